@@ -82,7 +82,7 @@ def stop_codes(
     """Codes (M, 2, 3) of the wanted (M,) pieces, 0 elsewhere. No piece is halved; the program may begin in motion."""
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
-        own.raised(search.used(own))
+        replace(own.raised(search.used(own)), quick=terms.quick)
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
+from itertools import tee
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,16 @@ from ..feed.pieces import FeedPieces
 from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
 from ..program.codes import ProgramError
-from ..program.image import Program, encode
+from ..program.image import Program, encode, segment_size
 from ..program.stop_planning import stop_codes, with_bounds
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
 from .geometry import Block
-from .windows import JOINTS, SectionFeed, Spacing, Stretch, Window, chained, taken
+from .windows import JOINTS, PIECE_BYTES, SectionFeed, Spacing, Stretch, Window, chained, taken
 
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 CHUNK_S = 0.7
 """New motion of a chunk."""
@@ -113,6 +115,32 @@ class _Kept:
         return kept, shift, int(times[shift])
 
 
+@dataclass
+class _Searched:
+    """Stop codes (M, 2, 3) of the pieces of a window, and which of them were searched (M,)."""
+
+    window: Window
+
+    def __post_init__(self) -> None:
+        count = len(self.window.stretch.pieces)
+        self.codes = _no_codes(count)
+        self.known: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
+
+
+class _Tails:
+    """Tails of a window, each planned once."""
+
+    def __init__(self, feed: SectionFeed, window: Window) -> None:
+        self._feed, self.window = feed, window
+        self._made: dict[int, Iterator[Stretch]] = {}
+
+    def behind(self, joint: int, least_q40: int) -> Iterator[Stretch]:
+        """As SectionFeed.tails; `least_q40` is that of the first call for a joint."""
+        made = self._made.get(joint) or self._feed.tails(self.window, joint, least_q40)
+        self._made[joint], own = tee(made)
+        return own
+
+
 class SectionChunks:
     """Makes the chunks of one section."""
 
@@ -141,6 +169,7 @@ class SectionChunks:
         self._most = most_bytes
         self._kept = _Kept()
         self._last: _Made | None = None
+        self._searched: _Searched | None = None
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -157,23 +186,26 @@ class SectionChunks:
         """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
         for, and which this is.
         """
-        codes = self._stop_codes(window, first, joints[-1])
-        before = self._kept
+        searched, before, tails = self._searched_in(window), self._kept, _Tails(self._feed, window)
+        program, fault = None, None
         for lateness_s, used in [
             *((LATENESS_S, count) for count in range(len(joints), 0, -1)),
             (LEAST_LATENESS_S, 1),
         ]:
             kept, piece_shift, time_shift = before.repeated(lateness_s)
-            joint = joints[used - 1]
-            new = taken(window.stretch.pieces, slice(first, joint))
-            self._kept = kept.with_new(new, codes[: joint - first])
-            program, fault = self._with_tail(window, joint)
+            joint, new = joints[used - 1], slice(first, joints[used - 1])
+            pieces = taken(window.stretch.pieces, new)
+            self._kept = kept.with_new(pieces, searched.codes[new])
+            if used > 1 and self._least_size(window, joint) > self._most:
+                continue
+            program, fault = self._with_tail(tails, joint)
             if fault is not None and fault.code == ProgramError.STOP_LONG:
-                codes = self._all_codes(window, first, joints[-1])
-                self._kept = kept.with_new(new, codes[: joint - first])
-                program, fault = self._with_tail(window, joint, search_tail=True)
+                self._search(searched, first, joint)
+                self._kept = kept.with_new(pieces, searched.codes[new])
+                program, fault = self._with_tail(tails, joint, search_tail=True)
             if fault is None and program.image_size + HEADER_SIZE <= self._most:
                 break
+        assert program is not None
         header = self._header(window, joint, program)
         if self._last is not None:
             # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
@@ -190,8 +222,16 @@ class SectionChunks:
         self._last = self._made(header, program)
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
-        new_s = float(new.duration_q32_s.sum()) * 2.0**-32
+        new_s = float(pieces.duration_q32_s.sum()) * 2.0**-32
         return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
+
+    def _least_size(self, window: Window, joint: int) -> int:
+        """Bytes of a chunk of the kept pieces, without its tail."""
+        path, pieces = self._feed.path, self._kept.pieces
+        assert pieces is not None
+        first = path.segment_at(int(pieces.start_q40[0]))
+        segments = path.segment_at(window.joint_q40(joint)) + 1 - first
+        return HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
 
     def _require_room(self, program: Program, line: int) -> None:
         size = program.image_size + HEADER_SIZE
@@ -233,27 +273,27 @@ class SectionChunks:
         return _Made(header, first, end, end_q40, program.piece_count)
 
     def _with_tail(
-        self, window: Window, joint: int, *, search_tail: bool = False
+        self, tails: _Tails, joint: int, *, search_tail: bool = False
     ) -> tuple[Program, NativeFault | None]:
         """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
 
         `search_tail`: stops may begin in the tail too. It is at rest soon anyway.
         """
-        kept, codes = self._kept.pieces, self._kept.codes
+        kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
         if window.rests and joint == window.count:
             program = self._program(Stretch(kept, window.stretch.end_q40), codes)
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
-        for tail in self._feed.tails(window, joint, least_q40):
+        for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
             program = self._program(whole, np.concatenate((codes, own)))
             fault = self._fault(program)
-            if program.image_size + HEADER_SIZE > self._most:
+            if fault is None or program.image_size + HEADER_SIZE > self._most:
                 break
-            if fault is None:
-                break
+            if fault.code == ProgramError.STOP_LONG and not search_tail:
+                break  # a longer tail makes the stop no shorter
         return program, fault
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
@@ -295,28 +335,34 @@ class SectionChunks:
                 bad[fault.index] = True
         return bad
 
-    def _stop_codes(self, window: Window, first: int, joint: int) -> Codes:
-        """Codes of the pieces between two knots, good for all of the path that the window knows behind them.
+    def _searched_in(self, window: Window) -> _Searched:
+        """Codes of the pieces of a window that are kept, good for all of the path that the window knows behind them.
 
         Of brief pieces only some are searched: a stop that is commanded in another one begins in the next that has
         codes, a little later.
         """
-        stretch = window.stretch
-        seconds = np.ldexp(stretch.pieces.duration_q32_s[first:joint].astype(np.float64), -32)
-        codes = _no_codes(len(stretch.pieces))
+        if self._searched is not None and self._searched.window is window:
+            return self._searched
+        searched, count = _Searched(window), window.count
+        durations = window.stretch.pieces.duration_q32_s[:count]
+        seconds = np.ldexp(durations.astype(np.float64), -32)
         for spacing_s in (SEARCH_S, 0.0):
-            found = np.asarray(codes[first:joint, :, DECELERATION].all(axis=1))
-            wanted = np.zeros(len(stretch.pieces), dtype=np.bool_)
-            wanted[first:joint] = _spaced(seconds, spacing_s, found)
-            if wanted.any():
-                codes = np.where(wanted[:, None, None], self._codes(window, stretch, wanted), codes)
-        return codes[first:joint]
+            found = np.asarray(searched.codes[:count, :, DECELERATION].all(axis=1))
+            wanted = np.flatnonzero(_spaced(seconds, spacing_s, found))
+            self._add_codes(searched, wanted)
+        self._searched = searched
+        return searched
 
-    def _all_codes(self, window: Window, first: int, joint: int) -> Codes:
-        """The same with every piece searched."""
-        wanted = np.zeros(len(window.stretch.pieces), dtype=np.bool_)
-        wanted[first:joint] = True
-        return self._codes(window, window.stretch, wanted)[first:joint]
+    def _search(self, searched: _Searched, first: int, joint: int) -> None:
+        """Searches those pieces between two knots that were not searched yet."""
+        self._add_codes(searched, first + np.flatnonzero(~searched.known[first:joint]))
+
+    def _add_codes(self, searched: _Searched, wanted: Index) -> None:
+        if wanted.size:
+            window, mask = searched.window, np.zeros_like(searched.known)
+            mask[wanted] = True
+            searched.codes[mask] = self._codes(window, window.stretch, mask)[mask]
+            searched.known |= mask
 
     def _tail_codes(self, window: Window, tail: Stretch) -> Codes:
         """Codes of a tail that takes longer than a fault stop may."""
@@ -329,7 +375,8 @@ class SectionChunks:
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
         plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
-        return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
+        terms = replace(stop_terms(self.machine, limits), quick=True)
+        return stop_codes(program, plan, terms, wanted)
 
 
 def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:

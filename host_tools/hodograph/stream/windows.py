@@ -357,7 +357,8 @@ class SectionFeed:
 
     def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
         """Ways to rest from a joint of a window, the shortest first, each to the end of a segment at arc length
-        `least_q40` of the section or behind it. The last one is the rest of the window.
+        `least_q40` of the section or behind it; each as it is planned, and then slower where the controller would
+        refuse that. The last one is the rest of the window.
         """
         found, curve = window.solution, self.path.curve
         low = float(found.grid.s[joint])
@@ -383,6 +384,7 @@ class SectionFeed:
                 own = _begun(ends_of(found, found.grid.size), state)
                 return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
 
+            yield made(one)
             yield self._lowered(one, made, lambda tail: tail)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
