@@ -133,12 +133,17 @@ class _Tails:
     def __init__(self, feed: SectionFeed, window: Window) -> None:
         self._feed, self.window = feed, window
         self._made: dict[int, Iterator[Stretch]] = {}
+        self._refused: list[Stretch] = []
 
     def behind(self, joint: int, least_q40: int) -> Iterator[Stretch]:
         """As SectionFeed.tails; `least_q40` is that of the first call for a joint."""
         made = self._made.get(joint) or self._feed.tails(self.window, joint, least_q40)
         self._made[joint], own = tee(made)
-        return own
+        return (tail for tail in own if not any(tail is one for one in self._refused))
+
+    def refuse(self, tail: Stretch) -> None:
+        """The controller would refuse the motion of a tail: it is not given again."""
+        self._refused.append(tail)
 
 
 class SectionChunks:
@@ -288,10 +293,14 @@ class SectionChunks:
         for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
-            program = self._program(whole, np.concatenate((codes, own)))
-            fault = self._fault(program)
-            if fault is None or program.image_size + HEADER_SIZE > self._most:
+            program, fault = self._program(whole, np.concatenate((codes, own))), None
+            if program.image_size + HEADER_SIZE > self._most:
                 break
+            fault = self._fault(program)
+            if fault is None:
+                break
+            if fault.code in _MOVING_FAULTS:
+                tails.refuse(tail)
             if fault.code == ProgramError.STOP_LONG and not search_tail:
                 break  # a longer tail makes the stop no shorter
         return program, fault
