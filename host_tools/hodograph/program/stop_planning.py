@@ -90,6 +90,18 @@ def stop_codes(
     return codes
 
 
+def without_long_stops(program: Program) -> Program:
+    """The program without stop parameters whose brakes take longer than the way on to where the next ones may begin, or
+    to its end.
+    """
+    codes = program.stops.codes.copy()
+    for kind in (HOLD, FAULT):
+        codes[
+            _better_without(_with_codes(program, codes), kind, range(program.piece_count)), kind
+        ] = 0
+    return with_bounds(_with_codes(program, codes))
+
+
 def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
     """Codes (M, 2, 3) of a program whose pieces without numbers of a kind are halved until all have them, or are too
     short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps them, so
@@ -127,7 +139,7 @@ def _search_round(
     codes[:, FAULT] = search.codes(limits[FAULT], codes[:, FAULT], given, codes[:, HOLD])
 
 
-def _better_without(program: Program, kind: int, pieces: list[int]) -> NDArray[np.bool_]:
+def _better_without(program: Program, kind: int, pieces: Sequence[int]) -> NDArray[np.bool_]:
     """Parts (M,) that had better have no numbers of a kind: those whose numbers give a bound that is longer by a tenth
     than the way on into the next part, and all of a piece (`pieces`, (M,)) where numbers that differ between its parts
     make no bound shorter by that.

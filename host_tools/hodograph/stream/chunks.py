@@ -18,7 +18,7 @@ from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
 from ..program.codes import ProgramError
 from ..program.image import Program, encode, segment_size
-from ..program.stop_planning import stop_codes, with_bounds
+from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
 from .geometry import Block
@@ -42,6 +42,9 @@ LATENESS_S, LEAST_LATENESS_S = 0.1, 0.02
 
 SEARCH_S, GAP_S = 0.02, 0.06
 """Stops may begin about so often, and all pieces are searched where they may not for so long."""
+
+_TAIL_SHARE = 0.8
+"""Of the last tail: a chunk for whose tail there is less room is not planned."""
 
 _LONGEST_NAME = 32
 _MOVING_FAULTS = frozenset(
@@ -117,14 +120,12 @@ class _Kept:
 
 @dataclass
 class _Searched:
-    """Stop codes (M, 2, 3) of the pieces of a window, and which of them were searched (M,)."""
+    """Stop codes (M, 2, 3) of the pieces of a window."""
 
     window: Window
 
     def __post_init__(self) -> None:
-        count = len(self.window.stretch.pieces)
-        self.codes = _no_codes(count)
-        self.known: NDArray[np.bool_] = np.zeros(count, dtype=np.bool_)
+        self.codes = _no_codes(len(self.window.stretch.pieces))
 
 
 class _Tails:
@@ -175,6 +176,7 @@ class SectionChunks:
         self._kept = _Kept()
         self._last: _Made | None = None
         self._searched: _Searched | None = None
+        self._tail_bytes = 0
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -201,13 +203,15 @@ class SectionChunks:
             joint, new = joints[used - 1], slice(first, joints[used - 1])
             pieces = taken(window.stretch.pieces, new)
             self._kept = kept.with_new(pieces, searched.codes[new])
-            if used > 1 and self._least_size(window, joint) > self._most:
+            kept_bytes = self._size_kept(window, joint)
+            if used > 1 and kept_bytes + _TAIL_SHARE * self._tail_bytes > self._most:
                 continue
-            program, fault = self._with_tail(tails, joint)
-            if fault is not None and fault.code == ProgramError.STOP_LONG:
-                self._search(searched, first, joint)
-                self._kept = kept.with_new(pieces, searched.codes[new])
-                program, fault = self._with_tail(tails, joint, search_tail=True)
+            program, fault = self._with_tail(tails, joint, None)
+            for thorough in (False, True):
+                if fault is None or fault.code != ProgramError.STOP_LONG:
+                    break
+                self._search_kept(window, joint, fault.index if thorough else None)
+                program, fault = self._with_tail(tails, joint, thorough)
             if fault is None and program.image_size + HEADER_SIZE <= self._most:
                 break
         assert program is not None
@@ -225,12 +229,13 @@ class SectionChunks:
                 f"(code {fault.code}): lower the feed there, and please report this file"
             )
         self._last = self._made(header, program)
+        self._tail_bytes = program.image_size + HEADER_SIZE - kept_bytes
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
         new_s = float(pieces.duration_q32_s.sum()) * 2.0**-32
         return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
 
-    def _least_size(self, window: Window, joint: int) -> int:
+    def _size_kept(self, window: Window, joint: int) -> int:
         """Bytes of a chunk of the kept pieces, without its tail."""
         path, pieces = self._feed.path, self._kept.pieces
         assert pieces is not None
@@ -278,11 +283,11 @@ class SectionChunks:
         return _Made(header, first, end, end_q40, program.piece_count)
 
     def _with_tail(
-        self, tails: _Tails, joint: int, *, search_tail: bool = False
+        self, tails: _Tails, joint: int, thorough: bool | None
     ) -> tuple[Program, NativeFault | None]:
         """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
 
-        `search_tail`: stops may begin in the tail too. It is at rest soon anyway.
+        `thorough`: how stops are searched that begin in the tail; None: none are. It is at rest soon anyway.
         """
         kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
@@ -292,17 +297,20 @@ class SectionChunks:
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
-            own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
+            own = self._tail_codes(window, tail, thorough)
             program, fault = self._program(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 break
             fault = self._fault(program)
+            if fault is not None and fault.code == ProgramError.STOP_LONG:
+                program = without_long_stops(program)
+                fault = self._fault(program)
             if fault is None:
                 break
             if fault.code in _MOVING_FAULTS:
                 tails.refuse(tail)
-            if fault.code == ProgramError.STOP_LONG and not search_tail:
-                break  # a longer tail makes the stop no shorter
+            if fault.code == ProgramError.STOP_LONG and not thorough:
+                break  # more codes are the better remedy; with them, a longer tail has more room for brakes
         return program, fault
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
@@ -357,34 +365,48 @@ class SectionChunks:
         seconds = np.ldexp(durations.astype(np.float64), -32)
         for spacing_s in (SEARCH_S, 0.0):
             found = np.asarray(searched.codes[:count, :, DECELERATION].all(axis=1))
-            wanted = np.flatnonzero(_spaced(seconds, spacing_s, found))
-            self._add_codes(searched, wanted)
+            self._add_codes(searched, _spaced(seconds, spacing_s, found))
         self._searched = searched
         return searched
 
-    def _search(self, searched: _Searched, first: int, joint: int) -> None:
-        """Searches those pieces between two knots that were not searched yet."""
-        self._add_codes(searched, first + np.flatnonzero(~searched.known[first:joint]))
+    def _add_codes(self, searched: _Searched, wanted: NDArray[np.bool_]) -> None:
+        """Searches the wanted ones of the kept pieces (count,)."""
+        if wanted.any():
+            window, mask = searched.window, np.zeros(len(searched.codes), dtype=np.bool_)
+            mask[: wanted.size] = wanted
+            searched.codes[mask] = self._codes(window, window.stretch, mask, False)[mask]
 
-    def _add_codes(self, searched: _Searched, wanted: Index) -> None:
-        if wanted.size:
-            window, mask = searched.window, np.zeros_like(searched.known)
-            mask[wanted] = True
-            searched.codes[mask] = self._codes(window, window.stretch, mask)[mask]
-            searched.known |= mask
+    def _search_kept(self, window: Window, joint: int, late: int | None) -> None:
+        """Searches all kept pieces that have no codes, before the path of the window behind their joint; thoroughly
+        those from piece `late` on, whether they have codes or not.
+        """
+        kept, codes = self._kept.pieces, self._kept.codes
+        assert kept is not None
+        rest = taken(window.stretch.pieces, slice(joint, None))
+        whole = Stretch(chained([kept, rest]), window.stretch.end_q40)
+        count = _kinds(codes)
+        wanted = count < codes.shape[1] if late is None else np.arange(len(codes)) >= late
+        mask = np.concatenate((wanted, np.zeros(len(rest), dtype=np.bool_)))
+        found = self._codes(window, whole, mask, late is not None)[: len(codes)]
+        better = wanted & (_kinds(found) >= count)
+        self._kept.codes = np.where(better[:, None, None], found, codes)
 
-    def _tail_codes(self, window: Window, tail: Stretch) -> Codes:
+    def _tail_codes(self, window: Window, tail: Stretch, thorough: bool | None) -> Codes:
         """Codes of a tail that takes longer than a fault stop may."""
-        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_))
+        if thorough is None:
+            return _no_codes(len(tail.pieces))
+        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_), thorough)
 
-    def _codes(self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_]) -> Codes:
+    def _codes(
+        self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_], thorough: bool
+    ) -> Codes:
         path = self._feed.path
         program = self._program(stretch, _no_codes(len(stretch.pieces)))
         begin = path.segment_at(int(stretch.pieces.start_q40[0]))
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
         plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
-        terms = replace(stop_terms(self.machine, limits), quick=True)
+        terms = replace(stop_terms(self.machine, limits), quick=not thorough)
         return stop_codes(program, plan, terms, wanted)
 
 
@@ -396,6 +418,11 @@ def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArra
     before = np.maximum.accumulate(np.where(found, t[1:], 0.0))
     after = np.minimum.accumulate(np.where(found, t[:-1], t[-1])[::-1])[::-1]
     return np.asarray((after - before > GAP_S) & ~found)
+
+
+def _kinds(codes: Codes) -> Index:
+    """Of how many kinds of stops each piece (M,) has codes."""
+    return np.asarray(np.count_nonzero(codes[:, :, DECELERATION], axis=1))
 
 
 def _no_codes(count: int) -> Codes:
