@@ -227,7 +227,7 @@ $(READY)/klipper/.ready: $(PEER_KLIPPER) tools/make_venv.sh | $(READY)/packages
 	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(READY)/klipper $(PEER_KLIPPER)
 compare: build $(if $(KLIPPER),$(READY)/klipper/.ready) ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA, Ruckig and Klipper (KLIPPER=CLONE); figures also in build/compare.json
 	@$(PYTHON) tools/packages.py compare
-	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json $(if $(ONLY),--only $(ONLY)) \
+	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json --figure $(BUILD)/compare.svg $(if $(ONLY),--only $(ONLY)) \
 	    $(if $(KLIPPER),--klipper $(KLIPPER) --klipper-python $(READY)/klipper/bin/python)
 
 butterfly: build ## the butterfly NURBS of the literature, beside three published cycle times; figures also in build/butterfly.json
