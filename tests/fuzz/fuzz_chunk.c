@@ -92,8 +92,9 @@ static void change(struct run *run, uint32_t count, struct fuzz_input *in)
     const uint8_t how = fuzz_byte(in);
     const uint32_t anywhere = fuzz_number(in, 2);
     const uint8_t value = fuzz_byte(in);
-    const uint32_t room = how >= 128u ? CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE : part->size;
-    const uint32_t at = anywhere % room;
+    FUZZ_CHECK(part->size > CHUNK_HEADER_SIZE);
+    const uint32_t at =
+        anywhere % (how >= 128u ? CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE : part->size);
     switch (how % 5u) {
     case 0:
         put(part, at, value, 1);
@@ -236,6 +237,7 @@ static void harness(struct fuzz_input *in)
     const struct job *job = &jobs[fuzz_byte(in) % JOBS];
     const uint32_t count = job->cuts.count;
     const struct program_limits limits = limits_of(job);
+    FUZZ_CHECK(count > 0u);
     fuzz_bytes(in, commands, sizeof commands);
     for (uint32_t i = 0; i < count; i++) {
         struct part *part = &run.parts[i];
