@@ -207,10 +207,7 @@ class _Plan:
         which = list(range(len(self.stretches)))
         if not which:
             return self
-        found = [
-            replace(self, cap_mm_s=(cap,) * len(which))._smoothed(which)
-            for cap in caps
-        ]
+        found = [replace(self, cap_mm_s=(cap,) * len(which))._smoothed(which) for cap in caps]
         best = [min(range(len(caps)), key=lambda k: found[k][index].time_s) for index in which]
         return replace(
             self,
