@@ -43,6 +43,10 @@ class _Windows(Divider):
     window: int = FIRST_CHORDS
 
     def _move(self, move: Move) -> None:
+        if move.end[3:] != ORIGIN[3:]:
+            raise InputError(
+                f"{self.file}:{move.line}: the move turns A, B or C: stream takes x, y and z only: use run"
+            )
         super()._move(move)
         while self.builder.count > self.window + _SEARCHED:
             chord = _straightest(self.builder, self.window)

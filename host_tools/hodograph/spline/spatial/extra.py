@@ -30,10 +30,17 @@ def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
     """
     value = np.vstack((values, values[:1])) if curve.closed else np.asarray(values)
     slope, bend = _by_arc_length(curve.segment_starts_mm, value, curve.closed)
+    return replace(curve, extra=quintics_by_arc_length(curve, value, slope, bend))
+
+
+def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, bend: Real) -> Real:
+    """Bezier coefficients (N, E, 6) of axes with values, slopes and second derivatives (N + 1, E) by arc length at the
+    joints of a curve.
+    """
     c = curve.speed_coefficients
     begin = _by_parameter(slope[:-1], bend[:-1], c[:, 0], 4.0 * (c[:, 1] - c[:, 0]))
     end = _by_parameter(slope[1:], bend[1:], c[:, 4], 4.0 * (c[:, 4] - c[:, 3]))
-    return replace(curve, extra=_hermite(value[:-1], value[1:], begin, end))
+    return _hermite(value[:-1], value[1:], begin, end)
 
 
 def with_standing_axes(curve: SpatialPHSpline, count: int) -> SpatialPHSpline:
