@@ -35,10 +35,10 @@ MILL = EXAMPLES / "machines" / "mill.toml"
 LIMIT_S = 240.0
 """Of real time: no test is judged by it, one that hangs ends by it."""
 COUNTS_PER_MM = 1_000_000
-CORNERS = ((0, 0, 0), (4, 0, 0), (4, 9, 0), (0, 0, -2))
-"""Exact stops at each; the second side takes 3 s."""
-PART = "F6000\nG61\nG1 X4\nG4 P0.1\nF180\nG1 Y9\nF6000\nG1 X0 Y0 Z-2\nM2\n"
-LONG_PART = PART.replace("Y9", "Y90").replace("F180", "F360")
+CORNERS = ((0, 0, 0), (4, 0, 0), (4, 5, 0), (0, 0, -2))
+"""Exact stops at each; the second side takes 1.7 s."""
+PART = "F6000\nG61\nG1 X4\nG4 P0.1\nF180\nG1 Y5\nF6000\nG1 X0 Y0 Z-2\nM2\n"
+LONG_PART = PART.replace("Y5", "Y90").replace("F180", "F360")
 REFUSED = 5
 STANDS_TICKS = 500
 
@@ -160,7 +160,7 @@ def _killed_and_stopped(bench: Bench, host: Host, kill_mm: float, stop_mm: float
 
 
 def test_a_host_that_is_killed_and_one_that_stops(make_bench: MakeBench, tmp_path: Path) -> None:
-    _killed_and_stopped(make_bench("fast", MILL), Host(tmp_path, CORNERS, PART), 0.5, 2.0)
+    _killed_and_stopped(make_bench("fast", MILL), Host(tmp_path, CORNERS, PART), 0.3, 1.5)
 
 
 @pytest.mark.long
@@ -186,6 +186,7 @@ def _link(state: str) -> None:
     subprocess.run(["ip", "link", "set", "vcan0", state], check=True)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may take the interface down")
 def test_an_interface_that_goes_down_and_a_machine_that_has_lost_its_place(tmp_path: Path) -> None:
     """The processes of the machine end with it, and with them job and positions. The new machine stands at 0: the job
