@@ -153,7 +153,8 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
 static uint64_t ticks_q32_s(uint32_t ticks, uint32_t period_us)
 {
     const uint64_t time_ms = (uint64_t)ticks * (period_us / 1000u);
-    return ((time_ms / 1000u) << 32) + qmath_div_u64((time_ms % 1000u) << 32, 1000u);
+    const uint64_t time_s = qmath_div_u64(time_ms, 1000u);
+    return (time_s << 32) + qmath_div_u64((time_ms - 1000u * time_s) << 32, 1000u);
 }
 
 static void enter(struct stream *stream, struct stream_chunk *at)

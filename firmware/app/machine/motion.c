@@ -61,8 +61,7 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     return 0;
 }
 
-/* Counts the ticks of a rest between two chunks. True: this one only repeats the last setpoint. */
-static bool rests(struct motion *motion)
+bool motion_rests(struct motion *motion)
 {
     const bool runs = feed_override_state(&motion->feed) == FEED_RUNNING;
     if (!motion_waits(motion)) {
@@ -74,16 +73,12 @@ static bool rests(struct motion *motion)
         return false;
     }
     motion->rest_ticks--;
+    motion->setpoints++;
     return true;
 }
 
 int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
 {
-    if (rests(motion)) {
-        motion->setpoints++;
-        path_counts_of(&motion->scale, &motion->point, target_counts);
-        return 0;
-    }
     const int result = feed_override_next(&motion->feed, &motion->interp, &motion->point);
     if (result < 0) {
         return result;

@@ -55,6 +55,10 @@ static inline uint32_t motion_axis_count(const struct motion *motion)
     return motion->scale.axis_count;
 }
 
+/* Before motion_step in each tick: counts the ticks of a rest between two chunks. True: this tick repeats the last setpoint, and
+ * there is no motion_step. Timer. */
+bool motion_rests(struct motion *motion);
+
 /* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */
 void motion_stop(struct motion *motion);
 void motion_fault_stop(struct motion *motion);

@@ -28,7 +28,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "name": program.name,
         "version": VERSION,
         "image_bytes": program.image_size,
-        "bytes": _bytes(program),
+        "record_bytes": _bytes(program),
         "period_us": program.period_us,
         "closed": program.closed,
         "segments": program.segment_count,
@@ -96,7 +96,7 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
     names = AXES[: program.axis_count]
     lines = [
         f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
-        _bytes_text(d["bytes"]),
+        _bytes_text(d["record_bytes"]),
         f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
         f"from      ({', '.join(f'{mm:.9f}' for mm in d['start_mm'])}) mm",
         f"to        ({', '.join(f'{mm:.9f}' for mm in d['end_mm'])}) mm",
