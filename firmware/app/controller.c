@@ -522,9 +522,10 @@ static bool wait_until(struct controller *controller, bool (*reached)(const stru
 
 static void leave_pre_operational(const struct controller *controller)
 {
-    for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
+    for (uint8_t i = 0; i < drive_configuration_nodes(&controller->config); ++i) {
         struct can_msg command;
-        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, controller->config.node[i], &command);
+        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL,
+                           drive_configuration_node(&controller->config, i), &command);
         controller_send(&command);
     }
 }

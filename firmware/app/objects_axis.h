@@ -48,4 +48,9 @@ uint64_t object_read_setpoint_torque(struct controller *controller, const struct
 uint64_t object_read_velocity_count(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_velocity_mapped(struct controller *controller, const struct od_entry *entry);
 
+/* TPDO13, which is RPDO1 of the I/O module, and the outputs in it (0x2036). */
+uint64_t object_read_outputs_cob_id(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_outputs_mapping(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry);
+
 #endif

@@ -79,6 +79,11 @@ enum program_error {
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
     PROGRAM_ERR_STOP_WORST = -64,   /* the worst stops of the header are not those of the table */
+    /* events (core/event_check.h): index = the event */
+    PROGRAM_ERR_EVENT_KIND = -100,  /* kind or channel unknown */
+    PROGRAM_ERR_EVENT_VALUE = -101, /* mask or value outside of what the kind has */
+    PROGRAM_ERR_EVENT_PLACE = -102, /* before the event before it, or outside the path */
+    PROGRAM_ERR_EVENT_DENSE = -103, /* a tick at 200 % could pass more than 16 events */
     /* chunks of a stream (core/chunk.h): index = the segment or piece of the chunk where it says so, else 0 */
     PROGRAM_ERR_CHUNK_FORMAT =
         -80, /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */

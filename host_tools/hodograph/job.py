@@ -8,7 +8,7 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -18,9 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import Machine, PathFile, SpacePathSpec
+from .config.outputs import Outputs
 from .errors import InputError, PlanError
+from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
+from .job_outputs import SectionCommands, is_output, section_events
 from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
@@ -74,6 +77,12 @@ class SectionPipeline(Pipeline):
     """A pipeline whose curve is that of a section."""
 
     fitted: FittedPath | None = None
+    given_events: Events = field(default_factory=no_events)
+
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path."""
+        return self.given_events
 
     @cached_property
     def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
@@ -268,7 +277,8 @@ def load_job(
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
     sections = tuple(made for section in path.sections for made in maker.made(section))
-    notes += _ignored_commands(path, file)
+    notes += _ignored_commands(path, file, machine.outputs)
+    sections = _with_outputs(sections, path.after, machine, file)
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
@@ -282,14 +292,30 @@ def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Ite
             yield command
 
 
-def _ignored_commands(path: Toolpath, file: Path) -> Iterator[str]:
+def _with_outputs(
+    sections: tuple[JobSection, ...], after: tuple[Command, ...], machine: Machine, file: Path
+) -> tuple[JobSection, ...]:
+    """The sections, with the outputs in their programs."""
+    if machine.outputs is None:
+        return sections
+    commands = [
+        SectionCommands(one.before, one.events, one.fitted.curve.length_mm) for one in sections
+    ]
+    every = section_events(commands, after, machine.outputs, file)
+    return tuple(
+        replace(one, pipeline=replace(one.pipeline, given_events=events))
+        for one, events in zip(sections, every, strict=True)
+    )
+
+
+def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> Iterator[str]:
     """Notes on commands that the machine does not execute, one for each kind."""
     at_rest = [command for section in path.sections for command in section.before]
     on_the_way = [event.command for section in path.sections for event in section.events]
     lines: dict[str, list[int]] = {}
     for command in [*at_rest, *path.after, *on_the_way]:
         for kinds, text in _IGNORED.items():
-            if isinstance(command, kinds):
+            if isinstance(command, kinds) and not is_output(command, outputs):
                 lines.setdefault(text, []).append(command.line)
     for text, where in lines.items():
         more = f" and {len(where) - 1} more" if len(where) > 1 else ""

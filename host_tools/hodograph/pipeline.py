@@ -25,6 +25,7 @@ from .config import (
     load_path_file,
 )
 from .errors import InputError, PlanError
+from .events import Events
 from .feed import (
     AxisLimits,
     ControllerLimits,
@@ -43,6 +44,7 @@ from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
 from .names import AXES
 from .native.brake_check import BrakeCheck
 from .native.program import NativeFault, NativeLimits, NativeProgram
+from .path_outputs import events_on_path
 from .program import (
     Compilation,
     Program,
@@ -434,9 +436,15 @@ class Pipeline:
                     limits,
                     machine.period_us,
                     self.stop_terms,
+                    self.events,
                 ),
                 self._replan,
             )
+
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path. Raises InputError: one that the machine does not have."""
+        return events_on_path(self.file, self.machine, self.curve)
 
     @property
     def stop_terms(self) -> StopTerms:

@@ -144,9 +144,77 @@ def _path_file() -> Schema:
                 "The machine that the path runs on",
                 {"file": _text("Machine file, relative to this file")},
             ),
+            "output": _list("Outputs that switch on the path", _path_output()),
         },
         ("path",),
         {"title": "Path file"},
+    )
+
+
+def _path_output() -> Schema:
+    places, levels = ("at_mm", "at_point", "at_fraction"), ("on", "value", "per_mm_s")
+    return _table(
+        "An output that switches at a place; one key for the place, one for what becomes of it",
+        {
+            "name": _text("The output, as the machine file calls it"),
+            "at_mm": _number("Arc length", 0, 2**22),
+            "at_point": _integer("Number of a point of `through`, from 0", 0, 10**7),
+            "at_fraction": _number("Share of the path's length", 0, 1),
+            "on": _flag("Level of a digital output"),
+            "value": _number("Value of an analogue output, in its unit", -1e12, 1e12),
+            "per_mm_s": _number(
+                "From here on the analogue output follows the feed, by so much for each mm/s",
+                -1e12,
+                1e12,
+            ),
+        },
+        ("name",),
+        {"allOf": [{"oneOf": [{"required": [key]} for key in keys]} for keys in (places, levels)]},
+    )
+
+
+def _outputs() -> Schema:
+    digital = _table("A digital output", {"digital": _integer("Number", 0, 15)}, ("digital",))
+    analogue = _table(
+        "An analogue output",
+        {
+            "analogue": _integer("Number", 0, 2),
+            "scale": _number("Value on the bus for one unit, not 0", -1e9, 1e9, 1.0),
+            "unit": _text("What the value is in"),
+        },
+        ("analogue",),
+    )
+    channels: Schema = {
+        "type": "object",
+        "description": "The outputs by name",
+        "propertyNames": {"pattern": "^[A-Za-z][A-Za-z0-9_]*$"},
+        "additionalProperties": {"anyOf": [digital, analogue]},
+        "minProperties": 1,
+    }
+    codes = {
+        "spindle": "Digital output: the spindle turns (M3, M4)",
+        "spindle_reverse": "Digital output: counterclockwise (M4)",
+        "speed": "Analogue output: S while the spindle turns",
+        "mist": "Digital output: M7",
+        "flood": "Digital output: M8",
+    }
+    return _table(
+        "An I/O module by CiA 401, whose outputs paths switch",
+        {
+            "node": _integer("Node number", 1, 127),
+            "delay_ticks": _integer("Ticks by which the outputs are held back", 0, 8, 1),
+            "keep_at_stop": _flag("Outputs stay on at a stop", False),
+            "keep_at_fault": _flag("And at a fault, a quick stop and with the drives off", False),
+            "off_at_end": _flag("Outputs go off at the end of a program", False),
+            "off_in_hold": _flag("Outputs are off during a feed hold", False),
+            "vendor": _integer("Vendor that the module must have; 0: any", 0, U32_MAX, 0),
+            "product": _integer("Product that it must have; 0: any", 0, U32_MAX, 0),
+            "channel": channels,
+            "gcode": _table(
+                "Outputs for words of G-code", {key: _text(text) for key, text in codes.items()}
+            ),
+        },
+        ("node", "channel"),
     )
 
 
@@ -308,6 +376,7 @@ def _machine_file() -> Schema:
                     )
                 },
             ),
+            "outputs": _outputs(),
             "axis": _list("The axes", _axis(), 1, MAX_AXES),
         },
         ("controller", "axis"),

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_configuration: the configuration of one drive as a list of operations on its dictionary, in order:
+ * drive_configuration: the configuration of one drive, or of the I/O module, as a list of operations on its dictionary, in order:
  * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object,
  * or PDO.
  *
@@ -22,6 +22,20 @@
  * long program can keep the main loop from it for a second). */
 #define DRIVE_HEARTBEAT_MS         100u
 #define DRIVE_CONTROLLER_SILENT_MS 2000u
+
+/* Drives, and the I/O module, where there is one. Pure. */
+static inline uint8_t drive_configuration_nodes(const struct config *config)
+{
+    return (uint8_t)(config->axis_count + (config->outputs.node != 0u ? 1u : 0u));
+}
+
+/* Of drive `i`; of the I/O module, which comes after them. Pure. */
+static inline uint8_t drive_configuration_node(const struct config *config, uint8_t i)
+{
+    return i < config->axis_count ? config->node[i] : config->outputs.node;
+}
+
+#define DRIVE_NODES (AXES_MAX + 1u)
 
 /* Kinds of operation on a drive's dictionary. */
 enum drive_op_kind {
@@ -50,7 +64,7 @@ struct drive_configuration {
     uint8_t item; /* of the row, when it is a PDO */
 };
 
-/* `config` and `facts` must stay; the facts are forgotten. */
+/* `config` and `facts` must stay; the facts are forgotten. `axis` = axis_count of the configuration: the I/O module. */
 void drive_configuration_begin(struct drive_configuration *configuration,
                                const struct config *config, uint8_t axis,
                                struct drive_properties *facts);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_monitor: heartbeats and emergency messages of the drives, and what they mean for the zero of a homed axis: a drive that
+ * drive_monitor: heartbeats and emergency messages of the drives and of the I/O module, and what they mean for the zero of a homed axis: a drive that
  * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
  * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
  */
@@ -9,6 +9,7 @@
 
 #include <stdint.h>
 
+#include "app/drives/drive_configuration.h"
 #include "app/machine/machine.h"
 #include "canopen/heartbeat.h"
 
@@ -20,9 +21,9 @@
 #define DRIVE_MONITOR_ZERO_MS 500u
 
 struct drive_monitor {
-    struct heartbeat_consumer consumers[AXES_MAX];
+    struct heartbeat_consumer consumers[DRIVE_NODES];
     struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are no drives: a host */
-    uint32_t silent_us[AXES_MAX]; /* since the last heartbeat, whatever has begun anew since */
+    uint32_t silent_us[DRIVE_NODES]; /* since the last heartbeat, whatever has begun anew since */
     uint8_t count;
     uint8_t other_count;
 };

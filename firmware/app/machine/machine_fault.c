@@ -53,10 +53,20 @@ void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_
     }
 }
 
+/* An output that is short or open, an error of the module itself. With the drives off nothing depends on it. */
+static void note_module_error(struct machine *machine, uint8_t node, uint16_t code)
+{
+    const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
+    if (node == machine->config.outputs.node && code != EMCY_NO_ERROR && on) {
+        machine_raise(machine, code, node, 0);
+    }
+}
+
 void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code)
 {
     struct axis *axis = machine_axis(machine, node);
     if (axis == NULL) {
+        note_module_error(machine, node, code);
         return;
     }
     axis->error_code = code;

@@ -16,6 +16,7 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     const int result = interpolator_begin(&motion->interp, program);
     if (result == 0) {
         feed_override_begin(&motion->feed, program, config->period_us, 0);
+        path_outputs_begin(&motion->outputs, program, -1);
     }
     return result;
 }
@@ -39,8 +40,11 @@ bool motion_take_over(struct motion *motion, const struct chunk *next)
         motion->rest_ticks = ticks > motion->rested_ticks ? ticks - motion->rested_ticks : 0u;
         motion->rested_ticks = 0;
         motion->point.arc_length_q40_mm = 0;
+        motion->precedes = true;
+        path_outputs_carry(&motion->outputs, &next->program, -1);
     } else {
         motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+        path_outputs_carry(&motion->outputs, &next->program, motion->point.arc_length_q40_mm);
     }
     return true;
 }
@@ -57,6 +61,7 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     feed_override_begin(&motion->feed, program, config->period_us, time_q42_s);
     (void)interpolator_seek(&motion->interp, time_q42_s >> 10);
     (void)interpolator_at_q42(&motion->interp, time_q42_s, &motion->point);
+    path_outputs_begin(&motion->outputs, program, arc_length_q40_mm);
     path_counts_of(&motion->scale, &motion->point, start_counts);
     return 0;
 }
@@ -84,6 +89,7 @@ int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
         return result;
     }
     motion->setpoints++;
+    motion->precedes = false;
     path_counts_of(&motion->scale, &motion->point, target_counts);
     return 0;
 }

@@ -16,6 +16,7 @@
 #include "core/chunk.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
+#include "core/path_outputs.h"
 
 struct motion {
     struct interpolator interp;
@@ -24,7 +25,10 @@ struct motion {
     uint32_t setpoints;              /* given so far */
     uint32_t rested_ticks;           /* at the end of the program, running, until the next chunk */
     uint32_t rest_ticks;             /* left before the program starts */
+    bool precedes; /* that setpoint is still the end of the chunk before: a rest is under way */
     struct path_counts scale;
+    struct path_outputs
+        outputs; /* at the last setpoint; stepped by `outputs`, where there is an I/O module */
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the

@@ -79,10 +79,12 @@ def controller_command(
 
 
 def drive_command(machine: Machine, address: BusAddress) -> list[str]:
-    """Command line of the one process that simulates all drives."""
+    """Command line of the one process that simulates all drives, and the I/O module."""
     command = [str(find_program(DRIVE)), "--bus", address.channel]
     for axis, drive in zip(machine.axes, machine.models(machine.axes), strict=True):
         command += ["--axis", _axis_text(axis, drive)]
+    if machine.outputs is not None:
+        command += ["--module", str(machine.outputs.node)]
     return command
 
 

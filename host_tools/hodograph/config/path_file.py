@@ -27,6 +27,7 @@ from ..feed.request import (
 )
 from ..names import AXES, is_toolpath
 from ..spline import END_NAMES, KNOT_NAMES
+from .outputs import PATH_OUTPUT, PathOutput, read_path_outputs
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
@@ -80,6 +81,7 @@ class PathFile:
     feed: FeedRequest | None
     limits: Limits
     machine_file: Path | None
+    outputs: tuple[PathOutput, ...] = ()
 
     @property
     def path(self) -> PathSpec:
@@ -112,7 +114,7 @@ class ListedPath:
 STOPS = ("none", "program", "optional")
 LONGEST_DWELL_MS = 86_400_000
 _RESTS = ("dwell_ms", "stop")
-_SECTIONS = ("path", "feed", "limits", "machine")
+_SECTIONS = ("path", "feed", "limits", "machine", "output")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
 _FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
 _LIMITS = (
@@ -185,6 +187,11 @@ def _path_file(root: Table, table: Table) -> PathFile:
         feed=feed,
         limits=limits,
         machine_file=machine.path("file") if machine.has("file") else None,
+        outputs=read_path_outputs(
+            root.tables("output", PATH_OUTPUT, required=False),
+            file,
+            len(path.points) if path.through else None,
+        ),
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
+from ..events import Events, no_events
 from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
@@ -52,7 +53,7 @@ class ProgramOptions:
 
     `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
     only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
-    beside the plan's limits.
+    beside the plan's limits. `events`: outputs on the path, by place.
     """
 
     name: str = ""
@@ -60,6 +61,7 @@ class ProgramOptions:
     limits: ProgramLimits | None = None
     period_us: int | None = None
     stops: StopTerms = field(default_factory=StopTerms)
+    events: Events = field(default_factory=no_events)
 
 
 _USUAL = ProgramOptions()
@@ -114,6 +116,7 @@ def compile_path(
         pieces=pieces,
         stops=no_stops(len(pieces)),
         extra_q40=geometry.extra_q40,
+        events=_on_path(options.events, length_q40),
     )
     _require_override_headroom(program, spline)
     program = plan_stops(program, plan, options.stops)
@@ -182,6 +185,13 @@ def _fit_feed(
         zones = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
         plan = replan(plan, [FeedZone(*zone) for zone in zones], where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
+
+
+def _on_path(events: Events, length_q40: int) -> Events:
+    """The events; one at the end of the path stays there when that is rounded down."""
+    held = events.copy()
+    held["place"] = np.minimum(events["place"], length_q40)
+    return held
 
 
 def _span(spline: Curve, joints_q40: Int, segment: int) -> tuple[int, float]:

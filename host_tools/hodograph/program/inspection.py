@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
@@ -49,6 +50,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "override_rate_least_per_s": float(pieces.override_rate_per_s().min()),
         "override_second_least_per_s2": float(pieces.override_second_per_s2().min()),
         "stops": stops_dict(program.stops, program.piece_starts_mm),
+        "events": [_event_dict(Event(*event)) for event in program.events.tolist()],
     }
 
 
@@ -119,8 +121,37 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         "",
         "   piece     hold: mm/s^3   mm/s^2   mm/s^3  bound s    fault: mm/s^3   mm/s^2   mm/s^3  bound s",
         *_rows(_stop_rows(program), full),
+        *_event_lines(program, full),
     ]
     return "\n".join(lines) + "\n"
+
+
+_EVENT_KINDS = {DIGITAL: "digital", ANALOGUE: "analogue", PROPORTIONAL: "proportional"}
+
+
+def _event_dict(event: Event) -> dict[str, Any]:
+    return {
+        "place_mm": event.place_q40 * 2.0**-40,
+        "kind": _EVENT_KINDS.get(event.kind, f"{event.kind}"),
+        "channel": event.channel,
+        "mask": event.mask,
+        "value": event.value / 65536 if event.kind == PROPORTIONAL else event.value,
+    }
+
+
+def _event_lines(program: Program, full: bool) -> list[str]:
+    """The table of events; nothing where there is none."""
+    if not len(program.events):
+        return []
+    rows = [
+        f"{i:8d} {d['place_mm']:14.9f} {d['kind']:>13} {d['channel']:8d}   0x{d['mask']:04X} {d['value']:12g}"
+        for i, d in enumerate(_event_dict(Event(*event)) for event in program.events.tolist())
+    ]
+    return [
+        "",
+        "   event       place mm          kind  channel     mask        value",
+        *_rows(rows, full),
+    ]
 
 
 def _segment_rows(program: Program) -> list[str]:
