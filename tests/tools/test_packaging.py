@@ -97,11 +97,11 @@ def test_the_place_of_the_wheel_is_forgotten(tmp_path: Path) -> None:
     information = tmp_path / "hodograph-1.dist-info"
     information.mkdir()
     (information / "direct_url.json").write_text('{"url": "file:///tmp/x"}')
-    first, last = "hodograph/__init__.py,sha256=a,1\n", "hodograph-1.dist-info/RECORD,,\n"
-    told = "hodograph-1.dist-info/direct_url.json,sha256=b,24\n"
-    (information / "RECORD").write_text(first + told + last)
+    first, last = b"hodograph/__init__.py,sha256=a,1\r\n", b"hodograph-1.dist-info/RECORD,,\r\n"
+    told = b"hodograph-1.dist-info/direct_url.json,sha256=b,24\r\n"
+    (information / "RECORD").write_bytes(first + told + last)
     forget_origin(information)
-    assert (information / "RECORD").read_text() == first + last
+    assert (information / "RECORD").read_bytes() == first + last
     assert [file.name for file in information.iterdir()] == ["RECORD"]
 
 

@@ -111,9 +111,9 @@ def forget_origin(information: Path) -> None:
     name = "direct_url.json"
     (information / name).unlink()
     record = information / "RECORD"
-    lines = record.read_text(encoding="utf-8").splitlines(keepends=True)
-    kept = [line for line in lines if not line.startswith(f"{information.name}/{name},")]
-    record.write_text("".join(kept), encoding="utf-8")
+    lines = record.read_bytes().splitlines(keepends=True)
+    told = f"{information.name}/{name},".encode()
+    record.write_bytes(b"".join(line for line in lines if not line.startswith(told)))
 
 
 def set_times(folder: Path, time_s: int) -> None:
