@@ -29,7 +29,14 @@ WINDOW_CHORDS = 1500
 FIRST_CHORDS = 300
 
 _SEARCHED = 200
-"""Chords at the end of a window among which the cut is chosen."""
+"""Chords behind a window among which the cut is chosen: where none of them is straight, as many more, and so on."""
+
+_STRAIGHT = 5e-4
+"""Change of direction about a straight chord; rad. Elsewhere a cut costs time: about 30 ms, since both curves are
+straight there."""
+
+_LONGEST = 3
+"""Times the length of a window, behind which the straightest chord is cut."""
 
 _SHORT_SHARE = 0.5
 """Of the median length: shorter chords are not cut."""
@@ -40,27 +47,34 @@ class _Windows(Divider):
     """A divider that cuts sections which become too long to be fitted at once."""
 
     window: int = FIRST_CHORDS
+    searched: int = 0
 
     def _move(self, move: Move) -> None:
         super()._move(move)
-        while self.builder.count > self.window + _SEARCHED:
-            chord = _straightest(self.builder, self.window)
-            if chord is None:
+        while self.builder.count > self.window + self.searched + _SEARCHED:
+            chord, turn = _straightest(self.builder, self.window + self.searched, _SEARCHED)
+            self.searched += _SEARCHED
+            if turn > _STRAIGHT:
+                if self.window + self.searched < _LONGEST * self.window:
+                    continue
+                chord, turn = _straightest(self.builder, self.window, self.searched)
+            if not np.isfinite(turn):
                 break
             self.add(self.builder.cut(chord), ends_tied=True)
-            self.window = WINDOW_CHORDS
+            self.window, self.searched = WINDOW_CHORDS, 0
 
 
-def _straightest(builder: ReferenceBuilder, first: int) -> int | None:
-    """The chord behind the first ones where the path turns least; None: it has none that is long enough."""
-    point = builder.points(first - 1, first + _SEARCHED + 2)
+def _straightest(builder: ReferenceBuilder, first: int, count: int) -> tuple[int, float]:
+    """The chord from the first one on where the path turns least, and by how much; inf: none is long enough."""
+    point = builder.points(first - 1, first + count + 2)
     length = np.linalg.norm(np.diff(point, axis=0), axis=1)
     if not length.all():
-        return first
+        return first, 0.0
     turn = turns(point)
     cost = turn[1:-2] + turn[2:-1]
     cost[length[1:-1] < _SHORT_SHARE * np.median(length)] = np.inf
-    return first + int(np.argmin(cost)) if np.isfinite(cost).any() else None
+    at = int(np.argmin(cost))
+    return first + at, float(cost[at])
 
 
 @dataclass(frozen=True, eq=False)
