@@ -22,7 +22,7 @@ from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
-from .geometry import Block
+from .geometry import Block, cut_segments
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -37,6 +37,11 @@ straight there."""
 
 _LONGEST = 3
 """Times the length of a window, behind which the straightest chord is cut."""
+
+_BESIDE_MM = 1e-6
+
+_LEAST_CUT_MM = 0.05
+"""A segment is not cut closer to its ends where the feed changes."""
 
 _SHORT_SHARE = 0.5
 """Of the median length: shorter chords are not cut."""
@@ -160,14 +165,24 @@ class _Rest:
 
 
 def block_of(section: JobSection) -> Block:
-    """The curve of a section, or of a part of one, with the feeds and lines of its segments."""
+    """The curve of a section, or of a part of one, with the feeds and lines of its segments. Segments end where the
+    programmed feed changes, but for short parts, which have the lower feed.
+    """
     fitted, reference = section.fitted, section.fitted.reference
-    place = fitted.place_mm
-    low = np.searchsorted(reference.place_mm, place[:-1], side="right") - 1
-    high = np.searchsorted(reference.place_mm, place[1:], side="left")
+    edges = fitted.place_mm
+    changes = reference.place_mm[1:-1][reference.feed_mm_s[1:] != reference.feed_mm_s[:-1]]
+    after = np.searchsorted(edges, changes)
+    apart = np.minimum(changes - edges[after - 1], edges[after] - changes)
+    cuts = changes[apart > _LEAST_CUT_MM]
+    cuts = cuts[np.append(True, np.diff(cuts) > _LEAST_CUT_MM)] if cuts.size else cuts
+    curve = cut_segments(section.pipeline.curve, fitted.arc_length_at(cuts))
+    place = np.sort(np.concatenate((edges, cuts)))
+    # A segment that ends where a chord does has nothing of the next one, whose feed may be less.
+    low = np.searchsorted(reference.place_mm, place[:-1] + _BESIDE_MM, side="right") - 1
+    high = np.searchsorted(reference.place_mm, place[1:] - _BESIDE_MM, side="left")
     low = np.clip(low, 0, reference.count - 1)
     high = np.clip(high, low + 1, reference.count)
     padded = np.append(np.minimum(reference.feed_mm_s, GREATEST_FEED_MM_S), np.inf)
     ranges = np.column_stack((low, high)).ravel()
     feed = np.minimum.reduceat(padded, ranges)[::2]
-    return Block(section.pipeline.curve, feed, reference.line[low])
+    return Block(curve, feed, reference.line[low])
