@@ -128,6 +128,28 @@ def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
     return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
 
 
+def cut_segments(curve: Curve, at_mm: Real) -> Curve:
+    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint."""
+    if not at_mm.size:
+        return curve
+    segment, xi = curve.locate(at_mm)
+    w = curve.w if isinstance(curve, PHSpline) else curve.preimage
+    parts, begin, done = [], 0, 0.0
+    for first, x in zip(segment.tolist(), xi.tolist(), strict=True):
+        if first >= begin:
+            parts.append(w[begin:first])
+            rest, begin, done = w[first : first + 1], first + 1, 0.0
+        else:
+            rest = parts.pop()
+        at = (x - done) / (1.0 - done)
+        # The part before is the one behind of the segment the other way round.
+        parts += [_behind_at(rest[..., ::-1], 1.0 - at)[..., ::-1], _behind_at(rest, at)]
+        done = x
+    origin: Any = np.insert(curve.origin, segment + 1, curve.position(segment, xi), axis=0)
+    made = PHSpline if isinstance(curve, PHSpline) else SpatialPHSpline
+    return made(origin, np.concatenate([*parts, w[begin:]]), False)
+
+
 def _behind_at(w: Any, x: float) -> Any:
     """Preimages (n, …, 3) whose first one begins at x of it; de Casteljau."""
     a, b, c = np.moveaxis(w[:1], -1, 0)

@@ -54,8 +54,8 @@ RESERVE = 0.01
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
 
-_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3)
-"""Ways of tails that are tried, in times the way that braking takes at least."""
+_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
+"""Ways of tails that are tried, in times the way that braking takes at least: some, and then those between them."""
 
 _MOST_LOWERED, _LOWERED = 8, 1.01
 """How often, and by which share, the limits of an interval are lowered that the controller would refuse."""
@@ -63,7 +63,8 @@ _MOST_LOWERED, _LOWERED = 8, 1.01
 _TAIL_LOWERED = (2, 1.04)
 """The same of a tail, which need not be the fastest."""
 
-_TAIL_EXCESS = 1.003
+_TAIL_EXCESS = 1.0075
+"""What a tail may use of the limits less RESERVE; whether the controller takes it is found by its own check."""
 _DRIFT_Q40 = 1024
 
 
@@ -366,7 +367,7 @@ class SectionFeed:
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
 
     def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """Ways to rest from a joint of a window, the shortest first, each to the end of a segment at arc length
+        """Ways to rest from a joint of a window, as _TAIL_WAYS has them, each to the end of a segment at arc length
         `least_q40` of the section or behind it; each as it is planned, and then slower where the controller would
         refuse that. The last one is the rest of the window.
         """
@@ -375,15 +376,13 @@ class SectionFeed:
         state = State(float(found.q[joint]), float(found.slope[joint]))
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
-        tried = -1
+        tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
             at = int(np.searchsorted(ends, wanted))
-            if at == tried:
+            if at in tried or at >= ends.size or ends[at] >= found.grid.s[-1]:
                 continue
-            if at >= ends.size or ends[at] >= found.grid.s[-1]:
-                break
-            tried = at
+            tried.add(at)
             high = float(ends[at])
             limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
             one = plan_window(curve, limits, low, high, state, self._period_s)
