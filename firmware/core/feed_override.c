@@ -344,13 +344,23 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
+/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited for the end of a
+ * rise of the override, which the bound of the piece before does not know of: then the bound of this piece counts. */
+static void enter_piece(struct feed_override *f)
+{
+    read_numbers(f);
+    if (f->kind == PROGRAM_STOP_HOLD) {
+        f->left_q30 = qmath_greater(f->left_q30, deadline_q30(f));
+    }
+}
+
 /* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
  * to find out before is spread over ticks. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
         if (f->numbers_piece != f->clock.piece) {
-            read_numbers(f);
+            enter_piece(f);
         }
         if (f->look == LOOK_SEEN) {
             f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;

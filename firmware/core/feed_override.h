@@ -7,7 +7,9 @@
  * bounds of every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
  * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
- * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4).
+ * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4). A hold or stop
+ * that is asked for while the override rises first ends the rise. If the plan is in another piece by then, the bound of that one
+ * counts from there.
  *
  * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
  * found to 2^-42 s of program time.

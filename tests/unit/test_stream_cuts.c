@@ -24,6 +24,9 @@
 #define MOST_TICKS 6000u
 #define LONGEST    20000u /* until rest */
 
+/* Found among 10^6: a hold while the override rises is late by the bound of the piece where it was commanded. */
+#define HOLD_IN_A_RISE 525090u
+
 static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp", "line.hdgp",
                                      "alpha_exponential.hdgp"};
 
@@ -405,6 +408,8 @@ static void test_cuts_at_any_instant(void)
         now.number = i;
         run_case(seed * 0x100000001u + i);
     }
+    now.number = HOLD_IN_A_RISE;
+    run_case(seed * 0x100000001u + HOLD_IN_A_RISE);
     printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
            "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
            "the whole; jerk %.4f of the limit\n",
