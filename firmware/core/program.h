@@ -45,6 +45,7 @@ struct program_header {
     uint32_t piece_count;
     uint16_t flags;      /* PROGRAM_FLAG_... */
     uint16_t axis_count; /* PROGRAM_PLANE ... PROGRAM_AXES */
+    uint32_t event_count;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
     int64_t offset_q40_mm
@@ -52,7 +53,6 @@ struct program_header {
     uint32_t feed_limit_um_s;
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
-    uint32_t event_count;
     char name[33];          /* UTF-8, always terminated */
     uint32_t hold_worst_us; /* longest stop of each kind, and the longest way of one */
     uint32_t hold_worst_um;

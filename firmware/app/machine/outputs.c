@@ -103,11 +103,19 @@ void outputs_step(struct outputs *outputs, struct machine *machine, bool synced)
 
 /* ---- The frame ---- */
 
+static bool same(const struct path_outputs_values *a, const struct path_outputs_values *b)
+{
+    bool equal = a->digital == b->digital;
+    for (uint32_t i = 0; i < PROGRAM_ANALOGUES; ++i) {
+        equal = equal && a->analogue[i] == b->analogue[i];
+    }
+    return equal;
+}
+
 bool outputs_due(const struct outputs *outputs, const struct config_outputs *config,
                  struct can_msg *out)
 {
-    if (outputs->refresh_ticks > 0u &&
-        memcmp(&outputs->present, &outputs->sent, sizeof outputs->sent) == 0) {
+    if (outputs->refresh_ticks > 0u && same(&outputs->present, &outputs->sent)) {
         return false;
     }
     const struct pdo_outputs outputs_pdo = {
