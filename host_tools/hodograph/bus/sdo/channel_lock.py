@@ -79,7 +79,7 @@ class Turns:
         if not got:
             raise BusyError(
                 f"another hodograph command is using {self._who}: no turn in {wait_s:g} s, "
-                "try again when it is done"
+                "try again when it is done (one that Ctrl-Z has stopped goes on with fg)"
             )
 
     def _lock(self, file: int, deadline: float) -> bool:
