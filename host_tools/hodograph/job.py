@@ -7,7 +7,7 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -308,18 +308,30 @@ def _with_outputs(
     )
 
 
+def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
+    """What a command that the machine does not execute is about; None: it executes it, or it is about motion."""
+    if is_output(command, outputs):
+        return None
+    return next((text for kinds, text in _IGNORED.items() if isinstance(command, kinds)), None)
+
+
+def ignored_note(file: Path, kind: str, lines: Sequence[int]) -> str:
+    """The note on all commands of a kind that the machine does not execute."""
+    more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
+    return f"{file}:{min(lines)}: {kind}{more}: the machine has none, it moves as if they were done"
+
+
 def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> Iterator[str]:
     """Notes on commands that the machine does not execute, one for each kind."""
     at_rest = [command for section in path.sections for command in section.before]
     on_the_way = [event.command for section in path.sections for event in section.events]
     lines: dict[str, list[int]] = {}
     for command in [*at_rest, *path.after, *on_the_way]:
-        for kinds, text in _IGNORED.items():
-            if isinstance(command, kinds) and not is_output(command, outputs):
-                lines.setdefault(text, []).append(command.line)
-    for text, where in lines.items():
-        more = f" and {len(where) - 1} more" if len(where) > 1 else ""
-        yield f"{file}:{min(where)}: {text}{more}: the machine has none, it moves as if they were done"
+        kind = ignored_kind(command, outputs)
+        if kind is not None:
+            lines.setdefault(kind, []).append(command.line)
+    for kind, where in lines.items():
+        yield ignored_note(file, kind, where)
 
 
 @dataclass(frozen=True, eq=False)

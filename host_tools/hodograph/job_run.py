@@ -90,10 +90,15 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
         needed = memory_bytes(program.image, RECORD_BYTES[kernel])
         room = job.machine.program_bytes or LARGEST_BANK
         if needed > room:
-            raise NoRoomError(
+            problem = (
                 f"{job.file}:{section.first_line}: the section up to line {section.last_line} takes {needed} bytes of "
-                f"a controller, which has {room}: hodograph stream takes jobs of any length"
+                f"a controller, which has {room}"
             )
+            if any(len(one.pipeline.events) for one in job.sections):
+                raise PlanError(
+                    f"{problem}: divide it by exact stops (G61); stream does not switch outputs yet"
+                )
+            raise NoRoomError(f"{problem}: hodograph stream takes jobs of any length")
         programs.append(program)
     return PreparedJob(job, kernel, tuple(programs), perf_counter() - begin)
 

@@ -426,6 +426,7 @@ class Pipeline:
         machine = self.machine
         limits = program_limits(machine)
         spline = self.curve
+        events = self.events  # its errors name file and table
         with _named_by(f"{self.file.file}:"):
             return compile_path(
                 spline,
@@ -436,7 +437,7 @@ class Pipeline:
                     limits,
                     machine.period_us,
                     self.stop_terms,
-                    self.events,
+                    events,
                 ),
                 self._replan,
             )

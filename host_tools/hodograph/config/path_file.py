@@ -156,6 +156,10 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     if not root.is_list("path"):
         return (ListedPath(load_path_file(file)),)
     tables = root.tables("path", (*_PATH, *_RESTS))
+    if root.has("output"):
+        raise root.error(
+            "output", "applies to files with one [path]: remove it, or make it one path"
+        )
     found = tuple(_listed(root, table) for table in tables)
     if len({type(one.file.given_path) for one in found}) > 1:
         raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from ..config import Machine
 from ..errors import InputError
 from ..feed.request import GREATEST_FEED_MM_S
-from ..job import GREATEST_TOLERANCE_MM, JobSection, SectionMaker, toolpath_commands
+from ..job import (
+    GREATEST_TOLERANCE_MM,
+    JobSection,
+    SectionMaker,
+    ignored_kind,
+    ignored_note,
+    toolpath_commands,
+)
+from ..job_outputs import is_output
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
@@ -146,13 +154,28 @@ class StreamReader:
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
         divider = _Windows(str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag))
         divider.tolerance_mm = self.tolerance_mm
-        for command in toolpath_commands(self.file, self.reading, self.notes):
+        for command in self._commands():
             divider.take(command)
             yield from divider.sections
             divider.sections.clear()
         divider.stop()
         yield from divider.sections
         self.after = tuple(divider.before)
+
+    def _commands(self) -> Iterator[Command]:
+        """Those of the file; the first one of each kind that is passed has a note. Raises InputError at an output."""
+        noted: set[str] = set()
+        for command in toolpath_commands(self.file, self.reading, self.notes):
+            if is_output(command, self.machine.outputs):
+                raise InputError(
+                    f"{self.file}:{command.line}: stream does not switch outputs yet: hodograph run does, where each "
+                    "section fits the controller; a machine file without [outputs] passes them"
+                )
+            kind = ignored_kind(command, self.machine.outputs)
+            if kind is not None and kind not in noted:
+                noted.add(kind)
+                self.notes.append(ignored_note(self.file, kind, [command.line]))
+            yield command
 
 
 class _Rest:

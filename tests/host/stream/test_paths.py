@@ -97,6 +97,7 @@ def _changed(folder: Path, old: str, new: str) -> Path:
         ('stop = "program"', 'stop = "maybe"', r"\[path 3\] stop"),
         ("dwell_ms = 500", "pause_ms = 500", r"\[path 2\] pause_ms"),
         ("closed = false", "dwell_ms = 5\nclosed = false", "first path has none"),
+        ("[feed]", '[[output]]\nname = "valve"\non = true\nat_mm = 5\n[feed]', "files with one"),
         ("[[40, 0], [52, 20], [40, 40]]", "[[40, 0, 1], [5, 2, 0], [4, 4, 4]]", "one kind"),
     ],
 )
