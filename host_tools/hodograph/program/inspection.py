@@ -10,10 +10,13 @@ import numpy as np
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
-from .image import VERSION, Program
+from .image import PIECE_SIZE, RECORD_BYTES, STOP_SIZE, VERSION, Program, record_bytes, segment_size
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
 
 _ROWS = 12
+
+RING_BYTES = 48 * 1024
+"""Memory for chunks of the small controllers (0x2060 sub 14)."""
 
 
 def inspect_dict(program: Program) -> dict[str, Any]:
@@ -27,6 +30,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "name": program.name,
         "version": VERSION,
         "image_bytes": program.image_size,
+        "memory": _memory(program),
         "period_us": program.period_us,
         "closed": program.closed,
         "segments": program.segment_count,
@@ -48,6 +52,65 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "override_second_least_per_s2": float(pieces.override_second_per_s2().min()),
         "stops": stops_dict(program.stops, program.piece_starts_mm),
     }
+
+
+def _records(program: Program, kernel: str) -> dict[str, int]:
+    of_segment, of_piece = record_bytes(RECORD_BYTES[kernel], program.axis_count)
+    return {"segment_bytes": of_segment, "piece_bytes": of_piece}
+
+
+def _memory(program: Program) -> dict[str, Any]:
+    """Bytes of a segment and a piece in the image and of their records, and what 48 KiB of images hold at least."""
+    segment, piece = segment_size(program.axis_count), PIECE_SIZE + STOP_SIZE
+    segments, pieces, seconds = ring_holds(program, RING_BYTES)
+    return {
+        "segment_bytes": segment,
+        "piece_bytes": piece,
+        "records": {kernel: _records(program, kernel) for kernel in RECORD_BYTES},
+        "ring_bytes": RING_BYTES,
+        "ring_segments": segments,
+        "ring_pieces": pieces,
+        "ring_s": seconds,
+    }
+
+
+def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
+    """Segments, pieces and seconds that fill so many bytes where they are densest.
+
+    Of a program that is smaller: so many of its mean density.
+    """
+    size = segment_size(program.axis_count), PIECE_SIZE + STOP_SIZE
+    starts = np.append(program.pieces.start_q40, program.length_q40)
+    times = np.concatenate((np.zeros(1), np.cumsum(program.pieces.duration_q32_s) * 2.0**-32))
+    # of the segments, those that begin before the end of each piece
+    begun = np.searchsorted(program.start_q40, starts, side="right")
+    filled = begun * size[0] + np.arange(program.piece_count + 1) * size[1]
+    last = np.searchsorted(filled, filled + ring_bytes, side="right") - 1
+    if last[0] == program.piece_count:
+        times_as_many = ring_bytes / (
+            program.segment_count * size[0] + program.piece_count * size[1]
+        )
+        return (
+            int(times_as_many * program.segment_count),
+            int(times_as_many * program.piece_count),
+            times_as_many * float(times[-1]),
+        )
+    full = np.flatnonzero(last < program.piece_count)
+    least = full[np.argmin(times[last[full]] - times[full])]
+    end = last[least]
+    return int(begun[end] - begun[least]), int(end - least), float(times[end] - times[least])
+
+
+def _memory_text(memory: dict[str, Any]) -> str:
+    records = "; ".join(
+        f"{kernel} {one['segment_bytes']} and {one['piece_bytes']}"
+        for kernel, one in memory["records"].items()
+    )
+    return (
+        f"memory    {memory['segment_bytes']} bytes a segment, {memory['piece_bytes']} a piece; records: {records}\n"
+        f"stream    {memory['ring_bytes'] // 1024} KiB hold {memory['ring_segments']} segments and "
+        f"{memory['ring_pieces']} pieces, {memory['ring_s']:.3f} s, where they are densest"
+    )
 
 
 def inspect_text(program: Program, *, full: bool = False) -> str:
@@ -75,6 +138,7 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         f"mm/s^2, jerk {d['peak_jerk_mm_s3']:.6g} mm/s^3 (bounds of the pieces)",
         f"override  factor {d['override_factor_least']:.4g}, rate {d['override_rate_least_per_s']:.4g} /s, "
         f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
+        _memory_text(d["memory"]),
         *stops_text(program.stops, program.piece_starts_mm),
         "",
         " segment       start mm"
