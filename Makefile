@@ -45,7 +45,7 @@ $(shell [ ! -e $(VENV)/.ready ] || [ "$$(cat $(VENV)/.ready)" = "$(CURDIR)" ] ||
 
 ## ---- what there is ---------------------------------------------------------------------------
 
-OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wildcard sim/node/drive.eds),drive)
+OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wildcard sim/node/drive.eds),drive) $(if $(wildcard sim/node/module.eds),module)
 OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
@@ -227,7 +227,7 @@ $(READY)/klipper/.ready: $(PEER_KLIPPER) tools/make_venv.sh | $(READY)/packages
 	@PYTHON=$(PYTHON) bash tools/make_venv.sh $(READY)/klipper $(PEER_KLIPPER)
 compare: build $(if $(KLIPPER),$(READY)/klipper/.ready) ## the same toolpaths planned by Hodograph, LinuxCNC, TOPP-RA, Ruckig and Klipper (KLIPPER=CLONE); figures also in build/compare.json
 	@$(PYTHON) tools/packages.py compare
-	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json $(if $(ONLY),--only $(ONLY)) \
+	@$(PY) benchmarks/peers/compare.py --json $(BUILD)/compare.json --figure $(BUILD)/compare.svg $(if $(ONLY),--only $(ONLY)) \
 	    $(if $(KLIPPER),--klipper $(KLIPPER) --klipper-python $(READY)/klipper/bin/python)
 
 butterfly: build ## the butterfly NURBS of the literature, beside three published cycle times; figures also in build/butterfly.json
@@ -312,6 +312,7 @@ $(BUILD)/generated/od_$(1).c $(BUILD)/generated/od_$(1).h &: $(2) $(wildcard too
 endef
 $(if $(filter controller,$(OD_NAMES)),$(eval $(call OD_RULE,controller,firmware/app/controller.eds)))
 $(if $(filter drive,$(OD_NAMES)),$(eval $(call OD_RULE,drive,sim/node/drive.eds)))
+$(if $(filter module,$(OD_NAMES)),$(eval $(call OD_RULE,module,sim/node/module.eds)))
 
 ## ---- C -------------------------------------------------------------------------------------------
 
@@ -473,7 +474,7 @@ format: $(VENV)/.ready ## bring C and Python into the formats that lint asks for
 
 lint-eds: $(VENV)/.ready
 	$(call say,eds,CiA 306)
-	$(Q)PYTHONPATH=tools $(PY) -m eds.check $(wildcard firmware/app/controller.eds sim/node/drive.eds)
+	$(Q)PYTHONPATH=tools $(PY) -m eds.check $(wildcard firmware/app/controller.eds sim/node/drive.eds sim/node/module.eds)
 
 ## ---- the native module of the Python package -------------------------------------------------------
 

@@ -21,8 +21,9 @@ sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "host_tools/hodograph/native")]
 
 from build_native import extension  # noqa: E402
 
-from dist.programs import PROGRAMS, build_programs  # noqa: E402
+from dist.programs import build_programs, programs_for  # noqa: E402
 
+PROGRAMS = tuple(programs_for(sys.platform))
 BY_MAKE = os.environ.get("HODOGRAPH_BUILT_BY_MAKE") == "1"
 NEEDED = (
     "hodograph/data/controller.eds",
@@ -33,13 +34,13 @@ NEEDED = (
     "hodograph/monitor/page/index.html",
     "hodograph/monitor/page/page.js",
     "hodograph/monitor/page/style.css",
-    "hodograph/native/_native.abi3.so",
+    "hodograph/native/_native.*[do]",  # .abi3.so, on Windows .pyd
     *(f"hodograph/bin/{name}" for name in PROGRAMS),
 )
 
 
 class BuildAll(build_ext):
-    """The native module, and then the programs, which lie in the package's folder `bin`."""
+    """The native module, and then, on Linux, the programs, which lie in the package's folder `bin`."""
 
     def run(self) -> None:
         """Compiles both; an installation for editing gets the programs in build/bin, where `make` puts them."""

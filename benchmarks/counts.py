@@ -6,7 +6,8 @@
 Needs `make counter`. The main figures of docs/validation/counts.md: for each core and kernel the median over
 the examples and the
 most over all programs, plain and with the override in use, of the motion part and of the whole interrupt; the same of
-the usual NURBS interpolator, with the ripple of the feed of both; and what the check of a program costs.
+the usual NURBS interpolator, with the ripple of the feed of both; what the check of a program costs; and what the proof
+of its stops costs.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ def main() -> None:
     figures = main_figures(Campaign(options.build).run())
     figures["constant_feed"] = beside(taylor.compare(options.build))
     figures["check"] = checking.costs(options.build)
+    figures["stop_check"] = checking.stop_costs(options.build)
     text = json.dumps(figures, indent=2)
     print(text)
     if options.json:

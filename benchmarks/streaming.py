@@ -25,7 +25,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "host_tools")]
 MILL = ROOT / "examples" / "machines" / "mill.toml"
-LINES, FIT_LINES = (300, 1200), (2000, 20_000)
+LINES, FIT_LINES = (300, 1200, 100_000), (2000, 20_000)
 _ROW_LINES, _STEP_MM, _PITCH_MM = 400, 0.25, 0.5
 
 

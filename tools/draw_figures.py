@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """draw_figures.py [--check] [--output DIR]: the figures of the manual (docs/images), from the programs themselves.
 
-Draws path, feed, phase plane of a stop, state machine, bus timing and the figures of the tutorial as SVG files. With
---check nothing is written; the exit status is 1 when a figure in DIR is not the one that would be drawn.
+Draws path, feed, outputs, phase plane of a stop, state machine, bus timing and the figures of the tutorial as SVG
+files. With --check nothing is written; the exit status is 1 when a figure in DIR is not the one that would be drawn.
 """
 
 from __future__ import annotations
@@ -33,7 +33,9 @@ from hodograph.native import NativeProgram
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import encode
+from hodograph.report.path_figures import mark_outputs
 from hodograph.report.style import BLUE, GREEN, GREY, INK, ORANGE, RED, SOFT, styled
+from hodograph.simulate import simulate_on
 from hodograph.toolpath.files import ReadOptions, read_toolpath
 from hodograph.toolpath.fit.sections import divided
 
@@ -115,6 +117,31 @@ def path_figure() -> Figure:
     feed.set(xlabel="time, s", ylabel="feed, mm/s", title="Feed of the same path by two profiles")
     feed.legend()
     feed.margins(x=0)
+    return figure
+
+
+# --- Outputs ---
+
+
+def output_figure() -> Figure:
+    """A bead of glue: where outputs switch, and the outputs over time."""
+    pipeline = example("dispense.toml")
+    motion = simulate_on(pipeline.machine, pipeline.image)
+    figure, (plane, times) = pyplot.subplots(1, 2, figsize=(9.6, 4.2))
+    spline = pipeline.spline_result.spline
+    points = spline.point(np.linspace(0.0, spline.length_mm, SAMPLES))
+    plane.plot(points.real, points.imag, color=BLUE, linewidth=2.4)
+    plane.set(xlabel="x, mm", ylabel="y, mm", title="Path, and where outputs switch")
+    plane.set_aspect("equal", adjustable="datalim")
+    mark_outputs(plane, pipeline)
+    time_s = motion.t_s[: motion.ticks]
+    times.plot(time_s, motion.feed_mm_s[: motion.ticks], color=BLUE, label="feed, mm/s")
+    for k, (name, color) in enumerate((("valve", RED), ("needle", GREEN))):
+        level = motion.output_columns[name][: motion.ticks]
+        times.step(time_s, 8.0 * level - 12.0 * (k + 1), color=color, where="post", label=name)
+    times.set(xlabel="time, s", title="Feed and outputs", yticks=range(0, 61, 20))
+    times.legend(loc="center")
+    times.margins(x=0)
     return figure
 
 
@@ -347,6 +374,7 @@ def _toolpath(axes: Axes, name: str) -> None:
 
 FIGURES: dict[str, Any] = {
     "path": path_figure,
+    "outputs": output_figure,
     "stops": stop_figure,
     "states": state_figure,
     "bus": bus_figure,

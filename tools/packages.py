@@ -128,8 +128,8 @@ AARCH64 = (
     _file(f"{AARCH64_ROOT}/lib/ld-linux-aarch64.so.1", "libc6-arm64-cross"),
 )
 DEB = (_program("dpkg-buildpackage"), _program("dh"))
-# A clean root, to try packages in, and containers.
-CLEAN_ROOT = (_program("mmdebstrap"),)
+# To try packages: what they are checked with, a clean root, and containers.
+CLEAN_ROOT = (_program("lintian"), _program("mmdebstrap"))
 CONTAINER = (_program("buildah"), *CLEAN_ROOT)
 COMPARE = (_program("linuxcnc"), _program("unshare"))
 SETS = {

@@ -4,7 +4,7 @@
 
 The output of a part passes through. A part given by --tests has to end with a line `N passed, N failed`, with or
 without `, N skipped`. A part fails when its exit status is not 0, and one of --tests also when it has no such line or
-counts a failure; whatever fails, the parts behind it run all the same. At the end there is a table of how long each
+counts a failure; whatever fails, the parts after it run all the same. At the end there is a table of how long each
 part took, and as the last line the sum: `N passed, N failed`. A part that fails without having counted a failure is
 one failure. Exit status 1 when there is any. Standard library only: it runs before anything is installed.
 """

@@ -4,7 +4,7 @@
 
 Prints what differs from firmware/targets/sizes.json; --update writes it there instead. Bytes: `code` is all that lies
 in flash, `data` the part of it that is copied to RAM, `ram` variables without the stack, `stack` the worst case of
-mainline and interrupts one upon the other (tools/analysis/stack.py), of the `room` that the linker script gives.
+main loop and interrupts one upon the other (tools/analysis/stack.py), of the `room` that the linker script gives.
 """
 
 from __future__ import annotations

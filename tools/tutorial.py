@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """docs/start/tutorial.md as a notebook: its Python blocks, run one after the other in one namespace.
 
-A block of ```text right behind a block of Python is what that prints. An image ../images/NAME.svg behind it shows the
+A block of ```text right after a block of Python is what that prints. An image ../images/NAME.svg after it shows the
 `figure` that it leaves.
 """
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """`make compare`: the same toolpaths planned by Hodograph and by its peers, side by side in one run.
 
-    compare.py [--json OUT] [--only NAME ...] [--klipper CLONE --klipper-python PYTHON]
+    compare.py [--json OUT] [--figure OUT] [--only NAME ...] [--klipper CLONE --klipper-python PYTHON]
 
 Each motion is sampled at 1 kHz. Printed of each: cycle time, greatest distance from the programmed path (both ways),
-greatest velocity, acceleration and jerk of an axis, ticks beyond the limits of the axes, and the wall time of planning
-(of LinuxCNC, which plans while it runs, there is none). docs/validation/compare.md says how each peer is set up.
+greatest velocity, acceleration and jerk of an axis, ticks beyond the limits of the axes, processor time (of LinuxCNC,
+which plans while it moves, there is none) and peak memory of the planning process. docs/validation/compare.md says how
+each peer is set up.
 """
 
 from __future__ import annotations
@@ -13,15 +14,12 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +30,10 @@ from hodograph.toolpath.moves import ORIGIN, ArcMove, SplineMove, StraightMove
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from peers import klipper, linuxcnc, ruckig_stops, toppra_spline
+from peers import klipper, linuxcnc, picture, ruckig_stops, toppra_spline
 from peers.motion import AxisLimits, Motion, deviation_um
+from peers.plan_alone import SLOWEST_S, plan_alone
+from peers.process_cost import Cost, run_measured
 from peers.toolpaths import Toolpath, toolpaths
 
 Real = NDArray[np.float64]
@@ -60,16 +60,19 @@ class Row:
     jerk_mm_s3: float
     ticks_beyond_acceleration: int
     ticks_beyond_jerk: int
-    planning_s: float | None
+    processor_s: float | None
+    memory_mib: float
 
 
-Runner = Callable[[Toolpath, Path], tuple[Motion, float | None]]
+Outcome = tuple[Motion, Cost]
+Runner = Callable[[Toolpath, Path], Outcome]
 
 
 def main() -> int:
     """Exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--figure", type=Path, help="a corner of the zigzag, drawn as SVG")
     parser.add_argument("--only", nargs="*", default=[], help="these toolpaths")
     parser.add_argument(
         "--klipper", type=Path, metavar="CLONE", help="folder of a clone of Klipper"
@@ -78,12 +81,15 @@ def main() -> int:
     options = parser.parse_args()
     try:
         with _optional_klipper(options) as peer:
-            rows = _printed(options.only, peer)
+            motions: dict[str, Motion] = {}
+            rows = _printed(options.only, peer, motions)
     except klipper.NoKlipperError as error:
         print(f"compare.py: {error}", file=sys.stderr)
         return 1
     if options.json is not None:
         options.json.write_text(json.dumps([vars(row) for row in rows], indent=1) + "\n")
+    if options.figure is not None and motions:
+        picture.draw(motions, TOLERANCE_MM, LIMITS.jerk_mm_s3 or np.inf, options.figure)
     return 0
 
 
@@ -98,8 +104,10 @@ def _optional_klipper(
     return klipper.copied(options.klipper.expanduser(), options.klipper_python.absolute())
 
 
-def _printed(only: list[str], peer: klipper.Klipper | None) -> list[Row]:
-    """Measures and prints row by row."""
+def _printed(
+    only: list[str], peer: klipper.Klipper | None, motions: dict[str, Motion]
+) -> list[Row]:
+    """Measures and prints row by row; keeps the motions that the figure shows."""
     told = "" if peer is None else f", Klipper {peer.version}"
     print(
         f"axes: {LIMITS.velocity_mm_s:g} mm/s, {LIMITS.acceleration_mm_s2:g} mm/s^2, {LIMITS.jerk_mm_s3:g} mm/s^3 "
@@ -108,13 +116,15 @@ def _printed(only: list[str], peer: klipper.Klipper | None) -> list[Row]:
     )
     print(_HEAD)
     rows = []
-    for row in _rows(only, peer):
+    for row in _rows(only, peer, motions):
         rows.append(row)
         print(_line(row), flush=True)
     return rows
 
 
-def _rows(only: list[str], peer: klipper.Klipper | None) -> Iterator[Row]:
+def _rows(
+    only: list[str], peer: klipper.Klipper | None, motions: dict[str, Motion]
+) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for feed in FEEDS_MM_MIN:
             for toolpath in toolpaths(feed):
@@ -124,23 +134,25 @@ def _rows(only: list[str], peer: klipper.Klipper | None) -> Iterator[Row]:
                 file.write_text(toolpath.text, encoding="utf-8")
                 path_mm = programmed_path(file)
                 for name, run in _peers(toolpath, peer):
-                    yield _measured(toolpath, name, *run(toolpath, file), path_mm)
+                    outcome = run(toolpath, file)
+                    if (toolpath.name, feed) == ("zigzag", FEEDS_MM_MIN[0]):
+                        motions[name] = outcome[0]
+                    yield _measured(toolpath, name, outcome, path_mm)
 
 
 def _peers(toolpath: Toolpath, peer: klipper.Klipper | None) -> Iterator[tuple[str, Runner]]:
     yield "Hodograph", _hodograph
     yield "LinuxCNC", _linuxcnc
     if peer is not None and toolpath.plain:
-        yield "Klipper", lambda _, file: (peer.run(file, LIMITS), None)
+        yield "Klipper", lambda _, file: _klipper(peer, file)
     if toolpath.smooth:
         yield "TOPP-RA", _toppra
     if toolpath.name == "zigzag":
         yield "Ruckig", _ruckig
 
 
-def _measured(
-    toolpath: Toolpath, peer: str, motion: Motion, planning_s: float | None, path_mm: Real
-) -> Row:
+def _measured(toolpath: Toolpath, peer: str, outcome: Outcome, path_mm: Real) -> Row:
+    motion, cost = outcome
     return Row(
         toolpath.name,
         toolpath.feed_mm_min,
@@ -152,7 +164,8 @@ def _measured(
         motion.peak(3),
         motion.ticks_beyond(2, LIMITS.acceleration_mm_s2),
         motion.ticks_beyond(3, LIMITS.jerk_mm_s3 or np.inf),
-        planning_s,
+        cost.processor_s,
+        cost.memory_mib,
     )
 
 
@@ -166,49 +179,50 @@ def programmed_path(file: Path) -> Real:
     return np.asarray(builder.reference().point)
 
 
-def _hodograph(_: Toolpath, file: Path) -> tuple[Motion, float | None]:
+def _hodograph(_: Toolpath, file: Path) -> Outcome:
     trace = file.with_suffix(".csv")
     command = [
         *(sys.executable, "-m", "hodograph", "simulate", str(file), "--machine", str(MACHINE)),
-        *("--tolerance", f"{TOLERANCE_MM:g}", "--trace", str(trace), "--json"),
+        *("--tolerance", f"{TOLERANCE_MM:g}", "--trace", str(trace)),
     ]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    said: dict[str, Any] = json.loads(done.stdout)
+    done, cost = run_measured(command, SLOWEST_S)
+    if done.returncode != 0:
+        raise RuntimeError(f"hodograph simulate failed:\n{done.stderr}")
     with trace.open(newline="") as rows:
         found = [[float(row[f"{axis}_cmd_mm"]) for axis in "xyz"] for row in csv.DictReader(rows)]
-    return Motion.trimmed(np.array(found)), float(said["planning_s"])
+    return Motion.trimmed(np.array(found)), cost
 
 
-def _linuxcnc(_: Toolpath, file: Path) -> tuple[Motion, float | None]:
-    return linuxcnc.run(file, LIMITS, f"G64 P{TOLERANCE_MM:g}"), None
+def _linuxcnc(_: Toolpath, file: Path) -> Outcome:
+    motion, memory_mib = linuxcnc.run(file, LIMITS, f"G64 P{TOLERANCE_MM:g}")
+    return motion, Cost(None, memory_mib)
 
 
-def _toppra(toolpath: Toolpath, file: Path) -> tuple[Motion, float | None]:
-    path_mm = programmed_path(file)
-    begin = perf_counter()
-    motion = toppra_spline.run(path_mm, toolpath.feed_mm_s, LIMITS)
-    return motion, perf_counter() - begin
+def _klipper(peer: klipper.Klipper, file: Path) -> Outcome:
+    return peer.run(file, LIMITS)
 
 
-def _ruckig(toolpath: Toolpath, file: Path) -> tuple[Motion, float | None]:
-    path_mm = programmed_path(file)
-    begin = perf_counter()
-    motion = ruckig_stops.run(path_mm, toolpath.feed_mm_s, LIMITS)
-    return motion, perf_counter() - begin
+def _toppra(toolpath: Toolpath, file: Path) -> Outcome:
+    return plan_alone("TOPP-RA", programmed_path(file), toolpath.feed_mm_s, LIMITS)
+
+
+def _ruckig(toolpath: Toolpath, file: Path) -> Outcome:
+    return plan_alone("Ruckig", programmed_path(file), toolpath.feed_mm_s, LIMITS)
 
 
 _HEAD = (
     f"{'toolpath':<18}{'F':>6} {'planner':<10}{'cycle s':>9}{'off um':>8}{'mm/s':>8}{'mm/s^2':>8}{'mm/s^3':>9}"
-    f"{'ticks beyond':>14}{'plan s':>8}"
+    f"{'ticks beyond':>14}{'CPU s':>8}{'MiB':>6}"
 )
 
 
 def _line(row: Row) -> str:
-    planning = "-" if row.planning_s is None else f"{row.planning_s:.2f}"
+    processor = "-" if row.processor_s is None else f"{row.processor_s:.2f}"
     beyond = f"{row.ticks_beyond_acceleration}, {row.ticks_beyond_jerk}"
     return (
         f"{row.toolpath:<18}{row.feed_mm_min:>6g} {row.peer:<10}{row.cycle_s:>9.3f}{row.deviation_um:>8.2f}"
-        f"{row.velocity_mm_s:>8.1f}{row.acceleration_mm_s2:>8.0f}{row.jerk_mm_s3:>9.0f}{beyond:>14}{planning:>8}"
+        f"{row.velocity_mm_s:>8.1f}{row.acceleration_mm_s2:>8.0f}{row.jerk_mm_s3:>9.0f}{beyond:>14}{processor:>8}"
+        f"{row.memory_mib:>6.0f}"
     )
 
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .motion import RATE_HZ, AxisLimits, Motion
+from .process_cost import Cost, run_measured
 
 Real = NDArray[np.float64]
 
@@ -54,8 +55,8 @@ class Klipper:
     python: Path
     version: str
 
-    def run(self, program: Path, limits: AxisLimits) -> Motion:
-        """The motion of a G-code program that starts at X0 Y0; raises NoKlipperError."""
+    def run(self, program: Path, limits: AxisLimits) -> tuple[Motion, Cost]:
+        """The motion of a G-code program that starts at X0 Y0, and what the batch run took; raises NoKlipperError."""
         with tempfile.TemporaryDirectory(prefix="peer-") as name:
             folder = Path(name)
             log, source, config = (
@@ -65,12 +66,12 @@ class Klipper:
             )
             config.write_text(_configuration(limits, log), encoding="utf-8")
             source.write_text(_own_words(program.read_text(encoding="utf-8")), encoding="utf-8")
-            _called(
+            cost = _called(
                 *(self.python, self.copy / "klippy/klippy.py", config, "-i", source),
                 *("-o", folder / "serial", "-d", self.copy / "out/klipper.dict"),
             )
             moves = np.loadtxt(log, ndmin=2)
-        return Motion.trimmed(_sampled(moves))
+        return Motion.trimmed(_sampled(moves)), cost
 
 
 @contextmanager
@@ -105,19 +106,13 @@ def _own_words(text: str) -> str:
     return f"SET_KINEMATIC_POSITION X=0 Y=0 Z=0\n{text}M400\n"
 
 
-def _called(*command: object) -> None:
-    """Raises NoKlipperError. Our make is not the one above theirs."""
+def _called(*command: object) -> Cost:
+    """What it took; raises NoKlipperError. Our make is not the one above theirs."""
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
-    done = subprocess.run(
-        list(map(str, command)),
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=_SLOWEST_S,
-        check=False,
-    )
+    done, cost = run_measured(command, _SLOWEST_S, environment)
     if done.returncode != 0:
         raise NoKlipperError(f"{command[0]} failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+    return cost
 
 
 def _configuration(limits: AxisLimits, log: Path) -> str:

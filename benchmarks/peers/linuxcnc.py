@@ -51,8 +51,11 @@ def version() -> str:
     return subprocess.run(query, capture_output=True, text=True, check=True).stdout
 
 
-def run(program: Path, limits: AxisLimits, blending: str) -> Motion:
-    """The motion of a G-code program, with `blending` (such as "G64 P0.01") before its first line."""
+def run(program: Path, limits: AxisLimits, blending: str) -> tuple[Motion, float]:
+    """The motion of a G-code program, with `blending` (such as "G64 P0.01") before its first line; memory in MiB.
+
+    The memory is the sum of the peaks of milltask, which reads the program, and rtapi_app, which plans and runs it.
+    """
     with tempfile.TemporaryDirectory(prefix="peer-") as name:
         folder = Path(name)
         folder.chmod(0o777)  # LinuxCNC's real-time part gives its privileges up
@@ -80,7 +83,8 @@ def run(program: Path, limits: AxisLimits, blending: str) -> Motion:
         if not samples.exists():
             log = "\n".join(file.read_text() for file in sorted(folder.glob("linuxcnc_*.txt")))
             raise RuntimeError(f"LinuxCNC did not run:\n{done.stdout}\n{done.stderr}\n{log}")
-        return Motion.trimmed(_positions(samples))
+        memory_kib = int((folder / "memory.txt").read_text())
+        return Motion.trimmed(_positions(samples)), memory_kib / 1024.0
 
 
 def _lines(program: Path) -> str:

@@ -34,7 +34,7 @@ class Motion:
 
     @staticmethod
     def trimmed(position_mm: Real) -> Motion:
-        """Without the standstill before and behind."""
+        """Without the standstill before and after."""
         moves = np.flatnonzero(np.abs(np.diff(position_mm, axis=0)).max(axis=1) > _STANDS_MM)
         if not moves.size:
             raise ValueError("nothing moves in these samples")
@@ -46,7 +46,7 @@ class Motion:
         return (len(self.position_mm) - 1) / RATE_HZ
 
     def derivative(self, order: int) -> Real:
-        """Differences (n, 3) of an order over the period, at rest before and behind."""
+        """Differences (n, 3) of an order over the period, at rest before and after."""
         rest = np.pad(self.position_mm, ((order, order), (0, 0)), mode="edge")
         return np.asarray(np.diff(rest, order, axis=0) * RATE_HZ**order)
 

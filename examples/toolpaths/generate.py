@@ -5,6 +5,7 @@ pocket.ngc     a plate with two pockets, a slot and four holes: arcs, helices, a
 engraving.ngc  a sign: cubic Bézier curves (G5), a NURBS (G5.2) and lines, between rapid moves
 dispensing.ngc a bead of adhesive round a lid: outputs switch with the moves, pressure by an analogue output
 surface.ngc    a wavy surface, finished in lines of short chords, as CAM systems write it
+five_axes.ngc  a groove that winds up a dome; the tool leans (A) while the table turns (C)
 """
 
 from __future__ import annotations
@@ -93,9 +94,29 @@ def surface() -> Iterator[str]:
     yield f"G0 Z{SAFE_Z:g}\nM5\nM30"
 
 
+def five_axes() -> Iterator[str]:
+    """One turn up a dome in chords of about 0.5 mm; A and C turn with X, Y and Z."""
+    yield from (
+        "(groove round a dome, X Y Z A C)",
+        "G21 G17 G90 G94 G64 P0.01",
+        "S18000 M3",
+        f"G0 X30 Y0 Z{SAFE_Z:g}",
+        "G1 Z0 F600",
+        "F1500",
+    )
+    count = 300
+    for k in range(1, count + 1):
+        t = k / count
+        radius, angle = 30.0 - 14.0 * t * t, 2.0 * math.pi * t
+        x, y = radius * math.cos(angle), radius * math.sin(angle)
+        lean = 12.0 * math.sin(0.5 * math.pi * t) ** 2
+        yield f"X{x:.4f} Y{y:.4f} Z{12 * t:.4f} A{lean:.4f} C{360 * t:.4f}"
+    yield f"G0 Z{12 + SAFE_Z:g}\nM5\nM30"
+
+
 def main() -> None:
     """Write all files."""
-    for write in (pocket, engraving, dispensing, surface):
+    for write in (pocket, engraving, dispensing, surface, five_axes):
         path = Path(__file__).with_name(f"{write.__name__}.ngc")
         path.write_text("".join(f"{line}\n" for line in write()), encoding="utf-8")
 

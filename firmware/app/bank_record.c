@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/bank_record.h (see there): the commit record at the end of a bank of the store, which marks the
+ * content as complete. */
 #include "app/bank_record.h"
 
 #include "canopen/cob.h"

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * bank_record: the mark at the end of a bank of the store that says: what is in here is whole. Programs and
- * parameters have it alike.
+ * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Banks for
+ * programs and banks for parameters both have one.
  *
  *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
  *
  * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check, so
- * that a bank without a valid record never counts, wherever the power went. Of two valid ones the later sequence
- * (modulo 2^32) is the newer content. Mainline.
+ * that a bank without a valid record never counts, whenever the power failed. Of two valid ones the later sequence
+ * (modulo 2^32) is the newer content. Main loop.
  */
 #ifndef APP_BANK_RECORD_H
 #define APP_BANK_RECORD_H

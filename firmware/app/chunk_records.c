@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/chunk_records.h (see there): the coefficient records of a job in chunks, made ahead of the tick. */
 #include "app/chunk_records.h"
 
 #include "core/kernel.h"
@@ -51,24 +52,19 @@ void chunk_records_go_on(struct chunk_records *records, struct machine *machine,
     }
 }
 
-bool chunk_records_take_over(struct chunk_records *records, struct machine *machine,
-                             const struct chunk *next)
+const struct coefficients_window *chunk_records_for_next(struct chunk_records *records,
+                                                         const struct machine *machine,
+                                                         const struct chunk *next)
 {
-    struct motion *motion = &machine->motion;
+    const struct motion *motion = &machine->motion;
     struct feed_place place;
     port_lock();
     const bool now = feed_override_may_take_over(&motion->feed, &motion->interp, next, &place) != 0;
     port_unlock();
-    const struct coefficients_window *window =
-        now ? coefficient_cache_prepare(&records->cache, &next->program, &place) : NULL;
-    if (window == NULL) {
-        return false;
-    }
-    port_lock();
-    const bool taken = machine_take_over(machine, next, window);
-    port_unlock();
-    if (taken) {
-        coefficient_cache_used(&records->cache);
-    }
-    return taken;
+    return now ? coefficient_cache_prepare(&records->cache, &next->program, &place) : NULL;
+}
+
+void chunk_records_taken_over(struct chunk_records *records)
+{
+    coefficient_cache_used(&records->cache);
 }

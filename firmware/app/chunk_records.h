@@ -37,9 +37,11 @@ const struct coefficients_window *chunk_records_begin(struct chunk_records *reco
 void chunk_records_go_on(struct chunk_records *records, struct machine *machine,
                          const struct program *program);
 
-/* Makes records of the next chunk and takes it over (machine_take_over): true when it has been taken over, false when it
- * cannot be now. */
-bool chunk_records_take_over(struct chunk_records *records, struct machine *machine,
-                             const struct chunk *next);
+/* Records of the next chunk, where it can be taken over now: for machine_take_over. NULL: it cannot. */
+const struct coefficients_window *chunk_records_for_next(struct chunk_records *records,
+                                                         const struct machine *machine,
+                                                         const struct chunk *next);
+/* The machine has taken it over, with these records. */
+void chunk_records_taken_over(struct chunk_records *records);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/chunk_ring.h (see there): memory for the chunks of a stream. */
 #include "app/chunk_ring.h"
 
 #include <stddef.h>

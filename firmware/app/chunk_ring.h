@@ -2,7 +2,7 @@
 /*
  * chunk_ring: memory for the chunks of a stream: blocks that lie in one piece each, taken and freed in the same order.
  *
- * A block that does not fit behind the newest one begins at the start of the memory again; what is left over at the end
+ * A block that does not fit after the newest one begins at the start of the memory again; the remainder at the end
  * stays unused until then. The newest block may be made smaller, or given back, as long as no other has been taken.
  * Offsets, not pointers: no block moves, and nothing is stored in the memory itself. Main loop.
  */
@@ -20,7 +20,7 @@ struct chunk_ring {
     uint32_t size;
     uint32_t first;  /* offset of the oldest block */
     uint32_t newest; /* of the newest one, */
-    uint32_t end;    /* and behind it */
+    uint32_t end;    /* and where it ends */
     uint32_t back;   /* `end` before it was taken */
     bool used;       /* there is a block */
 };
@@ -34,7 +34,8 @@ void chunk_ring_clear(struct chunk_ring *ring);
 /* Bytes of the largest block that can be taken now. Pure. */
 uint32_t chunk_ring_room(const struct chunk_ring *ring);
 
-/* Takes a block of `least` bytes or more, as large as there is room in its place: *size. NULL: there is no such place. */
+/* Takes a block of `least` bytes or more, as large as there is room in its place: *size. NULL: there is no such
+ * place. */
 uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size);
 
 /* The newest block keeps its first `size` bytes, which must be some. */

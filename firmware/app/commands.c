@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/commands.h (see there): the commands of object 0x2001. */
 #include "app/commands.h"
 
 #include <string.h>

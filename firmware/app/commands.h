@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* commands: object 0x2001. Mainline. */
+/* commands: object 0x2001. Main loop. */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
 
@@ -18,20 +18,22 @@ enum command {
     COMMAND_HOME = 10,
 };
 
-/* Hold, stop and quick stop wait for nothing: no transfer of another client, no check of a chunk. Pure. */
+/* Whether a command is executed at once, without waiting for a transfer of another client or the check of a chunk:
+ * hold, stop and quick stop. Pure. */
 static inline bool command_is_urgent(uint8_t number)
 {
     return number == (uint8_t)COMMAND_STOP || number == (uint8_t)COMMAND_HOLD ||
            number == (uint8_t)COMMAND_QUICK_STOP;
 }
 
-/* Whether the frame is an SDO request of this node to do one of these, in the one form that passes at any time. Pure. */
+/* Whether the frame is an SDO request of this node to do one of these, in the one form that passes at any time.
+ * Pure. */
 bool command_urgent_request(const struct can_msg *frame, uint8_t node);
 
 /* Those of a set (bit by enum command), the most severe last. Under the lock. */
 void commands_execute_urgent(struct machine *machine, uint16_t set);
 
-/* Does it, or says why not; the answer is also kept in controller->refusal. */
+/* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. */
 enum machine_refusal commands_execute(struct controller *controller, enum command command);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/controller.h (see there): the wiring of machine, tick, protocol objects and port. */
 #include "app/controller.h"
 
 #include <stddef.h>
@@ -40,11 +41,11 @@ void controller_start_itself(struct controller *controller)
 
 /* ---- Values at power-on and at a reset ---- */
 
-/* At power-on, and at the NMT services reset node and reset communication (CiA 301, 7.3.2.2), all objects, or those below
- * 0x2000, get their stored values (0x1010) or else their defaults. The program stays: it is no parameter. The resets come while
- * the machine is configurable only. */
+/* At power-on, and at the NMT services reset node and reset communication (CiA 301, 7.3.2.2), all objects, or those
+ * below 0x2000, get their stored values (0x1010) or else their defaults. The program stays: it is no parameter. The
+ * resets come while the machine is configurable only. */
 
-/* The whole configuration anew from the objects; the drives have to hear of it. */
+/* The whole configuration anew from the objects; the drives have to be configured by it. */
 static void take_configuration(struct controller *controller)
 {
     config_read(&controller->config, &controller->od);
@@ -62,7 +63,7 @@ static void forget_errors(struct controller *controller)
                        values->predefined_error_field, &values->predefined_error_field_count,
                        (uint8_t)(sizeof values->predefined_error_field /
                                  sizeof values->predefined_error_field[0]));
-    controller->reported_serial--; /* a fault that is still there is told again */
+    controller->reported_serial--; /* a fault that is still there is reported again */
 }
 
 /* All values to the stored ones or their defaults, for this node; no errors. */
@@ -123,7 +124,8 @@ static void init_values(struct controller *controller, uint8_t port_node)
     }
 }
 
-/* A chunk is checked while the motion goes on: the main loop does not stand still, and the chunk before this one may be due. */
+/* A chunk is checked while the motion goes on: the main loop does not stand still, and the chunk before this one may be
+ * due. */
 static void beat_in_stream(void *self)
 {
     struct controller *controller = self;
@@ -224,7 +226,7 @@ static void receive_other(struct controller *controller, const struct can_msg *m
     }
 }
 
-/* Receive: process data at once, the rest waits for the mainline. */
+/* Receive: process data at once, the rest waits for the main loop. */
 static void on_receive(void *self, const struct can_msg *message, uint32_t now_us)
 {
     struct controller *controller = self;
@@ -266,7 +268,7 @@ int controller_start(struct controller *controller)
 
 /* The node is its own NMT master: it enters OPERATIONAL by itself, and executes resets from outside
  * while its drives are off. */
-static bool nmt_obeyed(struct controller *controller, const struct can_msg *in)
+static bool nmt_command_allowed(struct controller *controller, const struct can_msg *in)
 {
     const bool reset = in->len >= 2u && (in->data[0] == (uint8_t)NMT_RESET_NODE ||
                                          in->data[0] == (uint8_t)NMT_RESET_COMMUNICATION);
@@ -278,7 +280,7 @@ static bool nmt_obeyed(struct controller *controller, const struct can_msg *in)
 
 static void take_nmt(struct controller *controller, const struct can_msg *in)
 {
-    if (!nmt_obeyed(controller, in) || !nmt_slave_receive(&controller->nmt, in)) {
+    if (!nmt_command_allowed(controller, in) || !nmt_slave_receive(&controller->nmt, in)) {
         return;
     }
     sdo_server_reset(&controller->server);
@@ -362,7 +364,7 @@ static bool boot_requested(struct machine *machine)
     return due;
 }
 
-/* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 tells changes only. */
+/* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 reports changes only. */
 static void note_facts(struct controller *controller, const struct can_msg *command)
 {
     if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
@@ -506,7 +508,7 @@ static bool reached_now(struct controller *controller, bool (*reached)(const str
     return done;
 }
 
-/* Goes on with the mainline until it is so or the time is over, or, where that counts, somebody insists. */
+/* Goes on with the main loop until it is so or the time is over, or, where that counts, somebody insists. */
 static bool wait_until(struct controller *controller, bool (*reached)(const struct machine *),
                        uint32_t time_us, bool until_insisted)
 {
@@ -524,9 +526,10 @@ static bool wait_until(struct controller *controller, bool (*reached)(const stru
 
 static void leave_pre_operational(const struct controller *controller)
 {
-    for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
+    for (uint8_t i = 0; i < drive_configuration_nodes(&controller->config); ++i) {
         struct can_msg command;
-        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL, controller->config.node[i], &command);
+        nmt_master_command(NMT_ENTER_PRE_OPERATIONAL,
+                           drive_configuration_node(&controller->config, i), &command);
         controller_send(&command);
     }
 }
@@ -537,8 +540,8 @@ static uint32_t quick_time_us(const struct controller *controller)
     return (MACHINE_QUICK_TICKS + AXIS_STANDSTILL_SYNCS) * controller->config.period_us;
 }
 
-/* The machine itself gives a stop up at its deadline, a fifth beyond its bound, or, near the end of a program, beyond twice
- * that at most; then the axes settle and arrive. This is for a machine whose ticks do not come. */
+/* The machine itself gives a stop up at its deadline, a fifth beyond its bound, or, near the end of a program, beyond
+ * twice that at most; then the axes settle and arrive. This is for a machine whose ticks do not come. */
 static uint32_t path_time_us(const struct controller *controller)
 {
     const struct program_slot *slot = &controller->slot;

@@ -7,7 +7,7 @@
  *     controller_start(&controller);              interrupts on
  *     while (...) { port_wait(...); controller_poll(&controller); }
  *
- * docs/reference/architecture.md draws which context runs what. All functions: mainline.
+ * docs/reference/architecture.md draws which context runs what. All functions: main loop.
  */
 #ifndef APP_CONTROLLER_H
 #define APP_CONTROLLER_H
@@ -32,11 +32,11 @@
 #include "canopen/sdo_server.h"
 #include "od_controller.h"
 
-/* The longest the mainline may sleep without a frame: the resolution of its timeouts. */
+/* The longest the main loop may sleep without a frame: the resolution of its timeouts. */
 #define CONTROLLER_POLL_US 5000u
 
-/* The most that one round counts against the partners of the protocols: a mainline that was busy (a program check), or
- * a host that stalled, is no silence of theirs. */
+/* The most time that one round counts in the timeouts of the protocols. So a main loop that was busy (a program check),
+ * or a host that stalled, does not count as silence of the other nodes. */
 #define CONTROLLER_ELAPSED_MAX_US 20000u
 
 /* The configuration that holds: one that the host has confirmed, or one restored from the store. */
@@ -51,10 +51,10 @@ struct controller {
     struct machine machine;
     struct tick tick;
     struct frame_queue queue;
-    bool checks_chunk; /* the mainline is busy with a chunk while the motion may go on: */
+    bool checks_chunk; /* the main loop is busy with a chunk while the motion may go on: */
     uint16_t
         urgent; /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
-    /* mainline only */
+    /* main loop only */
     struct config config; /* the same values as machine.config */
     struct configured configured;
     struct parameter_store store;
@@ -71,7 +71,7 @@ struct controller {
     struct heartbeat_producer heartbeat;
     struct emcy_producer emcy;
     uint32_t polled_us;             /* port_time_us() of the last poll */
-    uint32_t reported_serial;       /* machine.fault_serial that the last EMCY told of */
+    uint32_t reported_serial;       /* machine.fault_serial of the last EMCY */
     enum machine_state noted_state; /* last one logged */
     enum cia402_state noted_drive[AXES_MAX];
     struct drive_trouble noted_trouble;
@@ -81,8 +81,8 @@ struct controller {
     bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
 };
 
-/* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored one
- * (0x2054) replaces. */
+/* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored
+ * one (0x2054) replaces. */
 void controller_init(struct controller *controller, uint8_t node);
 
 /* Turns the interrupts on. 0 or PORT_ERR_SYSTEM. */
@@ -98,8 +98,8 @@ bool controller_shut_down(struct controller *controller);
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
-/* A sign of life in long work of the main loop, such as the check of a program, at each step: sends the heartbeat if it is due
- * and tells the port (port_progress). `self`: the controller. */
+/* To be called at each step of long work in the main loop, such as the check of a program: sends the heartbeat if it is
+ * due and calls port_progress(). `self`: the controller. */
 void controller_beat(void *self);
 
 /* Around the check of a chunk: commands to stop that come meanwhile take effect at once. */
@@ -109,8 +109,8 @@ void controller_check_ends(struct controller *controller);
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
 void controller_start_itself(struct controller *controller);
 
-/* Sends from the mainline, waiting a little when the port is full; then the frame is dropped: every
- * protocol above can stand a lost frame. */
+/* Sends from the main loop, waiting a little when the port is full; then the frame is dropped: every protocol above
+ * tolerates a lost frame. */
 void controller_send(const struct can_msg *message);
 
 #endif

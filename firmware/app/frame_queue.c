@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/frame_queue.h (see there): frames from the receive interrupt to the main loop, in order. */
 #include "app/frame_queue.h"
 
 void frame_queue_init(struct frame_queue *queue)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* frame_queue: frames from the receive interrupt to the mainline, in order. */
+/* frame_queue: frames from the receive interrupt to the main loop, in order. */
 #ifndef APP_FRAME_QUEUE_H
 #define APP_FRAME_QUEUE_H
 
@@ -20,7 +20,7 @@ struct frame_queue {
 
 void frame_queue_init(struct frame_queue *queue);
 
-/* Returns true when the queue was empty, so that the mainline may have to be woken. Receive. */
+/* Returns true when the queue was empty, so that the main loop may have to be woken. Receive. */
 bool frame_queue_put(struct frame_queue *queue, const struct can_msg *frame);
 
 /* Takes the oldest; false when there is none. Under the lock. */

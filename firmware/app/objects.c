@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/objects.h (see there): what the controller's object dictionary (controller.eds) does beside
+ * storing values. */
 #include "app/objects.h"
 
 #include <stddef.h>
@@ -23,8 +25,7 @@ static uint64_t object_read_state(struct controller *controller, const struct od
     return (uint64_t)controller->machine.state;
 }
 
-/* While the drives are being looked for, node and detail tell which one keeps the others waiting.
- */
+/* In BOOT, node and detail name the drive that the others wait for. */
 static uint64_t object_read_fault(struct controller *controller, const struct od_entry *entry)
 {
     const struct machine *machine = &controller->machine;
@@ -250,7 +251,8 @@ static uint32_t object_write_confirmation(struct controller *controller,
     return SDO_OK;
 }
 
-/* The dictionary has the new value while the configuration is read from it, and the old one again when it is refused. */
+/* The dictionary has the new value while the configuration is read from it, and the old one again when it is
+ * refused. */
 static uint32_t reconfigure(struct controller *controller, const struct od_entry *entry,
                             uint64_t value)
 {
@@ -314,8 +316,8 @@ static void object_written_consumer(struct controller *controller)
 
 /* ---- The table ---- */
 
-/* Entries that have handlers: those of the indices first ... last with the sub-indices sub_first ... sub_last. A handler that is
- * NULL is not needed: the field holds the value, any value may be written. */
+/* Entries that have handlers: those of the indices first ... last with the sub-indices sub_first ... sub_last. A
+ * handler that is NULL is not needed: the field holds the value, any value may be written. */
 struct object {
     uint16_t first;
     uint16_t last;
@@ -336,7 +338,7 @@ struct object {
     bool (*urgent)(uint8_t value);
 };
 
-/* What only the mainline writes; what the interrupts write too. */
+/* What only the main loop writes; what the interrupts write too. */
 #define OWN    false
 #define SHARED true
 
@@ -353,6 +355,8 @@ static const struct object objects[] = {
     {0x1A00, 0x1A05, 3, 3, SHARED, object_read_setpoint_torque, NULL, NULL, NULL},
     {0x1A06, 0x1A0B, 0, 0, SHARED, object_read_velocity_count, NULL, NULL, NULL},
     {0x1A06, 0x1A0B, 1, 1, SHARED, object_read_velocity_mapped, NULL, NULL, NULL},
+    {0x180C, 0x180C, 1, 1, SHARED, object_read_outputs_cob_id, NULL, NULL, NULL},
+    {0x1A0C, 0x1A0C, 0, 5, SHARED, object_read_outputs_mapping, NULL, NULL, NULL},
     {0x2000, 0x2000, 2, 32, OWN, object_read_program, NULL, NULL, NULL},
     {0x2001, 0x2001, 0, 0, OWN, NULL, object_write_command, NULL, object_urgent_command},
     {0x2002, 0x2002, 0, 0, SHARED, object_read_state, NULL, NULL, NULL},
@@ -374,12 +378,14 @@ static const struct object objects[] = {
     {0x2027, 0x202A, 1, 6, OWN, object_read_identity, NULL, NULL, NULL},
     {0x202B, 0x202B, 1, 6, SHARED, object_read_torque_offset, NULL, NULL, NULL},
     {0x202C, 0x202C, 1, 6, SHARED, object_read_velocity_offset, NULL, NULL, NULL},
+    {0x2036, 0x2036, 1, 5, SHARED, object_read_outputs, NULL, NULL, NULL},
     {0x2040, 0x2040, 0, 0, OWN, object_read_timing, NULL, NULL, NULL},
     {0x2041, 0x2041, 1, 5, OWN, object_read_memory, NULL, NULL, NULL},
     {0x2050, 0x2050, 1, 6, OWN, object_read_configuration, object_write_confirmation, NULL, NULL},
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
+    {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},
 };
 
 static bool contains(const struct object *object, const struct od_entry *entry)

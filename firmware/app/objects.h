@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * objects: what the controller's object dictionary (controller.eds) does beside storing values: values that are computed when
- * they are read, checks and effects of writes, commands, the program's image.
+ * objects: what the controller's object dictionary (controller.eds) does beside storing values: values that are
+ * computed when they are read, checks and effects of writes, commands, the program's image.
  *
- * Handlers are attached to entries in one table (objects.c): an object with behaviour needs its lines in the EDS file, its
- * handlers and a row in that table. Those that tell of one axis are in objects_axis.c, those of the program in
+ * Handlers are attached to entries in one table (objects.c): an object with behaviour needs its lines in the EDS file,
+ * its handlers and a row in that table. Those of one axis are in objects_axis.c, those of the program in
  * objects_program.c. Objects of the configuration are known by config_contains (app/machine/config.h).
  */
 #ifndef APP_OBJECTS_H
@@ -12,10 +12,10 @@
 
 #include "canopen/od.h"
 
-/* Hooks of the dictionary; their context is the struct controller. Mainline.
+/* Hooks of the dictionary; their context is the struct controller. Main loop.
  *   read     always SDO_OK
- *   write    SDO_ABORT_STATE when a command or change is not possible now, SDO_ABORT_VALUE when the value makes no sense, others
- *            as CiA 301 has them for the object. Commands are executed here.
+ *   write    SDO_ABORT_STATE when a command or change is not possible now, SDO_ABORT_VALUE when the value makes no
+ *            sense, others as CiA 301 has them for the object. Commands are executed here.
  *   urgent   hold, stop and quick stop */
 extern const struct od_hooks objects_hooks;
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/objects_axis.h (see there): handlers of objects that have one value for each axis, for the table
+ * in objects.c. */
 #include "app/objects_axis.h"
 
 #include "canopen/cob.h"
@@ -138,4 +140,44 @@ uint64_t object_read_velocity_count(struct controller *controller, const struct 
 uint64_t object_read_velocity_mapped(struct controller *controller, const struct od_entry *entry)
 {
     return mapped(VELOCITY_OFFSET, entry, axis_of_pdo(controller, entry)->velocity_mapped);
+}
+
+/* ---- The outputs of the path: 0x180C, 0x1A0C, 0x2036 ---- */
+
+#define OUTPUTS UINT32_C(0x20360000)
+
+uint64_t object_read_outputs_cob_id(struct controller *controller, const struct od_entry *entry)
+{
+    const uint32_t node = controller->machine.config.outputs.node;
+    (void)entry;
+    return (node != 0u ? 0u : PDO_MAP_OFF) | (COB_RPDO1 + node);
+}
+
+/* Entry `i` of the mapping, from 0: bytes of digital outputs are subs 1 and 2, analogue ones subs 3 to 5. */
+static uint32_t outputs_entry(const struct config_outputs *outputs, uint32_t i)
+{
+    const uint32_t bytes = outputs->digital_count / 8u;
+    const uint32_t analogue = i - bytes;
+    if (i < bytes) {
+        return OUTPUTS | ((i + 1u) << 8) | 8u;
+    }
+    return analogue < outputs->analogue_count ? OUTPUTS | ((analogue + 3u) << 8) | 16u : 0u;
+}
+
+uint64_t object_read_outputs_mapping(struct controller *controller, const struct od_entry *entry)
+{
+    const struct config_outputs *outputs = &controller->machine.config.outputs;
+    if (entry->sub == 0u) {
+        return outputs->digital_count / 8u + outputs->analogue_count;
+    }
+    return outputs_entry(outputs, entry->sub - 1u);
+}
+
+uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry)
+{
+    const struct path_outputs_values *sent = &controller->tick.outputs.sent;
+    if (entry->sub <= 2u) {
+        return (sent->digital >> (8u * (entry->sub - 1u))) & 0xFFu;
+    }
+    return (uint64_t)(int64_t)sent->analogue[entry->sub - 3u];
 }

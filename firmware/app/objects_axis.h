@@ -1,15 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * objects_axis: handlers of objects that tell of one axis each, for the table in objects.c.
+ * objects_axis: handlers of objects that have one value for each axis, for the table in objects.c.
  *
- *   0x200A ... 0x200E, 0x2017, 0x201B, 0x201C, 0x2024, 0x2026 ... 0x202C   sub i + 1: axis i: what its drive said last, what it was sent
+ *   0x200A ... 0x200E, 0x2017, 0x201B, 0x201C, 0x2024, 0x2026 ... 0x202C
+ *               sub i + 1: axis i: what its drive reported last, what it was sent
  *   0x1400 + i  TPDO1 of its drive      0x1800 + i  its RPDO1; third object 0x202B where the drive maps a torque offset
  *                                       0x1806 + i  its RPDO2, where the drive maps a velocity offset
  *
- * PDO parameters say what is on the bus: those of axes that are not configured, and offsets that are not sent, have bit 31 of
- * the COB-ID set.
+ * PDO parameters say what is on the bus: those of axes that are not configured, and offsets that are not sent, have bit
+ * 31 of the COB-ID set.
  *
- * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under the lock.
+ * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under
+ * the lock.
  */
 #ifndef APP_OBJECTS_AXIS_H
 #define APP_OBJECTS_AXIS_H
@@ -45,5 +47,10 @@ uint64_t object_read_setpoint_count(struct controller *controller, const struct 
 uint64_t object_read_setpoint_torque(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_velocity_count(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_velocity_mapped(struct controller *controller, const struct od_entry *entry);
+
+/* TPDO13, which is RPDO1 of the I/O module, and the outputs in it (0x2036). */
+uint64_t object_read_outputs_cob_id(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_outputs_mapping(struct controller *controller, const struct od_entry *entry);
+uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry);
 
 #endif

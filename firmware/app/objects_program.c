@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/objects_program.h (see there): handlers of object 0x2000, for the table and the hooks in
+ * objects.c. */
 #include "app/objects_program.h"
 
 #include <string.h>
@@ -104,7 +106,7 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 
 #define STOPS_FIRST 16u /* four numbers of the longest hold, four of the longest fault stop */
 #define FAULT_FIRST 20u
-#define AXES_NUMBER 24u /* then start and end of the axes behind the plane */
+#define AXES_NUMBER 24u /* then start and end of the axes after the plane */
 #define START_REST  25u
 #define END_REST    (START_REST + AXES_MAX - PROGRAM_PLANE)
 

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* objects_program: handlers of object 0x2000, for the table and the hooks in objects.c: the image (sub 1, a DOMAIN), state of the
- * upload, what the program in the slot says of itself. `context` is the controller. Mainline. */
+/* objects_program: handlers of object 0x2000, for the table and the hooks in objects.c: the image (sub 1, a DOMAIN),
+ * state of the upload, data of the program in the slot. `context` is the controller. Main loop. */
 #ifndef APP_OBJECTS_PROGRAM_H
 #define APP_OBJECTS_PROGRAM_H
 
 #include "app/controller.h"
 
-/* A reader, of the sub-indices from 2 on: two's complement in 64 bits; 0 where the value needs a program and there is none. Checks
- * the program anew when the configuration has changed since (program_slot_refresh). Not under the lock. */
+/* A reader, of the sub-indices from 2 on: two's complement in 64 bits; 0 where the value needs a program and there is
+ * none. Checks the program anew when the configuration has changed since (program_slot_refresh). Not under the lock. */
 uint64_t object_read_program(struct controller *controller, const struct od_entry *entry);
 
 /* Refused with SDO_ABORT_STATE while a program runs, SDO_ABORT_MEMORY when it cannot fit. */

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/objects_stream.h (see there): handlers of object 0x2060, for the table and the hooks in
+ * objects.c. */
 #include "app/objects_stream.h"
 
 #include "canopen/sdo_abort.h"
@@ -16,7 +18,8 @@ static bool moving(struct controller *controller)
 
 static bool is_under_way(const struct stream *stream)
 {
-    return stream->state == STREAM_UNDERRUN || (stream->state == STREAM_OPEN && stream->started);
+    return stream->state == STREAM_UNDERRUN || stream->state == STREAM_PROGRAM_STOP ||
+           (stream->state == STREAM_OPEN && stream->started);
 }
 
 uint32_t object_chunk_begin(struct controller *controller, uint32_t size)
@@ -87,9 +90,19 @@ uint64_t object_read_stream(struct controller *controller, const struct od_entry
         return stream_free_bytes(stream);
     case 14:
         return stream->ring.size;
+    case 16:
+        return stream->optional_stop ? 1u : 0u;
     default:
         return read_place(stream, &controller->machine, entry->sub);
     }
+}
+
+uint32_t object_write_optional_stop(struct controller *controller, const struct od_entry *entry,
+                                    uint64_t number)
+{
+    (void)entry;
+    controller->stream.optional_stop = number != 0u;
+    return SDO_OK;
 }
 
 uint32_t object_write_stream_close(struct controller *controller, const struct od_entry *entry,

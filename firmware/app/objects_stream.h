@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* objects_stream: handlers of object 0x2060, for the table and the hooks in objects.c: a chunk (sub 1, a DOMAIN), what has become
- * of the job, its end. Mainline. */
+/* objects_stream: handlers of object 0x2060, for the table and the hooks in objects.c: a chunk (sub 1, a DOMAIN), what
+ * has become of the job, its end. Main loop. */
 #ifndef APP_OBJECTS_STREAM_H
 #define APP_OBJECTS_STREAM_H
 
@@ -21,6 +21,8 @@ uint32_t object_chunk_end(struct controller *controller, uint32_t size);
 void object_chunk_abort(struct controller *controller);
 
 /* Sub 15 closes the job; SDO_ABORT_STATE while it is on the path. */
+uint32_t object_write_optional_stop(struct controller *controller, const struct od_entry *entry,
+                                    uint64_t number);
 uint32_t object_write_stream_close(struct controller *controller, const struct od_entry *entry,
                                    uint64_t number);
 

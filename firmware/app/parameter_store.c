@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/parameter_store.h (see there): parameters of the object dictionary that outlive a loss of power
+ * (objects 0x1010 and 0x1011). */
 #include "app/parameter_store.h"
 
 #include <stddef.h>
@@ -27,7 +29,7 @@ static bool is_parameter(const struct od_entry *entry)
             index == NODE_NUMBER || config_contains(index));
 }
 
-/* The next parameter behind `entry`, or the first one (NULL); NULL at the end. */
+/* The next parameter after `entry`, or the first one (NULL); NULL at the end. */
 static const struct od_entry *next_parameter(const struct od *od, const struct od_entry *entry)
 {
     const struct od_entry *end = od->table->entries + od->table->entry_count;

@@ -6,17 +6,17 @@
  *     parameter_store_restore(&store, &od, 0, 0xFFFF);   into the dictionary
  *     parameter_store_save(&store, &od, crc32, true);
  *
- * Parameters are all objects that can be read and written and that describe the machine, its drives, or this node on the
- * bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save writes them to
- * the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h): wherever the power
- * goes, either the old parameters or the new ones are found again, whole. Layout of the content:
+ * Parameters are all objects that can be read and written and that describe the machine, its drives, or this node on
+ * the bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save
+ * writes them to the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h):
+ * wherever the power goes, either the old parameters or the new ones are found again, whole. Layout of the content:
  *
  *     CRC-32 of (index u16, sub u8, size u8) of each parameter u32 | CRC-32 of the configuration u32 | confirmed u8 |
  *     zero u8 x 3 | values in rising order of (index, sub), little-endian | zeros to a multiple of 8 bytes
  *
- * A content of 0 bytes means that the defaults are wanted (0x1011). The newest record decides: where its content is damaged,
- * has a value that this firmware does not take, or is of a firmware with other parameters, nothing is restored, neither a
- * part of it nor the parameters before. Mainline.
+ * A content of 0 bytes means that the defaults are wanted (0x1011). The newest record decides: where its content is
+ * damaged, has a value that this firmware does not take, or is of a firmware with other parameters, nothing is
+ * restored, neither a part of it nor the parameters before. Main loop.
  */
 #ifndef APP_PARAMETER_STORE_H
 #define APP_PARAMETER_STORE_H
@@ -43,16 +43,16 @@ struct parameter_store {
     bool confirmed;        /* WHOLE: the configuration was confirmed when it was stored */
 };
 
-/* Looks for the newest parameters and checks them. */
+/* Finds the newest parameters and checks them. */
 void parameter_store_find(struct parameter_store *store, const struct od *od);
 
-/* Puts the stored values of objects `first` to `last` into the dictionary, without hooks. Does nothing, and returns false,
- * unless the state is WHOLE. */
+/* Puts the stored values of objects `first` to `last` into the dictionary, without hooks. Does nothing, and returns
+ * false, unless the state is WHOLE. */
 bool parameter_store_restore(const struct parameter_store *store, struct od *od, uint16_t first,
                              uint16_t last);
 
-/* Stores the present values. Writes nothing when exactly these are stored already. 0, or PORT_ERR_STORE: then what was stored
- * before still is. */
+/* Stores the present values. Writes nothing when exactly these are stored already. 0, or PORT_ERR_STORE: then what was
+ * stored before still is. */
 int parameter_store_save(struct parameter_store *store, const struct od *od, uint32_t config_crc32,
                          bool confirmed);
 

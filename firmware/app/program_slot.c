@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/program_slot.h (see there): the active program and the upload of its successor (object 0x2000). */
 #include "app/program_slot.h"
 
 #include <string.h>

@@ -2,13 +2,12 @@
 /*
  * program_slot: the active program and the upload of its successor (object 0x2000).
  *
- * An upload goes to the spare bank of the port's store; only a complete image that passes every
- * check takes over, so a broken or refused one leaves the active program as it was. What has taken over carries a record
- * (bank_record.h), by which it is found again after a loss of power at any moment: it, or its predecessor.
- * A program is bound to the configuration it was checked against, by that one's CRC-32, which the record keeps: under another
- * configuration, and once after each power-on, it is checked again before it counts.
- * Mainline.
- * Nobody may run the program while an upload ends (see machine_moving).
+ * An upload goes to the spare bank of the port's store; only a complete image that passes every check takes over, so a
+ * broken or refused one leaves the active program as it was. What has taken over carries a record (bank_record.h), by
+ * which it is found again after a loss of power at any moment: it, or its predecessor. A program is bound to the
+ * configuration it was checked against, by that one's CRC-32, which the record keeps: under another configuration, and
+ * once after each power-on, it is checked again before it counts. Main loop. Nobody may run the program while an upload
+ * ends (see machine_moving).
  */
 #ifndef APP_PROGRAM_SLOT_H
 #define APP_PROGRAM_SLOT_H
@@ -29,7 +28,8 @@ enum program_slot_state {
 
 struct program_slot {
     void (*attend)(
-        void *self); /* called with `self` now and then while a program is checked; may be NULL */
+        void *
+            self); /* called with `self` from time to time while a program is checked; may be NULL */
     void *self;
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */
@@ -48,11 +48,11 @@ struct program_slot {
 void program_slot_init(struct program_slot *slot);
 
 /* The newest whole program of the store, if there is one, becomes the active one: after power-on, before the first
- * upload. Costs a whole check of each program it looks at. */
+ * upload. Costs a whole check of each program that it tries. */
 void program_slot_recover(struct program_slot *slot);
 
-/* Object 0x2041: 1 bytes of a bank for image and records; for a kernel the record of 2 a segment in the plane, 3 a piece, 4 a
- * segment in space, 5 and each extra axis of it. */
+/* Object 0x2041: 1 bytes of a bank for image and records; for a kernel the record of 2 a segment in the plane, 3 a
+ * piece, 4 a segment in space, 5 and each extra axis of it. */
 uint64_t program_slot_memory(uint32_t kernel, uint8_t number);
 
 enum program_slot_state program_slot_state(const struct program_slot *slot);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program_table: the coefficient records (core/coefficients.h) of the program in a bank of the store, right behind its image,
- * for the kernel that the tick uses. The controller makes them itself when an upload has passed its checks; what it
- * finds there after power-on it compares with what it would write. Mainline.
+ * program_table: the coefficient records (core/coefficients.h) of the program in a bank of the store, right after its
+ * image, for the kernel that the tick uses. The controller makes them itself when an upload has passed its checks; what
+ * it finds there after power-on it compares with what it would write. Main loop.
  */
 #ifndef APP_PROGRAM_TABLE_H
 #define APP_PROGRAM_TABLE_H
@@ -13,12 +13,12 @@
 #include "core/program.h"
 
 /* Writes the records and gives them to the program. 0, PROGRAM_ERR_ROOM when image and records do not fit the bank,
- * PROGRAM_ERR_STORE, or PROGRAM_ERR_KERNEL when this image has no such kernel. The bank must be erased behind the image.
- */
+ * PROGRAM_ERR_STORE, or PROGRAM_ERR_KERNEL when this image has no such kernel. The bank must be erased after the
+ * image. */
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
 
-/* Gives the records that are there to the program, if it has not got them yet and every byte of them is right. True when
- * it has them now. */
+/* Gives the records that are there to the program, if it has not got them yet and every byte of them is right. True
+ * when it has them now. */
 bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/report.h (see there): emergency messages, the NMT state after errors, lines on the console. */
 #include "app/report.h"
 
 #include "canopen/cia402.h"
@@ -18,7 +19,7 @@ static void tell_fault(struct controller *controller, const struct fault *fault)
     }
 }
 
-/* Faults are raised in interrupts; their telling is left to the mainline. */
+/* Faults are raised in interrupts; their telling is left to the main loop. */
 static void report_fault(struct controller *controller)
 {
     port_lock();
@@ -52,7 +53,7 @@ static void note_state(struct controller *controller)
     }
 }
 
-/* The internal limit of a drive (statusword bit 11) is a warning: it still follows, though not as fast as it is told. */
+/* The internal limit of a drive (statusword bit 11) is a warning: it still follows, though not as fast as commanded. */
 static void note_limits(struct controller *controller)
 {
     for (uint8_t i = 0; i < controller->config.axis_count; ++i) {
@@ -109,7 +110,7 @@ static bool bus_takes_frames(const struct controller *controller)
     return takes;
 }
 
-/* What cannot be told now is told later. */
+/* What cannot be sent now is sent later. */
 static void send_emergencies(struct controller *controller)
 {
     struct can_msg out;

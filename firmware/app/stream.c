@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/stream.h (see there): a job that comes in chunks (object 0x2060). */
 #include "app/stream.h"
 
 #include <string.h>
 
 #include "app/machine/path_counts.h"
+#include "core/qmath.h"
 #include "port/port.h"
 
 /* At the start of a block of the ring; the bytes of the chunk follow. */
@@ -26,6 +28,7 @@ void stream_init(struct stream *stream)
     memset(stream, 0, sizeof *stream);
     chunk_ring_init(&stream->ring, memory, size);
     chunk_records_init(&stream->records);
+    stream->optional_stop = true;
 }
 
 /* ---- A download ---- */
@@ -133,6 +136,14 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
 
 /* ---- A chunk that has passed ---- */
 
+/* Below 2^32 periods of at most 8 ms, which is below 2^36 ms: with 2^22 s behind it, below 2^64. */
+static uint64_t ticks_q32_s(uint32_t ticks, uint32_t period_us)
+{
+    const uint64_t time_ms = (uint64_t)ticks * (period_us / 1000u);
+    const uint64_t time_s = qmath_div_u64(time_ms, 1000u);
+    return (time_s << 32) + qmath_div_u64((time_ms - 1000u * time_s) << 32, 1000u);
+}
+
 static void enter(struct stream *stream, struct stream_chunk *at)
 {
     stream->executed = at;
@@ -151,10 +162,22 @@ static void open_job(struct stream *stream, struct stream_chunk *first, const st
     stream->job = first->chunk.job;
     stream->config_crc32 = config->crc32;
     stream->underruns = 0;
+    stream->stopped_for = 0;
     stream->started = false;
     stream->waits = false;
     stream->state = STREAM_OPEN;
     enter(stream, first);
+}
+
+/* Time of the job at the start of a chunk behind the newest one. */
+static uint64_t job_time_behind_q32_s(const struct stream_chunk *newest, const struct chunk *chunk)
+{
+    if (!chunk_begins_at_rest(chunk)) {
+        return newest->job_time_q32_s + chunk->time_shift_q32_s;
+    }
+    const struct program_header *before = &newest->chunk.program.header;
+    return newest->job_time_q32_s + before->duration_q32_s +
+           ticks_q32_s(chunk_rest_ticks(chunk), before->period_us);
 }
 
 static uint64_t shared_time_q32_s(const struct chunk *chunk)
@@ -172,7 +195,7 @@ static void accept(struct stream *stream, struct stream_chunk *chunk, const stru
     if (opens_a_job(stream, &chunk->chunk)) {
         open_job(stream, chunk, config);
     } else {
-        chunk->job_time_q32_s = stream->newest->job_time_q32_s + chunk->chunk.time_shift_q32_s;
+        chunk->job_time_q32_s = job_time_behind_q32_s(stream->newest, &chunk->chunk);
         stream->newest->next = chunk;
     }
     chunk->joint_time_q32_s = chunk->job_time_q32_s + shared_time_q32_s(&chunk->chunk);
@@ -238,11 +261,32 @@ void stream_started(struct stream *stream)
 
 /* ---- A round ---- */
 
+/* The chunk behind a rest, where the motion rests; NULL: none. */
+static const struct chunk *chunk_behind_rest(const struct stream *stream,
+                                             const struct machine *machine)
+{
+    const struct stream_chunk *next = stream->executed->next;
+    return next != NULL && chunk_begins_at_rest(&next->chunk) && machine_waits_for_chunk(machine)
+               ? &next->chunk
+               : NULL;
+}
+
+static enum stream_state state_on_path(const struct stream *stream, const struct machine *machine)
+{
+    const struct chunk *next = chunk_behind_rest(stream, machine);
+    if (next == NULL) {
+        return machine_waits_for_chunk(machine) ? STREAM_UNDERRUN : STREAM_OPEN;
+    }
+    return stream->stopped_for == next->sequence && machine->state != MACHINE_RUNNING
+               ? STREAM_PROGRAM_STOP
+               : STREAM_OPEN;
+}
+
 static enum stream_state state_of(const struct stream *stream, const struct machine *machine)
 {
     const bool at_end = feed_override_state(&machine->motion.feed) == FEED_ENDED;
     if (machine_on_path(machine)) {
-        return machine_waits_for_chunk(machine) ? STREAM_UNDERRUN : STREAM_OPEN;
+        return state_on_path(stream, machine);
     }
     return at_end && !chunk_goes_on(&stream->executed->chunk) && machine->state != MACHINE_FAULT
                ? STREAM_ENDED
@@ -265,12 +309,32 @@ static void note_state(struct stream *stream, const struct machine *machine)
     }
 }
 
+/* Holds the path before a chunk with a program stop, once. */
+static void stop_before_next(struct stream *stream, struct machine *machine)
+{
+    const struct chunk *next = chunk_behind_rest(stream, machine);
+    const uint32_t wanted = CHUNK_REST_STOP | (stream->optional_stop ? CHUNK_REST_OPTIONAL : 0u);
+    if (next != NULL && (next->rest_flags & wanted) != 0u &&
+        stream->stopped_for != next->sequence && machine->state == MACHINE_RUNNING) {
+        stream->stopped_for = next->sequence;
+        (void)machine_hold(machine);
+    }
+}
+
 static bool take_next_over(struct stream *stream, struct machine *machine)
 {
     struct stream_chunk *next = stream->executed->next;
-    const bool taken =
-        next != NULL && chunk_records_take_over(&stream->records, machine, &next->chunk);
+    if (next == NULL) {
+        return false;
+    }
+    const struct coefficients_window *window =
+        chunk_records_for_next(&stream->records, machine, &next->chunk);
+    port_lock();
+    stop_before_next(stream, machine);
+    const bool taken = window != NULL && machine_take_over(machine, &next->chunk, window);
+    port_unlock();
     if (taken) {
+        chunk_records_taken_over(&stream->records);
         chunk_ring_free_oldest(&stream->ring, (const uint8_t *)next);
         stream->waits = false;
         enter(stream, next);
@@ -306,8 +370,12 @@ uint32_t stream_free_bytes(const struct stream *stream)
 
 static uint64_t time_now_q32_s(const struct stream *stream, const struct machine *machine)
 {
-    return stream->place.job_time_q32_s +
-           (stream->started ? motion_time_q32_s(&machine->motion) : 0u);
+    const struct motion *motion = &machine->motion;
+    if (!stream->started) {
+        return stream->place.job_time_q32_s;
+    }
+    return stream->place.job_time_q32_s + motion_time_q32_s(motion) -
+           ticks_q32_s(motion->rest_ticks, machine->config.period_us);
 }
 
 /* Below 2^22 s. */

@@ -9,6 +9,9 @@
  * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
  * goes on when the next chunk has come.
  *
+ * Where the next chunk begins at rest, behind a dwell, it is taken over at the end of its predecessor, and the motion counts the
+ * ticks until it starts. Before a program stop the path is held once, until a resume.
+ *
  * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
  * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
  * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
@@ -28,10 +31,11 @@
 /* Values of object 0x2060 sub 2. */
 enum stream_state {
     STREAM_NONE = 0,
-    STREAM_OPEN = 1,     /* a job has its first chunk; it may be running */
-    STREAM_UNDERRUN = 2, /* at rest at the end of a tail: the next chunk is missing */
-    STREAM_ENDED = 3,    /* the last chunk has been executed to its end */
-    STREAM_STOPPED = 4,  /* over before its end: stopped, or a fault */
+    STREAM_OPEN = 1,         /* a job has its first chunk; it may be running */
+    STREAM_UNDERRUN = 2,     /* at rest at the end of a tail: the next chunk is missing */
+    STREAM_ENDED = 3,        /* the last chunk has been executed to its end */
+    STREAM_STOPPED = 4,      /* over before its end: stopped, or a fault */
+    STREAM_PROGRAM_STOP = 5, /* at rest before a chunk with a program stop, until resumed */
 };
 
 /* Where a job is; kept when its chunks are gone. */
@@ -52,7 +56,8 @@ struct stream {
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
     void (*attend)(
-        void *self); /* called with `self` now and then while a chunk is checked; may be NULL */
+        void
+            *self); /* called with `self` from time to time while a chunk is checked; may be NULL */
     void *self;
 
     struct chunk_ring ring;
@@ -64,14 +69,17 @@ struct stream {
     uint32_t config_crc32; /* of the configuration that the job was checked under */
     int32_t start_counts[AXES_MAX];
     bool started;
-    bool waits; /* this underrun has been counted */
+    bool waits;         /* this underrun has been counted */
+    bool optional_stop; /* optional program stops are made */
+    uint32_t
+        stopped_for; /* sequence of the chunk before which a program stop was made last; 0: none */
     enum stream_state state;
 };
 
 void stream_init(struct stream *stream);
 
-/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0 or
- * PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
+/* A download of a chunk: begin (`size` bytes, 0: not known), write in order, then finish or abandon. Begin and write: 0
+ * or PROGRAM_ERR_ROOM, when the chunk does not fit the ring now. Finish checks: 0, or the code that is then in
  * stream->refused; then nothing has changed. */
 int stream_begin(struct stream *stream, uint32_t size);
 int stream_write(struct stream *stream, uint32_t offset, const uint8_t *data, uint32_t size);

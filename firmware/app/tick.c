@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/tick.h (see there): what happens each period: SYNC, supervision, setpoints. */
 #include "app/tick.h"
 
 #include <string.h>
@@ -13,6 +14,7 @@ void tick_init(struct tick *tick, struct machine *machine)
     tick->refused = false;
     tick->setpoint_refused = false;
     offsets_init(&tick->offsets);
+    outputs_init(&tick->outputs);
     sync_producer_init(&tick->sync, SYNC_COUNTER_OVERFLOW);
 }
 
@@ -97,6 +99,18 @@ static void send_velocities(struct tick *tick, const struct feedforward_offset *
     }
 }
 
+/* After the setpoints, whose SYNC they have to be latched at. */
+static void send_outputs(struct tick *tick, bool synced)
+{
+    struct machine *machine = tick->machine;
+    struct can_msg frame;
+    outputs_step(&tick->outputs, machine, synced);
+    if (machine_drives_operational(machine) &&
+        outputs_due(&tick->outputs, &machine->config.outputs, &frame) && send(tick, &frame)) {
+        outputs_sent(&tick->outputs);
+    }
+}
+
 /* All positions first: they matter most on a bus that is full. */
 static void send_process_data(struct tick *tick)
 {
@@ -133,6 +147,9 @@ void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns)
         machine_note_waiting(machine, now_us);
     } else {
         send_process_data(tick);
+        if (machine->config.outputs.node != 0u) {
+            send_outputs(tick, sync == MACHINE_SYNC_SENT);
+        }
         machine_note_sent(machine, (struct machine_sent){.sync = sync == MACHINE_SYNC_SENT,
                                                          .setpoints = !tick->setpoint_refused,
                                                          .all = !tick->refused});

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements can/slcan.h (see there): CAN frames as lines of text, as LAWICEL's adapters and their many
+ * descendants have them. */
 #include "can/slcan.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/cia402.h (see there): states, controlword and statusword of the drive profile. */
 #include "canopen/cia402.h"
 
 #include <stddef.h>

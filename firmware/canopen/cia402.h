@@ -58,13 +58,13 @@ enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP
 #define CIA402_ENABLE_OPERATION 0x000Fu
 #define CIA402_FAULT_RESET      0x0080u
 
-/* Bits 0 ... 3, 5 (quick stop) and 6 of a statusword tell the states apart: a number below CIA402_CODES, and its state. */
+/* Bits 0 ... 3, 5 (quick stop) and 6 of a statusword identify the state: a number below CIA402_CODES, and its state. */
 #define CIA402_CODES        64
 #define CIA402_CODE(status) (((status) & 0xFu) | (((unsigned)(status) >> 1) & 0x30u))
 extern const uint8_t cia402_states[CIA402_CODES];
 
-/* These bits of a state; and the state of a statusword (codings that do not exist give CIA402_NOT_READY), which the tick
- * asks for often. */
+/* These bits of a state; and the state of a statusword (codings that do not exist give CIA402_NOT_READY), which the
+ * tick asks for often. */
 uint16_t cia402_status_bits(enum cia402_state state);
 static inline enum cia402_state cia402_decode(uint16_t statusword)
 {

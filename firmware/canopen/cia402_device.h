@@ -1,10 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* cia402_device: the drive's side of the CiA 402 state machine.
- *
- * The drive tells the machine what happens inside it (ready, fault, reaction finished), gives it
- * each controlword, and does what cia402_device_action says. Functions return true when the state
- * changed. All in one context (that of the drive's period).
- */
+ * 
+ * The drive reports to the machine what happens inside it (ready, fault, reaction finished), gives it each controlword,
+ * and does what cia402_device_action says. Functions return true when the state changed. All in one context (that of
+ * the drive's period). */
 #ifndef CANOPEN_CIA402_DEVICE_H
 #define CANOPEN_CIA402_DEVICE_H
 

@@ -20,16 +20,17 @@ enum cia402_goal {
     CIA402_GOAL_SWITCHED_ON,
     CIA402_GOAL_ENABLED, /* Operation enabled. From Quick stop active by way of Switch on disabled
                           */
-    CIA402_GOAL_QUICK_STOP, /* Quick stop active from Operation enabled; else off. The command is the same whatever
-                               the statusword says: nobody brakes by what may be wrong or old */
-    CIA402_GOAL_RESET /* out of Fault, to Switch on disabled */
+    CIA402_GOAL_QUICK_STOP, /* Quick stop active from Operation enabled; else off. The command does
+                               not depend on the statusword, which may be wrong or old */
+    CIA402_GOAL_RESET       /* out of Fault, to Switch on disabled */
 };
 #define CIA402_GOALS 6
 
 /* Commands by goal and state. */
 extern const uint8_t cia402_master_commands[CIA402_GOALS][CIA402_STATES];
 
-/* The controlword to send to a drive in `state` after `previous` was sent: a fault reset is an edge, so it falls again. */
+/* The controlword to send to a drive in `state` after `previous` was sent: a fault reset is an edge, so it falls
+ * again. */
 static inline uint16_t cia402_master_controlword(enum cia402_goal goal, enum cia402_state state,
                                                  uint16_t previous)
 {

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/cob.h (see there): identifiers of the predefined connection set and little-endian access to
+ * frame bytes. */
 #include "canopen/cob.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/emcy.h (see there): emergency messages, error register 0x1001 and history 0x1003. */
 #include "canopen/emcy.h"
 
 #include <assert.h>

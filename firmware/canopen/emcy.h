@@ -67,7 +67,7 @@ void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *e
                         uint32_t *history, uint8_t *history_count, uint8_t history_size);
 
 /* A new error: sets `bits` (and the generic bit) in the error register, enters the history, queues
- * a message. `detail` may be NULL (zeros). Mainline, or the context of _process. */
+ * a message. `detail` may be NULL (zeros). Main loop, or the context of _process. */
 void emcy_producer_raise(struct emcy_producer *producer, uint16_t code, uint8_t bits,
                          const uint8_t detail[EMCY_DETAIL_SIZE]);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/heartbeat.h (see there): heartbeat producer (0x1017) and consumer (0x1016). */
 #include "canopen/heartbeat.h"
 
 #include "canopen/cob.h"

@@ -14,11 +14,11 @@ struct heartbeat_producer {
     uint8_t node;
 };
 
-/* Mainline or timer, one of them. */
+/* Main loop or timer, one of them. */
 void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node);
 
 /* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in
- * INITIALISING. Returns true when *out is to be sent. Late calls give one frame, not several. Mainline
+ * INITIALISING. Returns true when *out is to be sent. Late calls give one frame, not several. Main loop
  * or timer, one of them. */
 bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
                                 enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
@@ -51,7 +51,8 @@ void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, 
 /* Splits an entry of 0x1016 (CiA 301: bits 16 ... 23 node, 0 ... 15 time in ms). */
 void heartbeat_consumer_init_entry(struct heartbeat_consumer *consumer, uint32_t entry);
 
-/* Whether another of `count` entries watches the node of this one, which is to be entry `at`: CiA 301 allows only one. */
+/* Whether another of `count` entries watches the node of this one, which is to be entry `at`: CiA 301 allows only
+ * one. */
 bool heartbeat_entry_taken(const uint32_t *entries, uint8_t count, uint8_t at, uint32_t entry);
 
 /* Takes a frame; others than this node's heartbeat give HEARTBEAT_NOTHING. Same context as

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/nmt.h (see there): the NMT slave's state machine and the master's commands. */
 #include "canopen/nmt.h"
 
 #include <stddef.h>

@@ -49,7 +49,7 @@ struct nmt_slave {
     uint8_t node;
 };
 
-/* Starts in INITIALISING. `hooks` may be NULL. Mainline, before any frame comes. */
+/* Starts in INITIALISING. `hooks` may be NULL. Main loop, before any frame comes. */
 void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hooks *hooks,
                     void *context);
 
@@ -58,12 +58,12 @@ void nmt_slave_init(struct nmt_slave *slave, uint8_t node, const struct nmt_hook
  * command for this node. Receive interrupt. */
 bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
 
-/* Carries out resets, tells hooks->changed, and, from INITIALISING, gives the boot-up frame and
- * enters PRE-OPERATIONAL. Returns true when *out is to be sent. Mainline. */
+/* Carries out resets, calls hooks->changed, and, from INITIALISING, gives the boot-up frame and enters PRE-OPERATIONAL.
+ * Returns true when *out is to be sent. Main loop. */
 bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
 
 /* A communication error (heartbeat of the master lost, bus off): `behaviour` is the value of
- * 0x1029 sub 1, enum nmt_error_behaviour. Mainline. */
+ * 0x1029 sub 1, enum nmt_error_behaviour. Main loop. */
 void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour);
 
 /* Which services a state permits (CiA 301, table 39). Pure. */

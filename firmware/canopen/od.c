@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/od.h (see there): an object dictionary: a constant table of entries over one struct of
+ * values. */
 #include "canopen/od.h"
 
 #include <string.h>

@@ -12,11 +12,11 @@
  *     od_init(&od, &od_controller_table, &values, &hooks, app);
  *
  * Hooks let the application compute a value when it is read, veto a write, learn of a write, and
- * stream DOMAIN data. All hooks run in the context of the caller (SDO: mainline); each may be NULL.
+ * stream DOMAIN data. All hooks run in the context of the caller (SDO: main loop); each may be NULL.
  * Fields that another context writes and that the processor does not load in one instruction (64
  * bits) should be copied by the read hook under the port's lock.
  *
- * od_find, od_size are pure. The rest: mainline.
+ * od_find, od_size are pure. The rest: main loop.
  */
 #ifndef CANOPEN_OD_H
 #define CANOPEN_OD_H
@@ -83,7 +83,7 @@ struct od_hooks {
     uint32_t (*write)(void *context, const struct od_entry *entry, const uint8_t *value,
                       uint32_t size);
 
-    /* Whether this value is written whoever else has an SDO transfer under way (canopen/sdo_server.h): a command to
+    /* Whether this value may be written while another SDO transfer is under way (canopen/sdo_server.h): a command to
      * stop. Of one byte; the entry can be written. Must change nothing. NULL: none is. */
     bool (*urgent)(const struct od_entry *entry, uint8_t value);
 
@@ -140,8 +140,8 @@ uint32_t od_size(const struct od *od, const struct od_entry *entry);
 uint32_t od_read(struct od *od, const struct od_entry *entry, uint8_t *out, uint32_t capacity,
                  uint32_t *size);
 
-/* Writes a value as the bus sees it: checks access, size and range, asks the write hook, stores,
- * tells the written hook. Nothing changes when the result is not SDO_OK. Not for a DOMAIN. */
+/* Writes a value as the bus sees it: checks access, size and range, calls the write hook, stores, calls the written
+ * hook. Nothing changes when the result is not SDO_OK. Not for a DOMAIN. */
 uint32_t od_write(struct od *od, const struct od_entry *entry, const uint8_t *value, uint32_t size);
 
 /* Whether a number may be in a field, by type and range: SDO_OK or an abort code. No access check, no hooks. Pure. */

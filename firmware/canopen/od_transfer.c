@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/od_transfer.h (see there): one object of a dictionary, written or read in pieces, as an SDO
+ * transfer brings or takes it. */
 #include "canopen/od_transfer.h"
 
 #include <stddef.h>

@@ -9,7 +9,7 @@
  * nothing. A value that is read is copied at the beginning, so that all its pieces are of one moment. DOMAIN data goes
  * to and comes from the hooks of the dictionary as it is moved.
  *
- * Results are abort codes or SDO_OK (canopen/sdo_abort.h). All functions: mainline (the hooks may take long).
+ * Results are abort codes or SDO_OK (canopen/sdo_abort.h). All functions: main loop (the hooks may take long).
  */
 #ifndef CANOPEN_OD_TRANSFER_H
 #define CANOPEN_OD_TRANSFER_H

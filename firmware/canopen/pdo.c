@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/pdo.h (see there): the fixed process data of the bus. */
 #include "canopen/pdo.h"
 
 #include "canopen/cob.h"
@@ -126,4 +127,16 @@ int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv)
         *volts_mv = (int16_t)cob_signed(cob_get(in->data, 2), 2);
     }
     return drive;
+}
+
+void pdo_encode_outputs(uint8_t module, const struct pdo_outputs *outputs, struct can_msg *out)
+{
+    out->id = (uint16_t)(COB_RPDO1 + module);
+    out->len = (uint8_t)(outputs->digital_bytes + 2u * outputs->analogue_count);
+    for (uint32_t i = 0; i < outputs->digital_bytes; ++i) {
+        out->data[i] = (uint8_t)(outputs->digital >> (8u * i));
+    }
+    for (uint32_t i = 0; i < outputs->analogue_count; ++i) {
+        cob_put16(out->data + outputs->digital_bytes + 2u * i, (uint16_t)outputs->analogue[i]);
+    }
 }

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /* pdo: the fixed process data of the bus (docs/reference/protocol.md, section 2).
- *
- * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id,
- * or 0 when the frame is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes
- * than the mapping (CiA 301: such a PDO is not processed); longer ones are accepted, extra bytes
- * ignored. Both directions are here, though the controller needs one of each: the other is what the drives of the tests
- * speak with, so that the two are one truth. Pure functions, any context.
- */
+ * 
+ * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id, or 0 when the frame
+ * is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes than the mapping (CiA 301: such a PDO is
+ * not processed); longer ones are accepted, extra bytes ignored. Both directions are here, though the controller needs
+ * one of each: the simulated drives of tests use the other, so that both sides share one definition. Pure functions,
+ * any context. */
 #ifndef CANOPEN_PDO_H
 #define CANOPEN_PDO_H
 
@@ -63,5 +62,15 @@ int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv);
 /* TPDO3 of a drive: 0x60FD, the digital inputs. */
 void pdo_encode_inputs(uint8_t drive, uint32_t inputs, struct can_msg *out);
 int pdo_decode_inputs(const struct can_msg *in, uint32_t *inputs);
+
+/* RPDO1 of an I/O module (CiA 401): 0x6200 subs 1, 2 (digital outputs 0 ... 7, 8 ... 15), 0x6411 subs 1, 2 ... (analogue
+ * outputs): as many of them as are mapped, 8 bytes at most. */
+struct pdo_outputs {
+    uint16_t digital;
+    const int16_t *analogue;
+    uint32_t digital_bytes; /* 0 ... 2 */
+    uint32_t analogue_count;
+};
+void pdo_encode_outputs(uint8_t module, const struct pdo_outputs *outputs, struct can_msg *out);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/pdo_map.h (see there): one remappable PDO of a device: parameters, mapping, packing, times. */
 #include "canopen/pdo_map.h"
 
 #include <assert.h>

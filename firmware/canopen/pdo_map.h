@@ -1,15 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* pdo_map: one remappable PDO of a device (CiA 301, 7.2.2, objects 0x1400 ... 0x1BFF): parameters,
- * mapping, packing, times.
- *
- * The parameters live in the object dictionary, with whatever sub-indices its EDS gives them; this
- * module checks writes to them (pdo_map_write, from the od's write hook), takes them over
- * (pdo_map_written) and keeps the mapping ready for use: entries and bytes, without a search. The
- * direction follows from the index: 0x1400 ... are received, 0x1800 ... sent. What may be mapped is
- * what the EDS says (PDOMapping), readable to be sent, writable to be received. Values go past the
- * od's hooks: the application brings fields up to date before packing, and judges received ones
- * when it uses them.
- *
+/* pdo_map: one remappable PDO of a device (CiA 301, 7.2.2, objects 0x1400 ... 0x1BFF): parameters, mapping, packing,
+ * times.
+ * 
+ * The parameters live in the object dictionary, with whatever sub-indices its EDS gives them; this module checks writes
+ * to them (pdo_map_write, from the od's write hook), takes them over (pdo_map_written) and keeps the mapping ready for
+ * use: entries and bytes, without a search. The direction follows from the index: 0x1400 ... are received, 0x1800 ...
+ * sent. What may be mapped is what the EDS says (PDOMapping), readable to be sent, writable to be received. Values go
+ * past the od's hooks: the application brings fields up to date before packing, and checks received ones when it uses
+ * them.
+ * 
  * Rules for writes, with their abort codes:
  *   COB-ID (sub 1)      another identifier while the PDO is valid (bit 31 clear), an identifier of
  *                       another service, or one of 29 bits: SDO_ABORT_VALUE
@@ -22,9 +21,8 @@
  *                       mappable or of another length: SDO_ABORT_NOT_MAPPABLE; more than 8 bytes in
  *                       all, when sub 0 is written: SDO_ABORT_PDO_LENGTH
  * So the order is: off, sub 0 to 0, entries, sub 0, on. No bits below a byte are mapped, no dummies.
- *
- * All functions of one PDO in one context.
- */
+ * 
+ * All functions of one PDO in one context. */
 #ifndef CANOPEN_PDO_MAP_H
 #define CANOPEN_PDO_MAP_H
 

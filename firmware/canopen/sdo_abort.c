@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/sdo_abort.h (see there): the abort codes of SDO transfers that this project sends or
+ * explains. */
 #include "canopen/sdo_abort.h"
 
 #include <stddef.h>

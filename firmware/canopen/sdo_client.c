@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/sdo_client.h (see there): reads and writes values of other nodes, expedited or segmented, as
+ * a polled machine. */
 #include "canopen/sdo_client.h"
 
 #include <string.h>

@@ -7,7 +7,7 @@
  *     each poll:       if (sdo_client_process(&client, elapsed_us, &out)) -> send out
  *     until client.status is not SDO_CLIENT_BUSY
  *
- * One transfer at a time, over the predefined COB-IDs. All functions: mainline.
+ * One transfer at a time, over the predefined COB-IDs. All functions: main loop.
  */
 #ifndef CANOPEN_SDO_CLIENT_H
 #define CANOPEN_SDO_CLIENT_H

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/sdo_server.h (see there): gives an object dictionary to one SDO client. */
 #include "canopen/sdo_server.h"
 
 #include <assert.h>
@@ -57,7 +58,7 @@ enum client_command {
 
 /* Functions that give a frame return true when *out is to be sent; those that return uint32_t give an abort code. */
 
-/* Tells the hooks and becomes idle. */
+/* Calls the hooks and becomes idle. */
 static void drop(struct sdo_server *s)
 {
     od_transfer_drop(&s->object);
@@ -547,8 +548,8 @@ static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
     return known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
 }
 
-/* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if its
- * bytes are those of a request.) */
+/* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if
+ * its bytes are those of a request.) */
 static bool is_strange(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
@@ -575,7 +576,8 @@ static bool restarts(const struct sdo_server *s, const uint8_t *data)
     return begins_again(s, data) && is_strange(s, data);
 }
 
-static bool refuse_stranger(const struct sdo_server *s, const uint8_t *data, struct can_msg *out)
+static bool refuse_other_client(const struct sdo_server *s, const uint8_t *data,
+                                struct can_msg *out)
 {
     frame(s, ABORT_BYTE, out);
     memcpy(out->data + 1, data + 1, 3);
@@ -606,7 +608,7 @@ static bool write_beside(const struct sdo_server *s, const struct od_entry *entr
     return true;
 }
 
-static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
+static bool from_other_client(const struct sdo_server *s, const uint8_t *data)
 {
     if (s->state == SDO_SERVER_IDLE || begins_again(s, data)) {
         return false;
@@ -617,7 +619,7 @@ static bool from_stranger(const struct sdo_server *s, const uint8_t *data)
     return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_strange(s, data) : is_initiate(data);
 }
 
-/* A stranger that gives up its own transfer does not end this one. */
+/* Another client that gives up its own transfer does not end this one. */
 static void take_abort(struct sdo_server *s, const uint8_t *data)
 {
     const bool named = cob_get(data + 1, 2) != 0u;
@@ -637,8 +639,8 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     if (urgent != NULL) {
         return write_beside(server, urgent, in->data, out);
     }
-    if (from_stranger(server, in->data)) {
-        return refuse_stranger(server, in->data, out);
+    if (from_other_client(server, in->data)) {
+        return refuse_other_client(server, in->data, out);
     }
     server->silence_us = 0;
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */

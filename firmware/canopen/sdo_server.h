@@ -1,33 +1,31 @@
 /* SPDX-License-Identifier: MIT */
 /* sdo_server: gives an object dictionary to one SDO client (CiA 301, 7.2.4).
- *
- * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client
- * reads): expedited, segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.
- *
+ * 
+ * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client reads): expedited,
+ * segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.
+ * 
  * One transfer at a time, of one client. While it is under way an initiate request is refused with SDO_ABORT_LOCAL and
- * its own object, and the transfer goes on: it comes from somebody else. Only a client that has moved nothing yet may
- * begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is gone is
- * forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
- *
- * A command to stop gets through: an expedited write of one byte that the dictionary's hook `urgent` names is carried out and answered
- * beside the transfer under way, which goes on. Its client has to disregard that answer, which names another object than
- * its own. Within a block, segments are told from such a write by all its eight bytes.
- *
- * Within a block each frame is a segment by its number. One that is a request for an object that there is, by all its bits, and
- * whose number is not one of the next two, is refused as such. A stranger's frame whose number is just the next one is taken, and then the true one shows: the same
- * number with other bytes ends the transfer, and where even that is missed, the CRC.
- *
- * Loss within a block: segments after a gap are ignored and the answer at the block's end names the
- * last good one, from where the client repeats. When the block's last segment itself is lost, the
- * server gives that answer after half of the timeout; a client that only paused repeats a few
- * segments. Loss of a whole block ends in the timeout.
- *
- * A client that sends a block does not listen: after an abort by the server the rest of the block
- * still comes. Frames whose numbers go on from the last segment are therefore no requests.
- *
- * Frames in, frames out. All functions: mainline (the hooks may take long); the receive interrupt
- * only queues.
- */
+ * its own object, and the transfer goes on: the request comes from another client. Only a client that has moved nothing
+ * yet may begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is
+ * gone is forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
+ * 
+ * A command to stop gets through: an expedited write of one byte that the dictionary's hook `urgent` names is carried
+ * out and answered beside the transfer under way, which goes on. Its client has to disregard that answer, which names
+ * another object than its own. Within a block, segments are told from such a write by all its eight bytes.
+ * 
+ * Within a block each frame is a segment by its number. A frame that has the form of a request for an existing object,
+ * and whose number is not one of the next two, is refused as the request of another client. A frame of another client
+ * with just the next number is taken for a segment. The true segment, with the same number and other bytes, then ends
+ * the transfer; if it is lost, the CRC does.
+ * 
+ * Loss within a block: segments after a gap are ignored and the answer at the block's end names the last good one, from
+ * where the client repeats. When the block's last segment itself is lost, the server gives that answer after half of
+ * the timeout; a client that only paused repeats a few segments. Loss of a whole block ends in the timeout.
+ * 
+ * A client that sends a block does not listen: after an abort by the server the rest of the block still comes. Frames
+ * whose numbers go on from the last segment are therefore no requests.
+ * 
+ * Frames in, frames out. All functions: main loop (the hooks may take long); the receive interrupt only queues. */
 #ifndef CANOPEN_SDO_SERVER_H
 #define CANOPEN_SDO_SERVER_H
 
@@ -91,8 +89,8 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
  * takes frames. */
 bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
 
-/* The CRC of block transfers (CiA 301, 7.2.4.3.16): polynomial x^16 + x^12 + x^5 + 1, initial value 0, not reflected; check
- * value of "123456789": 0x31C3. Goes on from `crc` (0 at the beginning) over `size` bytes. Pure, any context. */
+/* The CRC of block transfers (CiA 301, 7.2.4.3.16): polynomial x^16 + x^12 + x^5 + 1, initial value 0, not reflected;
+ * check value of "123456789": 0x31C3. Goes on from `crc` (0 at the beginning) over `size` bytes. Pure, any context. */
 uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/sync.h (see there): SYNC with counter, producer and consumer. */
 #include "canopen/sync.h"
 
 #include "canopen/cob.h"

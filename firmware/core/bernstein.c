@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/bernstein.h (see there): bounds of a polynomial from its Bernstein coefficients. */
 #include "core/bernstein.h"
 
 #include <string.h>

@@ -19,9 +19,8 @@ int64_t bernstein_from_powers(const int64_t *a, int degree, int64_t *b);
 /* The same polynomial on the left half of the interval (in place) and on the right one; de Casteljau, rounded down. */
 void bernstein_halve(int64_t *b, int64_t *right, int degree);
 
-/* 1 when the polynomial stays in [low, high] on the interval, 0 when it does not or exceeds by so
- * little that nine halvings cannot tell (about 1e-5 of its variation). |b|, |low|, |high| < 2^62.
- * Explicit stack, at most 1023 intervals. */
+/* 1 when the polynomial stays in [low, high] on the interval, 0 when it does not, or when nine halvings cannot decide
+ * (within about 1e-5 of its variation). |b|, |low|, |high| < 2^62. Explicit stack, at most 1023 intervals. */
 int bernstein_within(const int64_t *b, int degree, int64_t low, int64_t high);
 
 #endif

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/brake_check.h (see there): the proof that path stops keep the limits of the path axes. */
 #include "core/brake_check.h"
 
 #include "core/qmath.h"

@@ -9,7 +9,8 @@
  * of how the axes move on that stretch of the path (core/path_bounds). Where that leaves it open the part is halved: in
  * time, rate or slope of the rate. A fault stop that begins during the brake of a feed hold is not looked at.
  *
- * Integers only (core/real.h): the same verdict on every target. Main loop; no heap, some 5 KiB of stack.
+ * Integers only (core/real.h): the same verdict on every target. Main loop of a host; no heap, some 9 KiB of stack and
+ * 10^6 to 10^9 instructions a piece (docs/guides/limits.md section 5).
  */
 #ifndef HODOGRAPH_CORE_BRAKE_CHECK_H
 #define HODOGRAPH_CORE_BRAKE_CHECK_H

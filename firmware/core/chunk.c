@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/chunk.h (see there): a chunk, a part of a job that is longer than the controller's memory:
+ * reading and checking it. */
 #include "core/chunk.h"
 
 #include <stddef.h>
@@ -7,10 +9,14 @@
 #include "core/crc32.h"
 #include "core/little_endian.h"
 #include "core/override_ramp.h"
+#include "core/qmath.h"
 
 #define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */
 #define CRC_FROM      16u
 #define ARC_LIMIT_Q40 ((int64_t)1 << 62)
+#define MEETS_Q40  ((int64_t)1 << 16) /* 2^-24 mm: how far an end may be from the start behind it */
+#define REST_FLAGS (CHUNK_REST_STOP | CHUNK_REST_OPTIONAL)
+#define FLAGS      (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST | CHUNK_FLAG_JOINED)
 
 static void read_header(struct chunk *c, const uint8_t *b)
 {
@@ -27,12 +33,22 @@ static void read_header(struct chunk *c, const uint8_t *b)
     c->job_start_q40_mm = read_i64(b + 56);
     c->line = read_u32(b + 64);
     c->remaining_ms = read_u32(b + 68);
+    c->rest_ms = read_u32(b + 72);
+    c->rest_flags = read_u32(b + 76);
 }
 
 static uint32_t crc_of(const uint8_t *bytes, uint32_t size)
 {
     const uint32_t before = crc32_update(0, bytes + 4, CRC_AT - 4u);
     return crc32_update(before, bytes + CRC_FROM, size - CRC_FROM);
+}
+
+static int flags_fit(const struct chunk *c)
+{
+    const int rests = chunk_begins_at_rest(c);
+    const int joined = (c->flags & CHUNK_FLAG_JOINED) != 0u;
+    return (c->flags & ~FLAGS) == 0u && (c->rest_flags & ~REST_FLAGS) == 0u &&
+           (rests || (c->rest_ms | c->rest_flags) == 0u) && !(joined && !chunk_goes_on(c));
 }
 
 int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
@@ -42,8 +58,7 @@ int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
         return PROGRAM_ERR_CHUNK_FORMAT;
     }
     read_header(c, bytes);
-    if (c->size > size || c->size < CHUNK_HEADER_SIZE ||
-        (c->flags & ~(CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST)) != 0u || read_u64(bytes + 72) != 0u) {
+    if (c->size > size || c->size < CHUNK_HEADER_SIZE || !flags_fit(c)) {
         return PROGRAM_ERR_CHUNK_FORMAT;
     }
     if (crc_of(bytes, c->size) != read_u32(bytes + CRC_AT)) {
@@ -59,16 +74,20 @@ int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size)
 
 /* --- The first chunk of a job --- */
 
-static int check_first(const struct chunk *c)
+static int shares_nothing(const struct chunk *c)
 {
     const uint64_t shifts = (uint64_t)c->piece_shift | c->segment_shift | c->shared_pieces |
                             c->shared_segments | (uint64_t)c->arc_shift_q40_mm |
                             c->time_shift_q32_s;
+    return shifts == 0u && (c->program.header.flags & PROGRAM_FLAG_MOVING) == 0u;
+}
+
+static int check_first(const struct chunk *c)
+{
     if (c->sequence != 0u) {
         return PROGRAM_ERR_CHUNK_SEQUENCE;
     }
-    if ((c->flags & CHUNK_FLAG_FIRST) == 0u || shifts != 0u ||
-        (c->program.header.flags & PROGRAM_FLAG_MOVING) != 0u) {
+    if ((c->flags & CHUNK_FLAG_FIRST) == 0u || chunk_begins_at_rest(c) || !shares_nothing(c)) {
         return PROGRAM_ERR_CHUNK_FIRST;
     }
     return c->job_start_q40_mm >= 0 && c->job_start_q40_mm < ARC_LIMIT_Q40
@@ -86,6 +105,9 @@ static int check_follows(const struct chunk *next, const struct chunk *previous)
     }
     if ((next->flags & CHUNK_FLAG_FIRST) != 0u || !chunk_goes_on(previous)) {
         return PROGRAM_ERR_CHUNK_FIRST;
+    }
+    if (!chunk_begins_at_rest(next) && (previous->flags & CHUNK_FLAG_JOINED) != 0u) {
+        return PROGRAM_ERR_CHUNK_REST;
     }
     return next->program.header.period_us == previous->program.header.period_us &&
                    next->program.header.axis_count == previous->program.header.axis_count
@@ -151,9 +173,45 @@ static int check_pieces(const struct chunk *next, const struct chunk *previous, 
     return 0;
 }
 
+/* --- One that begins at rest --- */
+
+static int meets(int64_t start_q40, int64_t end_q40)
+{
+    return qmath_magnitude(start_q40 - end_q40) <= MEETS_Q40;
+}
+
+/* Whether it begins at the point where its predecessor ends. */
+static int begins_at_end(const struct chunk *next, const struct chunk *previous)
+{
+    const uint32_t axis_count = next->program.header.axis_count;
+    const int64_t *end_q40 = previous->end.position_q40;
+    struct program_segment first;
+    int same = 1;
+    program_segment_get(&next->program, 0, &first);
+    for (uint32_t axis = 0; axis < program_curve_axes(axis_count); axis++) {
+        same = same && meets(first.point_q40_mm[axis], end_q40[axis]);
+    }
+    for (uint32_t i = 0; i < program_extra_axes(axis_count); i++) {
+        same = same && meets(first.extra[i].start_q40, end_q40[PROGRAM_SPACE + i]);
+    }
+    return same;
+}
+
+static int check_rest(const struct chunk *next, const struct chunk *previous)
+{
+    const int64_t end_q40_mm = previous->job_start_q40_mm + previous->program.header.length_q40_mm;
+    return shares_nothing(next) && next->job_start_q40_mm == end_q40_mm &&
+                   next->job_start_q40_mm < ARC_LIMIT_Q40 && begins_at_end(next, previous)
+               ? 0
+               : PROGRAM_ERR_CHUNK_REST;
+}
+
 static int check_shared(const struct chunk *next, const struct chunk *previous, uint32_t *index)
 {
     int code = check_follows(next, previous);
+    if (chunk_begins_at_rest(next)) {
+        return code != 0 ? code : check_rest(next, previous);
+    }
     if (code == 0 && (!counts_fit(next, previous) || !shifts_fit(next, previous))) {
         code = PROGRAM_ERR_CHUNK_SHARED;
     }

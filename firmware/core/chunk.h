@@ -2,10 +2,14 @@
 /*
  * A chunk: a part of a job that is longer than the memory of the controller (docs/reference/protocol.md 1.7).
  *
- * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside the
- * limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before the joint,
- * where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion is in the
- * shared part (feed_override_take_over). When that does not come to pass, the motion follows the tail and rests on the path.
+ * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside
+ * the limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before
+ * the joint, where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion
+ * is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
+ * rests on the path.
+ *
+ * A chunk with flag REST shares nothing: it begins at rest, where its predecessor ends, after a dwell or a program stop. So
+ * paths with exact stops between them are one job.
  *
  * A chunk is never copied; its bytes must stay unchanged as long as a struct chunk refers to them. No heap, no globals.
  */
@@ -18,11 +22,16 @@
 #include "core/program.h"
 #include "core/program_check.h"
 
-#define CHUNK_HEADER_SIZE  80u
-#define CHUNK_VERSION      1u
-#define CHUNK_FLAG_FIRST   1u /* the job begins with it, at rest */
-#define CHUNK_FLAG_LAST    2u /* the job ends with it: its end is no tail */
-#define CHUNK_TIME_UNKNOWN UINT32_MAX
+#define CHUNK_HEADER_SIZE   80u
+#define CHUNK_VERSION       1u
+#define CHUNK_FLAG_FIRST    1u /* the job begins with it, at rest */
+#define CHUNK_FLAG_LAST     2u /* the job ends with it: its end is no tail */
+#define CHUNK_FLAG_REST     4u /* it begins at rest where its predecessor ends */
+#define CHUNK_FLAG_JOINED   8u /* its end is no tail: the next chunk has flag REST */
+#define CHUNK_REST_STOP     1u /* of rest_flags: a program stop before it */
+#define CHUNK_REST_OPTIONAL 2u /* an optional one */
+#define CHUNK_REST_TICKS    8u /* the shortest rest before a chunk with flag REST */
+#define CHUNK_TIME_UNKNOWN  UINT32_MAX
 #define CHUNK_SHARED_PIECES                                                                        \
     16u /* of a chunk whose takeover no look-ahead delays: the longest window */
 
@@ -42,6 +51,8 @@ struct chunk {
     int64_t job_start_q40_mm;  /* arc length of the job at arc length 0 */
     uint32_t line;             /* of the source at its start; 0: none */
     uint32_t remaining_ms;     /* of the job from the joint on; CHUNK_TIME_UNKNOWN */
+    uint32_t rest_ms;          /* dwell before it starts */
+    uint32_t rest_flags;       /* CHUNK_REST_STOP, CHUNK_REST_OPTIONAL */
     struct program program;
     /* What a takeover needs of the whole program, made by chunk_check: */
     uint64_t joint_time_q32_s;     /* program time of the joint in the predecessor, */
@@ -49,21 +60,35 @@ struct chunk {
     struct interpolator_point end; /* and its exact end point */
 };
 
-/* Opens a chunk of `size` bytes: magic, version, size, flags, CRC, and the program in it (program_open). The buffer may be
- * longer than the chunk says, never shorter. Cost: two CRCs, linear in the size. Returns 0 or a negative enum
+/* Opens a chunk of `size` bytes: magic, version, size, flags, CRC, and the program in it (program_open). The buffer may
+ * be longer than the chunk says, never shorter. Cost: two CRCs, linear in the size. Returns 0 or a negative enum
  * program_error; *c is then not usable. */
 int chunk_open(struct chunk *c, const uint8_t *bytes, uint32_t size);
 
-/* Checks an opened chunk: its whole program (program_check), and that it goes on from its predecessor, which has passed this
- * check; NULL for the first. Returns 0, or the code of the first rule broken; *fault gets the same code and its index. What
- * costs little and refuses a wrong chunk comes first. Main loop; linear. */
+/* Checks an opened chunk: its whole program (program_check), and that it goes on from its predecessor, which has passed
+ * this check; NULL for the first. Returns 0, or the code of the first rule broken; *fault gets the same code and its
+ * index. What costs little and refuses a wrong chunk comes first. Main loop; linear. */
 int chunk_check(struct chunk *next, const struct chunk *previous,
                 const struct program_limits *limits, struct program_fault *fault);
 
-/* 1: the job goes on behind the end of this chunk's program, which is the end of a tail. */
+/* 1: the job goes on after this chunk's program, whose end is then the end of a tail. */
 static inline int chunk_goes_on(const struct chunk *c)
 {
     return (c->flags & CHUNK_FLAG_LAST) == 0u;
+}
+
+/* 1: it shares nothing and begins at rest where its predecessor ends. */
+static inline int chunk_begins_at_rest(const struct chunk *c)
+{
+    return (c->flags & CHUNK_FLAG_REST) != 0u;
+}
+
+/* Ticks of rest before such a chunk: setpoints that repeat the end of its predecessor. */
+static inline uint32_t chunk_rest_ticks(const struct chunk *c)
+{
+    const uint32_t period_ms = c->program.header.period_us / 1000u;
+    const uint32_t ticks = c->rest_ms / period_ms + (c->rest_ms % period_ms != 0u ? 1u : 0u);
+    return ticks > CHUNK_REST_TICKS ? ticks : CHUNK_REST_TICKS;
 }
 
 #endif

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/coefficients.h (see there): what a kernel needs of a program, computed once: coefficient
+ * records. */
 #include "core/coefficients.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/crc32.h (see there): CRC-32 of IEEE 802.3. */
 #include "core/crc32.h"
 
 static const uint32_t nibble_table[16] = {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/crossing_check.h (see there): the check that no tick crosses more than two segment ends. */
 #include "core/crossing_check.h"
 
 #include "core/feed_bounds.h"
@@ -21,21 +22,21 @@ static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
     return (length_q40 >> 16) * (int64_t)half_frequency / 8 - 1;
 }
 
-/* Pieces from *first on that reach into the stretch [from, to] stay below the feed; *first moves on past
- * those that end before it. */
-static int slow_enough(const struct program *p, int64_t from, int64_t to, uint32_t *first)
+int crossing_slow_enough(const struct program *p, int64_t from_q40_mm, int64_t to_q40_mm,
+                         uint32_t *first)
 {
-    int64_t feed = crossing_feed_q24(p, to - from);
+    int64_t feed = crossing_feed_q24(p, to_q40_mm - from_q40_mm);
     if (feed < FEED_LEAST_Q24) {
         return 0;
     }
-    while (*first + 1 < p->header.piece_count && piece_start(p, *first + 1u) < from - REACH_Q40) {
+    while (*first + 1 < p->header.piece_count &&
+           piece_start(p, *first + 1u) < from_q40_mm - REACH_Q40) {
         (*first)++;
     }
     for (uint32_t i = *first; i < p->header.piece_count; i++) {
         struct program_piece c;
         program_piece_get(p, i, &c);
-        if (c.start_q40_mm > to + REACH_Q40) {
+        if (c.start_q40_mm > to_q40_mm + REACH_Q40) {
             break;
         }
         if (!feed_bounds_within(&c, FEED_VELOCITY, -FEED_NO_BOUND_Q24, feed)) {
@@ -51,7 +52,7 @@ int crossing_check_all(const struct program *p, uint32_t *index)
     for (*index = 1; (uint64_t)*index + 2u < p->header.segment_count; (*index)++) {
         int64_t from = program_segment_start(p, *index);
         int64_t to = program_segment_start(p, *index + 2u);
-        if (!slow_enough(p, from, to, &piece)) {
+        if (!crossing_slow_enough(p, from, to, &piece)) {
             (*index)++;
             return PROGRAM_ERR_SEGMENT_SHORT;
         }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/feed_bounds.h (see there): feed, acceleration and jerk of a piece: values at its ends and bounds
+ * over it. */
 #include "core/feed_bounds.h"
 
 #include <assert.h>

@@ -28,21 +28,21 @@ void feed_bounds_end(const struct program_piece *piece, struct feed_state *out);
 
 enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 };
 
-/* 1 when that derivative of F stays within [low, high] over the whole piece, in 2^-24 mm/s, mm/s^2
- * or mm/s^3; 0 when it does not (or by less than about 1e-5 of its variation cannot be told). */
+/* 1 when that derivative of F stays within [low, high] over the whole piece, in 2^-24 mm/s, mm/s^2 or mm/s^3; 0 when it
+ * does not, or when that cannot be decided (within about 1e-5 of its variation). */
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
 
 #define FEED_PARTS 8
 
-/* Bounds of that derivative over each eighth of the piece (in time), their Bernstein coefficients' least and greatest in
- * 2^-24 units, rounded outwards. The greatest are held at +-FEED_NO_BOUND_Q24; the least are -FEED_NO_BOUND_Q24 or more,
- * and below 2^62. */
+/* Bounds of that derivative over each eighth of the piece (in time), their Bernstein coefficients' least and greatest
+ * in 2^-24 units, rounded outwards. The greatest are held at +-FEED_NO_BOUND_Q24; the least are -FEED_NO_BOUND_Q24 or
+ * more, and below 2^62. */
 void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
-/* The way a piece may go behind its start or beyond its end: 2^-14 mm. The exponential ramp begins with a step back of
- * some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
+/* The distance that a piece may go back before its start or beyond its end: 2^-14 mm. The exponential ramp begins with
+ * a step back of some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
 #define FEED_WAY_SLACK_Q36 ((int64_t)1 << 22)
 
 /* 1 when F stays between its values at both ends of the piece, to that slack: a feed that is nowhere far below 0 may

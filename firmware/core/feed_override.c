@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/feed_override.h (see there): the feed override and path stops: which place of the path each tick
+ * has. */
 #include "core/feed_override.h"
 
 #include <stddef.h>
@@ -351,13 +353,23 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
+/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited for the end of a
+ * rise of the override, which the bound of the piece before does not know of: then the bound of this piece counts. */
+static void enter_piece(struct feed_override *f)
+{
+    read_numbers(f);
+    if (f->kind == PROGRAM_STOP_HOLD) {
+        f->left_q30 = qmath_greater(f->left_q30, deadline_q30(f));
+    }
+}
+
 /* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
  * to find out before is spread over ticks. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
         if (f->numbers_piece != f->clock.piece) {
-            read_numbers(f);
+            enter_piece(f);
         }
         if (f->look == LOOK_SEEN) {
             f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;
@@ -462,16 +474,30 @@ static int may_take_over_resting(const struct feed_override *f, const struct chu
                               program_piece_start(&next->program, 0);
 }
 
+/* A chunk behind a rest: at the end of its predecessor. A path that is held waits. */
+static int may_begin_next(const struct feed_override *f)
+{
+    return f->phase == PHASE_PLAN && f->state == STATE_WAITING;
+}
+
 static int may_take_over(const struct feed_override *f, const struct chunk *next)
 {
+    if (chunk_begins_at_rest(next)) {
+        return may_begin_next(f);
+    }
     return f->goes_on != 0u && f->phase != PHASE_BRAKE &&
            (rests(f) ? may_take_over_resting(f, next) : may_take_over_moving(f, next));
 }
 
-/* In motion the same place of the next program; at rest the search for it begins with the first piece. */
+/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the first
+ * piece. */
 static void place_in_next(const struct feed_override *f, const struct interpolator *it,
                           const struct chunk *next, struct feed_place *place)
 {
+    if (chunk_begins_at_rest(next)) {
+        *place = (struct feed_place){.piece = 0};
+        return;
+    }
     const int resting = rests(f);
     const uint32_t segment = it->segment->number;
     place->piece = resting ? 0u : f->clock.piece - next->piece_shift;
@@ -496,27 +522,46 @@ static void rest_in_next(struct feed_override *f)
     f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
 }
 
+/* As a program begins. */
+static void begin_next(struct feed_override *f, const struct chunk *next,
+                       const struct coefficients_piece *first)
+{
+    program_clock_begin_at_piece(&f->clock, &next->program, f->clock.period_us, first);
+    override_plan_begin_next(&f->plan, &next->least);
+    f->state = FEED_RUNNING;
+}
+
+static void go_on_in_next(struct feed_override *f, const struct chunk *next,
+                          const struct feed_place *at, const struct coefficients_piece *record)
+{
+    const int resting = at->by_arc != 0u;
+    /* at rest at its start until the place is found */
+    program_clock_carry(&f->clock, &next->program,
+                        resting ? f->clock.time_q42_s : qmath_q42_of_q32(next->time_shift_q32_s),
+                        at->piece, record);
+    override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
+    if (resting) {
+        rest_in_next(f);
+    }
+}
+
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,
                             const struct chunk *next, const struct coefficients_window *window)
 {
     struct feed_place at;
-    const int resting = rests(f);
     place_in_next(f, it, next, &at);
     const struct coefficients_piece *record = coefficients_window_piece(window, at.piece);
     const struct coefficients_segment *segment =
         interpolator_segment_in(window, at.segment, at.arc_length_q40_mm);
-    if (!may_take_over(f, next) || segment == NULL || (!resting && record == NULL)) {
+    if (!may_take_over(f, next) || segment == NULL || (at.by_arc == 0u && record == NULL)) {
         return 0;
     }
     f->point.arc_length_q40_mm = at.arc_length_q40_mm;
-    /* at rest at its start until the place is found */
-    program_clock_carry(&f->clock, &next->program,
-                        resting ? f->clock.time_q42_s : qmath_q42_of_q32(next->time_shift_q32_s),
-                        at.piece, record);
     interpolator_carry(it, &next->program, window, segment, &next->end);
-    override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
-    if (resting) {
-        rest_in_next(f);
+    if (chunk_begins_at_rest(next)) {
+        begin_next(f, next, record);
+    } else {
+        go_on_in_next(f, next, &at, record);
     }
     goes_on(f, next);
     return 1;

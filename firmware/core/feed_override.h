@@ -7,7 +7,9 @@
  * bounds of every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
  * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
- * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4).
+ * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4). A hold or stop
+ * that is asked for while the override rises first ends the rise. If the plan is in another piece by then, the bound of that one
+ * counts from there.
  *
  * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
  * found to 2^-42 s of program time.
@@ -108,7 +110,8 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
  * same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those of the
  * program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a ramp or is on
  * one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from the same arc length;
- * the motion goes on when it is running and the place is found, with the override from 0.
+ * the motion goes on when it is running and the place is found, with the override from 0. A chunk that begins at rest: at the end
+ * of its predecessor, running; the next tick gives its first setpoint, as of a program.
  * Returns 1, or 0: not now, or not with these records, and nothing has changed; try again after the next tick. After 1 the
  * program before and its records are no longer in use. Constant time. */
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/feed_piece.h (see there): arc length and feed of a feed piece at a time, in integers. */
 #include "core/feed_piece.h"
 
 #include "core/qmath.h"

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/feedforward.h (see there): velocity and torque offsets (0x60B1, 0x60B2) that go with the
+ * setpoints of one axis. */
 #include "core/feedforward.h"
 
 #include "core/qmath.h"

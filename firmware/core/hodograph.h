@@ -16,11 +16,11 @@
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
  *   of a job in chunks, in place of program_open, program_check and feed_override_begin (core/chunk.h):
- *   main loop   chunk_open, chunk_check      the same for the program of a chunk, and that it goes on from its predecessor
+ *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it goes on from its predecessor
  *               feed_override_begin_job      with the first chunk
  *               feed_override_take_over      the next chunk for the program under way; needs the tick held off
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
- *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us   what is so at the last setpoint
+ *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us   state at the last setpoint
  *
  * ## Context
  *
@@ -31,10 +31,10 @@
  *
  * ## Path axes
  *
- * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section 1).
- * program.header.axis_count says how many; positions, limits and offsets are arrays of PROGRAM_AXES, of which the first
- * axis_count count. A controller that serves another number says so in program_limits.axis_count, and program_check
- * refuses the program.
+ * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section
+ * 1). program.header.axis_count says how many; positions, limits and offsets are arrays of PROGRAM_AXES, of which the
+ * first axis_count count. A controller that serves another number says so in program_limits.axis_count, and
+ * program_check refuses the program.
  *
  * ## Cost
  *
@@ -46,10 +46,11 @@
  *
  * ## Errors
  *
- * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and program_check: enum program_error,
- * program_error_text. coefficients_make_in: COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next:
- * INTERPOLATOR_ERR_...; of a program that passed program_check a tick has no error. Arguments are validated there and
- * nowhere else: what a header demands of the caller is not checked again. Questions with two answers return an int, 1 or 0.
+ * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and
+ * program_check: enum program_error, program_error_text. coefficients_make_in: COEFFICIENTS_ERR_SIZE.
+ * interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed program_check a tick
+ * never fails. Only program_check validates: what a header demands of the caller is not checked again. Questions with
+ * two answers return an int, 1 or 0.
  *
  * ## Numbers
  *

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/interpolator.h (see there): program time in, point on the path out. */
 #include "core/interpolator.h"
 
 #include <stddef.h>

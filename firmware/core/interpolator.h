@@ -2,11 +2,11 @@
 /*
  * The interpolator: program time in, point on the path out.
  *
- * The point is a pure function of (program, time, kernel): the cursor inside struct interpolator only
- * remembers which segment and piece are looked at. So a run, a seek and a run backwards by seeks
- * give the same bits. Kernels: docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12
- * (the inverse of arc length). The program must have passed program_check with any limits and must have coefficient
- * records (core/coefficients.h); the records decide the kernel. Image and records must outlive the struct.
+ * The point is a pure function of (program, time, kernel): the cursor inside struct interpolator only remembers the
+ * present segment and piece. So a run, a seek and a run backwards by seeks give the same bits. Kernels:
+ * docs/theory/numerics.md sections 9 (fixed), 10 (float), 11 (double), 12 (the inverse of arc length). The program must
+ * have passed program_check with any limits and must have coefficient records (core/coefficients.h); the records decide
+ * the kernel. Image and records must outlive the struct.
  */
 #ifndef HODOGRAPH_CORE_INTERPOLATOR_H
 #define HODOGRAPH_CORE_INTERPOLATOR_H
@@ -39,7 +39,7 @@ struct interpolator_point {
                                          * mm, in degrees for an extra axis that turns */
 };
 
-/* The positions of the axes behind y, for the next function. */
+/* The positions of the axes after y, for the next function. */
 void interpolator_point_copy_rest(struct interpolator_point *out,
                                   const struct interpolator_point *from, uint32_t axis_count);
 
@@ -101,7 +101,7 @@ void interpolator_carry(struct interpolator *it, const struct program *p,
                         const struct coefficients_segment *segment,
                         const struct interpolator_point *end);
 
-/* Only the last one. */
+/* Only the last point. */
 void interpolator_exact_end(const struct program *p, struct interpolator_point *end);
 
 /* The point at a program time in 2^-42 s, below 2^22 s. Crosses at most two piece ends forwards and
@@ -112,15 +112,15 @@ void interpolator_exact_end(const struct program *p, struct interpolator_point *
 int interpolator_at_q42(struct interpolator *it, uint64_t time_q42_s,
                         struct interpolator_point *out);
 
-/* The same by a caller that has already found the record of the piece that this time lies in. Nothing is looked for but
- * the segment; the cursor of pieces stays where it is. INTERPOLATOR_ERR_JUMP too when the piece ends before this time and is
- * not the last; it must not begin after this time. */
+/* The same by a caller that has already found the record of the piece that this time lies in. Only the segment is
+ * searched; the cursor of pieces stays where it is. INTERPOLATOR_ERR_JUMP too when the piece ends before this time and
+ * is not the last; it must not begin after this time. */
 int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece,
                           uint64_t time_q42_s, struct interpolator_point *out);
 
-/* The point at an arc length, for whoever knows that without a time (core/feed_override); held inside the path. Of *out
- * feed_q32_mm_s is 0. Crosses at most INTERPOLATOR_MOST_SEGMENTS segment ends either way, else INTERPOLATOR_ERR_JUMP. Tick context;
- * bounded time. */
+/* The point at an arc length, for a caller without a program time (core/feed_override); held inside the path. Of *out
+ * feed_q32_mm_s is 0. Crosses at most INTERPOLATOR_MOST_SEGMENTS segment ends either way, else INTERPOLATOR_ERR_JUMP.
+ * Tick context; bounded time. */
 int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm,
                                struct interpolator_point *out);
 

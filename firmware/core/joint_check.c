@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/joint_check.h (see there): whether a path goes on smoothly from a segment to the next. */
 #include "core/joint_check.h"
 
 #include "core/qwide.h"

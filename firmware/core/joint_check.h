@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Whether a path goes on smoothly from a segment to the next: part of core/segment_check. Products are exact; what follows
- * them in space is within 2^-26 of itself. docs/reference/protocol.md 1.2. Pure, main loop.
+ * Whether a path goes on smoothly from a segment to the next: part of core/segment_check. Products are exact. In space
+ * the numbers computed from them are within 2^-26 of themselves. docs/reference/protocol.md 1.2. Pure, main loop.
  */
 #ifndef HODOGRAPH_CORE_JOINT_CHECK_H
 #define HODOGRAPH_CORE_JOINT_CHECK_H

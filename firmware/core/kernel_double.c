@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/kernel_double.h (see there): the double kernel, the host's reference. */
 #include "core/kernel_double.h"
 
 #include "core/kernel.h"

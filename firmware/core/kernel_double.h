@@ -21,7 +21,7 @@ struct kernel_double_piece {
 struct kernel_double_arc {
     int64_t origin_q40_mm;
     double c_mm[6];
-    double inverse[2][4]; /* first guess of z, before and behind the middle: scale, then cubic */
+    double inverse[2][4]; /* first guess of z, before and after the middle: scale, then cubic */
 };
 
 struct kernel_double_axis {
@@ -39,7 +39,7 @@ struct kernel_double_extra {
     double c[6]; /* position in powers of z */
 };
 
-/* Of a spatial program; ends behind its extra axes. */
+/* Of a spatial program; a record ends with the last extra axis that the program has. */
 struct kernel_double_space {
     struct kernel_double_arc arc;
     struct kernel_double_axis axes[PROGRAM_SPACE];
@@ -52,7 +52,8 @@ void kernel_double_piece_set(void *piece, const struct program_piece *from);
 int64_t kernel_double_piece_acceleration(const void *piece, uint64_t t_q42_s);
 void kernel_double_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s);
 
-/* The functions have the types of struct kernel: `segment` is a struct kernel_double_segment, `piece` a struct kernel_double_piece. */
+/* The functions have the types of struct kernel: `segment` is a struct kernel_double_segment, `piece` a struct
+ * kernel_double_piece. */
 
 void kernel_double_segment_set(void *segment, const struct ph_segment *ph);
 

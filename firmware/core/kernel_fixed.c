@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/kernel_fixed.h (see there): the fixed kernel: integers only, the same bits everywhere. */
 #include "core/kernel_fixed.h"
 
 #include "core/kernel.h"

@@ -27,7 +27,7 @@ struct kernel_fixed_arc {
     int32_t s_q30[6];     /* normalised arc length from the middle */
     int32_t slope_q29[5]; /* its derivative in z: sigma / 2 */
     int32_t exponent;
-    struct kernel_fixed_inverse inverse[2]; /* before and behind the middle */
+    struct kernel_fixed_inverse inverse[2]; /* before and after the middle */
 };
 
 struct kernel_fixed_axis {
@@ -43,7 +43,7 @@ struct kernel_fixed_segment {
     int32_t v_q28[3];
 };
 
-/* Of a spatial program; ends behind its extra axes. */
+/* Of a spatial program; a record ends with the last extra axis that the program has. */
 struct kernel_fixed_space {
     struct kernel_fixed_arc arc;
     struct kernel_fixed_axis axes[PROGRAM_SPACE];

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/kernel_float.h (see there): the float kernel: single precision and integers. */
 #include "core/kernel_float.h"
 
 #include "core/kernel.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The float kernel: the inverse of arc length and the tangent in single precision, everything else in 32-bit integers with
- * a scale of the segment's own. No double, no 64-bit conversion: int32 to float and back only. Derivation and
+ * The float kernel: the inverse of arc length and the tangent in single precision, everything else in 32-bit integers
+ * with a scale of the segment's own. No double, no 64-bit conversion: int32 to float and back only. Derivation and
  * error bound: docs/theory/numerics.md section 10. Feed pieces are core/feed_piece.h. Only + - * / : with
  * -ffp-contract=off the same bits on every target with IEEE single. Pure, tick context.
  */
@@ -30,7 +30,7 @@ struct kernel_float_inverse {
 /* Arc length and its inverse. */
 struct kernel_float_arc {
     int64_t middle_q40_mm;   /* arc length at z = 0, rounded down, */
-    int32_t middle_rest_q48; /* and what that leaves */
+    int32_t middle_rest_q48; /* the part below that rounding */
     int32_t scale;           /* 2^(48 - q of the polynomials) */
     int32_t shift;           /* arc length in q48 by this to q30 normalised */
     struct kernel_float_polynomial p;
@@ -51,7 +51,7 @@ struct kernel_float_segment {
     float v[3];
 };
 
-/* Of a spatial program; ends behind its extra axes. */
+/* Of a spatial program; a record ends with the last extra axis that the program has. */
 struct kernel_float_space {
     struct kernel_float_arc arc;
     struct kernel_float_axis axes[PROGRAM_SPACE];
@@ -65,7 +65,8 @@ struct kernel_float_space {
 
 void kernel_float_segment_set(void *segment, const struct ph_segment *ph);
 
-/* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow ones. */
+/* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow
+ * ones. */
 void kernel_float_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/limit_check.h (see there): the proof that a program keeps the limits of its path axes. */
 #include "core/limit_check.h"
 
 #include <stddef.h>

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/override_plan.h (see there): which override ramp comes next on the way to the commanded
+ * override, and a tick of it. */
 #include "core/override_plan.h"
 
 #include <string.h>
@@ -78,6 +80,13 @@ void override_plan_let_go(struct override_plan *plan)
         plan->kept = *plan->ahead.bounds;
         plan->ahead.bounds = &plan->kept;
     }
+}
+
+void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
+{
+    override_plan_carry(plan, least, 0);
+    come_to_rest(plan);
+    plan->started = 0;
 }
 
 void override_plan_rest(struct override_plan *plan)

@@ -2,10 +2,11 @@
 /*
  * The plan of the feed override: which ramp comes next on the way to the override that is commanded, and a tick of it.
  *
- * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The decision
- * is spread over the ticks before it, one step of a search in a tick. Up to `guaranteed_q57`, the override that all pieces of
- * the program allow, the override may rest for as long as it likes. Above it a ramp back is known before a ramp up begins,
- * and when it has to begin (docs/theory/numerics.md section 12, "Override ramps" and "Look-ahead windows").
+ * One ramp at a time is decided, from rest to rest, by look-ahead into the feed pieces that it will run into. The
+ * decision is spread over the ticks before it, one step of a search in a tick. Up to `guaranteed_q57`, the override
+ * that all pieces of the program allow, the override may stay constant for any time. Above it the return ramp, and the
+ * time at which it has to begin, are known before a ramp up begins (docs/theory/numerics.md section 12, "Override
+ * ramps" and "Look-ahead windows").
  *
  * Integers only, bounded time, no heap. One owner. Tick context, but for override_plan_begin.
  */
@@ -19,7 +20,7 @@
 #include "core/program_clock.h"
 
 enum override_task {
-    OVERRIDE_DECIDES, /* nothing is looked for */
+    OVERRIDE_DECIDES, /* no search is under way */
     OVERRIDE_SEARCHES,
     OVERRIDE_BEGINS,
 };
@@ -33,7 +34,7 @@ enum override_kind {
 
 /* The steps of a search, one in a tick. */
 enum override_search {
-    OVERRIDE_LOOKS, /* at the next window of pieces: what it allows, and the levels of the change, */
+    OVERRIDE_LOOKS, /* evaluates the next window of pieces: what it allows, and the levels of the change, */
     OVERRIDE_STAGES,   /* how far one ramp may go with that, */
     OVERRIDE_MEASURES, /* how long that ramp takes, */
     OVERRIDE_FITS,     /* and whether it ends inside the window */
@@ -53,7 +54,7 @@ struct override_plan {
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
     int64_t asked_q57;  /* the override asked for, */
-    int64_t most_q57;   /* and the most that counts of it: */
+    int64_t most_q57;   /* the largest value that counts, whatever is commanded, */
     int64_t commanded_q57;
     int64_t guaranteed_q57;             /* greatest override that all pieces allow, */
     struct program_override guaranteed; /* and their least bounds */
@@ -78,15 +79,19 @@ struct override_plan {
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
 void override_plan_begin(struct override_plan *plan, const struct program *p);
 
+/* The same for the next program of a job, which begins at rest, with its least override bounds: what is commanded stays.
+ * Constant time. */
+void override_plan_begin_next(struct override_plan *plan, const struct program_override *least);
+
 /* The most that counts of the override asked for. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 
-/* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a ramp
- * decided with pieces before, and nothing is looked for. */
+/* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a
+ * ramp decided with pieces before, and no search is under way. */
 int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s);
 
-/* The program goes on as another, with these least bounds, whose time is less by `shift`. Where override_plan_ends_by its
- * first new piece, or at rest. */
+/* The program of the next chunk takes over: it has these least bounds, and its program time is less by `shift`. Only at
+ * rest, or where override_plan_ends_by accepts the time of its first new piece. */
 void override_plan_carry(struct override_plan *plan, const struct program_override *least,
                          uint64_t shift_q32_s);
 
@@ -105,7 +110,7 @@ void override_plan_set(struct override_plan *plan, uint32_t percent);
 void override_plan_hold(struct override_plan *plan);
 void override_plan_release(struct override_plan *plan);
 
-/* An override that rises does so no more: its slope goes to 0 as fast as it rose. */
+/* Ends a rise of the override early: its slope falls to 0 as fast as it rose. */
 void override_plan_rise_no_more(struct override_plan *plan);
 
 /* --- Tick --- */

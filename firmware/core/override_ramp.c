@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/override_ramp.h (see there): ramps of the feed override from one constant value to another. */
 #include "core/override_ramp.h"
 
 #include "core/qmath.h"

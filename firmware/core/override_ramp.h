@@ -2,14 +2,15 @@
 /*
  * Ramps of the feed override: how the override goes from one value to another, at rest at both.
  *
- * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"), 1 as planned. On a ramp
- * its second derivative is constant in each tick, so the override is piecewise quadratic in time. What the feed pieces of a
- * program allow its two derivatives is given by level of the override (docs/reference/protocol.md 1.3); a ramp keeps the bounds of
- * the level of its greatest override, so a change through several levels is made in stages (section 12, "Levels").
+ * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"), 1 as
+ * planned. On a ramp its second derivative is constant in each tick, so the override is piecewise quadratic in time.
+ * What the feed pieces of a program allow its two derivatives is given by level of the override
+ * (docs/reference/protocol.md 1.3); a ramp keeps the bounds of the level of its greatest override, so a change through
+ * several levels is made in stages (section 12, "Levels").
  *
- * Units: override in 2^-57, its slope in 2^-56 a tick, its second difference in 2^-56 a tick squared. A tick that takes the
- * slope from a to b raises the override by exactly a + b units. Pure functions, integers only, no division but where it is
- * said. Any context.
+ * Units: override in 2^-57, its slope in 2^-56 a tick, its second difference in 2^-56 a tick squared. A tick that takes
+ * the slope from a to b raises the override by exactly a + b units. Pure functions, integers only, no division unless
+ * stated. Any context.
  */
 #ifndef HODOGRAPH_CORE_OVERRIDE_RAMP_H
 #define HODOGRAPH_CORE_OVERRIDE_RAMP_H
@@ -21,7 +22,7 @@
 #define OVERRIDE_ONE          ((int64_t)1 << 57)
 #define OVERRIDE_MOST         (2 * OVERRIDE_ONE)
 #define OVERRIDE_MOST_PERCENT 200u /* OVERRIDE_MOST in per cent */
-/* 10^-6: what a ramp may leave of its change, but for bounds next to nothing. */
+/* 10^-6: the largest remainder of its change that a ramp leaves, unless its bounds are near the least of the format. */
 #define OVERRIDE_SPARE ((int64_t)1 << 37)
 
 /* A factor of the override bounds as an override. */
@@ -84,19 +85,19 @@ void override_limits_of(struct ramp_limits *out, const struct program_override *
 
 /* --- Duration --- */
 
-/* How long a ramp takes: the slope rises for `rise` ticks, at most for `half`; it is `half` ticks from the first to where
- * it begins to fall, and falls as it rose. rise + half ticks in all. */
+/* How long a ramp takes: the slope rises for `rise` ticks, at most for `half`; it is `half` ticks from the first to
+ * where it begins to fall, and falls as it rose. rise + half ticks in all. */
 struct ramp_ticks {
     uint32_t rise;
     uint32_t half;
 };
 
-/* Ticks for a change (0 ... OVERRIDE_MOST): as few as can be, but for 2^-10 of them and two. */
+/* Ticks for a change (0 ... OVERRIDE_MOST): the least number, or up to 2^-10 of it and two more. */
 void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limits,
                        int64_t change_q57);
 
 /* What the slope changes by in a tick, floor(change / (2 rise half)): inside the limits that `ticks` was made with, for
- * that change and any smaller one. What it leaves of the change is below 2 rise half units. One division. */
+ * that change and any smaller one. The remainder of the change is below 2 rise half units. One division. */
 int64_t override_step_of(const struct ramp_ticks *ticks, int64_t change_q57);
 
 /* Upper bound of the program time of so many ticks at this mean override, 2^-32 s; period rounded up. */

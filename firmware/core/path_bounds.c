@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/path_bounds.h (see there): bounds of how the axes move along the path, for a stretch of it. */
 #include "core/path_bounds.h"
 
 #include <stddef.h>

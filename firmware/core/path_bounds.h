@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Bounds of how the axes move along the path, for a stretch of it: the first three derivatives of each axis by arc length.
+ * Bounds of how the axes move along the path, for a stretch of it: the first three derivatives of each axis by arc
+ * length.
  *
- * Each segment is cut into equal parts, 8 to 64, the shorter the stretch the more. For a part the derivatives at both ends are
- * kept, and by how much a derivative may differ from the straight line between them, which follows from a bound of its second
- * derivative (core/path_motion). The parts looked at last are kept, since the next stretch is near.
+ * Each segment is cut into equal parts, 8 to 64, the shorter the stretch the more. For a part the derivatives at both
+ * ends are kept, and by how much a derivative may differ from the straight line between them, which follows from a
+ * bound of its second derivative (core/path_motion). The parts used last are kept, since the next stretch is near.
  *
  * Integers only (core/real.h). Main loop; the caller lends the memory, some 2.5 KiB.
  */
@@ -45,8 +46,8 @@ struct path_bounds {
 /* For a program whose segments have passed their checks. */
 void path_bounds_begin(struct path_bounds *bounds, const struct program *p);
 
-/* The stretch from one arc length to another, which lie on the path or are taken as its ends. `segment`: one at or before the
- * segment of the first. Sets the program's axes. */
+/* The stretch from one arc length to another, which lie on the path or are taken as its ends. `segment`: one at or
+ * before the segment of the first. Sets the program's axes. */
 void path_bounds_of(struct path_bounds *bounds, uint32_t segment, int64_t from_q40_mm,
                     int64_t to_q40_mm, struct path_stretch *out);
 

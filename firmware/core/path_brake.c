@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/path_brake.h (see there): a path stop: an S-curve of path speed, decided anew in each tick. */
 #include "core/path_brake.h"
 
 #include "core/qmath.h"

@@ -2,12 +2,13 @@
 /*
  * A brake along the path: how feed hold, stop and fault stop come to rest without leaving the curve.
  *
- * The path speed follows an S-curve from the speed and acceleration that the motion has: the acceleration falls by at most
- * the first jerk to the deceleration, stays there, and rises by at most the last jerk until speed and acceleration are 0 in
- * the same tick. Jerks and deceleration are the three numbers that the program's stop table has for the piece
- * (core/program.h). Each tick decides from the state alone whether the acceleration still falls or the way to rest begins
- * (docs/theory/numerics.md section 12, "Path stop"), so there is no plan to search for, and the numbers may change on the way.
- * Only the arc length is made here; the point on the curve is the interpolator's (interpolator_at_arc_length).
+ * The path speed follows an S-curve from the speed and acceleration that the motion has: the acceleration falls by at
+ * most the first jerk to the deceleration, stays there, and rises by at most the last jerk until speed and acceleration
+ * are 0 in the same tick. Jerks and deceleration are the three numbers that the program's stop table has for the piece
+ * (core/program.h). Each tick decides from the state alone whether the acceleration still falls or the release phase
+ * begins (docs/theory/numerics.md section 12, "Path stop"), so there is no plan to search for, and the numbers may
+ * change on the way. Only the arc length is made here; the point on the curve is the interpolator's
+ * (interpolator_at_arc_length).
  *
  * Unit of length: 2^-56 mm. Unit of time: a tick. Integers only, the same on every target. Speed and acceleration are 0
  * exactly at the end. Pure functions, bounded time, any context.
@@ -31,8 +32,8 @@ struct path_state {
     int64_t acceleration_q56;  /* mm a tick squared */
 };
 
-/* What a brake may use; jerks in mm a tick cubed, deceleration in mm a tick squared. At least 2^22, and the deceleration
- * below PATH_BRAKE_MOST_TICKS times either jerk: as path_brake_numbers_of makes them. */
+/* What a brake may use; jerks in mm a tick cubed, deceleration in mm a tick squared. At least 2^22, and the
+ * deceleration below PATH_BRAKE_MOST_TICKS times either jerk: as path_brake_numbers_of makes them. */
 struct path_brake_numbers {
     int64_t jerk_down_q56;
     int64_t deceleration_q56;
@@ -49,8 +50,8 @@ struct path_brake {
     uint32_t phase;
 };
 
-/* The numbers of an entry of the stop table, rounded down. period_us: 1000, 2000, 4000 or 8000. Returns 1, or 0 where the
- * entry has no brake, or one out of range (then *out is unchanged). */
+/* The numbers of an entry of the stop table, rounded down. period_us: 1000, 2000, 4000 or 8000. Returns 1, or 0 where
+ * the entry has no brake, or one out of range (then *out is unchanged). */
 int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
                           uint32_t period_us);
 
@@ -60,13 +61,13 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
 int path_brake_begin(struct path_brake *brake, const struct path_state *from,
                      const struct path_brake_numbers *numbers);
 
-/* Whether a brake that begins here, or a tick later of this motion, rests within a way. An upper bound of the way is
- * what is compared, so 0 where it just does. */
+/* Whether a brake that begins here, or a tick later of this motion, comes to rest within a distance. It compares an
+ * upper bound of the stopping distance, so the result may be 0 although the brake would just fit. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t way_q40_mm);
 
-/* The first tick of a brake may be this one, in place of a step: an acceleration above 0 falls, as far as 0, and one below
- * stays. Cheap, for a tick that had to find out the state. */
+/* The first tick of a brake may be this one, in place of a step: an acceleration above 0 falls, as far as 0, and one
+ * below stays. Cheap, for a tick that had to determine the state. */
 void path_brake_first(struct path_brake *brake);
 
 /* One tick on; `at` is the state then. At rest nothing changes. */

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, as numbers that bounds
+ * can be proved of. */
 #include "core/path_motion.h"
 
 #include "core/ph_segment.h"

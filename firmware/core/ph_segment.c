@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/ph_segment.h (see there): a PH segment expanded for evaluation. */
 #include "core/ph_segment.h"
 
 #include "core/qmath.h"

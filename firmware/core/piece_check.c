@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/piece_check.h (see there): the rules of feed pieces (docs/reference/protocol.md 1.3). */
 #include "core/piece_check.h"
 
 #include "core/feed_bounds.h"
@@ -82,7 +83,7 @@ static int check_one(const struct program_piece *c, const struct program_limits 
 }
 
 /* End of one piece (absolute start and state) against the start of the next; a piece may not end
- * behind its start. */
+ * after its start. */
 static int check_join(const struct program_piece *a, const struct program_piece *b)
 {
     struct feed_state end;

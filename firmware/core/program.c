@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/program.h (see there): reading header, segments, feed pieces and stops of a program image. */
 #include "core/program.h"
 
 #include <stddef.h>
@@ -9,7 +10,7 @@
 #include "core/program_check.h"
 #include "core/qmath.h"
 
-#define CRC_FROM 16u /* the CRC covers everything behind itself */
+#define CRC_FROM 16u /* the CRC covers everything after itself */
 
 static void read_header(struct program_header *h, const uint8_t *b)
 {
@@ -30,6 +31,7 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->feed_limit_um_s = read_u32(b + 64);
     h->acceleration_limit_um_s2 = read_u32(b + 68);
     h->jerk_limit_mm_s3 = read_u32(b + 72);
+    h->event_count = read_u32(b + 76);
     memcpy(h->name, b + 80, 32);
     h->name[32] = '\0';
     h->hold_worst_us = read_u32(b + 112);
@@ -38,7 +40,7 @@ static void read_header(struct program_header *h, const uint8_t *b)
     h->fault_worst_um = read_u32(b + 124);
 }
 
-/* Those of the axes behind y stand behind the header of a planar program. */
+/* Those of the axes after y stand after the header of a planar program. */
 static void read_offsets(struct program_header *h, const uint8_t *b)
 {
     for (uint32_t axis = PROGRAM_PLANE; axis < h->axis_count; axis++) {
@@ -67,7 +69,8 @@ static int check_size(const struct program_header *h, uint32_t size)
     }
     uint64_t need = h->header_size +
                     (uint64_t)h->segment_count * program_segment_size(h->axis_count) +
-                    (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
+                    (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
+                    (uint64_t)h->event_count * PROGRAM_EVENT_SIZE;
     if (need != h->image_size) {
         return PROGRAM_ERR_SIZE;
     }
@@ -134,6 +137,26 @@ void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kin
     out->jerk_up = codes[2];
     out->reserved = (uint16_t)read_u16(b + 6);
     out->bound_us = read_u32(kind == PROGRAM_STOP_FAULT ? b + 12 : b + 8);
+}
+
+static const uint8_t *event_bytes(const struct program *p, uint32_t i)
+{
+    return stop_bytes(p, p->header.piece_count) + (size_t)i * PROGRAM_EVENT_SIZE;
+}
+
+void program_event_get(const struct program *p, uint32_t i, struct program_event *out)
+{
+    const uint8_t *b = event_bytes(p, i);
+    out->place_q40_mm = read_i64(b);
+    out->kind = b[8];
+    out->channel = b[9];
+    out->mask = (uint16_t)read_u16(b + 10);
+    out->value = (int32_t)read_u32(b + 12);
+}
+
+int64_t program_event_place(const struct program *p, uint32_t i)
+{
+    return read_i64(event_bytes(p, i));
 }
 
 int64_t program_segment_start(const struct program *p, uint32_t i)

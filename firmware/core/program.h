@@ -2,11 +2,10 @@
 /*
  * The uploaded program image: reading its header, segments, feed pieces and stops.
  *
- * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The
- * image is never copied; it must stay unchanged as long as a struct program or a struct interpolator
- * refers to it. `program_open` checks what is needed to read without leaving the image (sizes,
- * counts, CRC); everything else is the business of `program_check` (core/program_check.h), which
- * has to pass before a program is interpolated.
+ * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The image is
+ * never copied; it must stay unchanged as long as a struct program or a struct interpolator refers to it.
+ * `program_open` checks what is needed to read without leaving the image (sizes, counts, CRC); `program_check`
+ * (core/program_check.h) checks everything else, and has to pass before a program is interpolated.
  *
  * No heap, no globals; every function may be called from any context.
  */
@@ -20,16 +19,20 @@ struct kernel; /* core/kernel.h */
 #define PROGRAM_AXES  6u /* greatest number of path axes */
 #define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
 #define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
-#define PROGRAM_EXTRAS       (PROGRAM_AXES - PROGRAM_SPACE)
-#define PROGRAM_HEADER_SIZE  128u /* and 8 for each path axis behind y */
-#define PROGRAM_SEGMENT_SIZE 72u  /* of a planar program */
-#define PROGRAM_SPACE_SIZE   104u /* of a segment of a spatial one, */
-#define PROGRAM_EXTRA_SIZE   38u  /* and for each extra axis */
-#define PROGRAM_PIECE_SIZE   88u
-#define PROGRAM_STOP_SIZE    16u
-#define PROGRAM_VERSION      2u
-#define PROGRAM_FLAG_CLOSED  1u
-#define PROGRAM_FLAG_MOVING  2u /* begins in motion: only in a chunk (core/chunk.h) */
+#define PROGRAM_EXTRAS        (PROGRAM_AXES - PROGRAM_SPACE)
+#define PROGRAM_HEADER_SIZE   128u /* and 8 for each path axis behind y */
+#define PROGRAM_SEGMENT_SIZE  72u  /* of a planar program */
+#define PROGRAM_SPACE_SIZE    104u /* of a segment of a spatial one, */
+#define PROGRAM_EXTRA_SIZE    38u  /* and for each extra axis */
+#define PROGRAM_PIECE_SIZE    88u
+#define PROGRAM_STOP_SIZE     16u
+#define PROGRAM_EVENT_SIZE    16u
+#define PROGRAM_VERSION       2u
+#define PROGRAM_FLAG_CLOSED   1u
+#define PROGRAM_FLAG_MOVING   2u  /* begins in motion: only in a chunk (core/chunk.h) */
+#define PROGRAM_DIGITALS      16u /* outputs that events can switch: digital ones, */
+#define PROGRAM_ANALOGUES     3u  /* and analogue ones, so that all fit in one PDO */
+#define PROGRAM_EVENTS_A_TICK 16u /* that a tick can pass at most */
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
 struct program_header {
@@ -42,6 +45,7 @@ struct program_header {
     uint32_t piece_count;
     uint16_t flags;      /* PROGRAM_FLAG_... */
     uint16_t axis_count; /* PROGRAM_PLANE ... PROGRAM_AXES */
+    uint32_t event_count;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
     int64_t offset_q40_mm
@@ -56,8 +60,8 @@ struct program_header {
     uint32_t fault_worst_um;
 };
 
-/* Components of the preimage A = u + v i + p j + q k, whose hodograph is A i A*. That of a planar program has u and q only:
- * w = u + iq. */
+/* Components of the preimage A = u + v i + p j + q k, whose hodograph is A i A*. That of a planar program has u and q
+ * only: w = u + iq. */
 enum program_component { PROGRAM_U, PROGRAM_V, PROGRAM_P, PROGRAM_Q };
 #define PROGRAM_COMPONENTS 4u
 
@@ -121,14 +125,31 @@ enum program_stop_kind {
     PROGRAM_STOP_FAULT = 1, /* fault stop: inside the machine's */
 };
 
-/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of
- * them 0: no brake may begin in this piece. */
+/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All
+ * of them 0: no brake may begin in this piece. */
 struct program_stop {
     uint8_t jerk_down;
     uint8_t deceleration;
     uint8_t jerk_up;
     uint16_t reserved;
     uint32_t bound_us; /* from the command, given in this piece, to rest: at most */
+};
+
+/* What an event does, protocol.md 1.8. */
+enum program_event_kind {
+    PROGRAM_EVENT_DIGITAL = 1,
+    PROGRAM_EVENT_ANALOGUE = 2,
+    PROGRAM_EVENT_PROPORTIONAL = 3,
+};
+
+/* An event on the path: what becomes of outputs at an arc length. */
+struct program_event {
+    int64_t place_q40_mm;
+    uint8_t kind;    /* enum program_event_kind, of an image that passed program_check */
+    uint8_t channel; /* of an analogue output; 0 for digital ones */
+    uint16_t mask;   /* digital: the outputs that change; else 0 */
+    int32_t
+        value; /* digital: their levels; analogue: the value; proportional: q16, for each mm/s */
 };
 
 struct program {
@@ -156,6 +177,10 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
 /* The stop of a kind that is asked for in piece i, which must be below the count. Constant time. */
 void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kind kind,
                       struct program_stop *out);
+
+/* Event number i, which must be below the count. Constant time. */
+void program_event_get(const struct program *p, uint32_t i, struct program_event *out);
+int64_t program_event_place(const struct program *p, uint32_t i);
 
 /* Only the start (arc length) of a segment, only the duration or the start of a piece: cheaper. */
 int64_t program_segment_start(const struct program *p, uint32_t i);

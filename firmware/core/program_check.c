@@ -1,7 +1,10 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/program_check.h (see there): all checks of a program before it may run, and the texts of
+ * refusals. */
 #include "core/program_check.h"
 
 #include "core/crossing_check.h"
+#include "core/event_check.h"
 #include "core/limit_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
@@ -45,7 +48,7 @@ static int check_header(const struct program *p, const struct program_limits *li
         return code;
     }
     const uint32_t flags = PROGRAM_FLAG_CLOSED | (limits->chunk != 0 ? PROGRAM_FLAG_MOVING : 0u);
-    if ((h->flags & ~flags) != 0 || !bytes_are_zero(p->image + 76, 4)) {
+    if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }
     if (limits->axis_count != 0 && limits->axis_count != h->axis_count) {
@@ -77,6 +80,9 @@ int program_check(const struct program *p, const struct program_limits *limits,
     if (fault->code == 0) {
         fault->code = stop_check_all(p, limits, &fault->index);
     }
+    if (fault->code == 0) {
+        fault->code = event_check_all(p, &fault->index);
+    }
     return fault->code;
 }
 
@@ -99,7 +105,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_KERNEL, "the controller does not have the kernel configured"},
     {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
     {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},
-    {PROGRAM_ERR_FLAGS, "unknown flag, or a reserved field of the header is not 0"},
+    {PROGRAM_ERR_FLAGS, "unknown flag"},
     {PROGRAM_ERR_AXES, "axis count not 2 ... 6, or not that of the machine"},
     {PROGRAM_ERR_DURATION, "not the sum of the pieces, or not below 2^22 s"},
     {PROGRAM_ERR_LENGTH, "length not in (0, 2^22) mm"},
@@ -140,6 +146,11 @@ static const struct text texts[] = {
     {PROGRAM_ERR_STOP_BOUND, "a stop can take longer than its bound"},
     {PROGRAM_ERR_STOP_LONG, "a fault stop can take longer than the controller allows"},
     {PROGRAM_ERR_STOP_WORST, "the worst stops of the header are not those of the table"},
+    {PROGRAM_ERR_EVENT_KIND, "kind or channel of an event is unknown"},
+    {PROGRAM_ERR_EVENT_VALUE,
+     "an event changes outputs beside its mask, or its value is too large"},
+    {PROGRAM_ERR_EVENT_PLACE, "an event is before the one before it, or not on the path"},
+    {PROGRAM_ERR_EVENT_DENSE, "a tick at 200 % could pass more than 16 events"},
     {PROGRAM_ERR_CHUNK_FORMAT,
      "chunk: wrong magic, version, size or flag, or a reserved field is not 0"},
     {PROGRAM_ERR_CHUNK_CRC, "chunk: CRC-32 is wrong"},
@@ -152,6 +163,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_CHUNK_PIECE, "chunk: a shared piece is not that of its predecessor"},
     {PROGRAM_ERR_CHUNK_OVER,
      "chunk: of a job that is over, or checked under another configuration"},
+    {PROGRAM_ERR_CHUNK_REST, "chunk: does not begin at rest where its predecessor ends"},
     {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
     {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
     {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},

@@ -23,7 +23,7 @@ enum program_error {
     PROGRAM_ERR_COUNT = -5,   /* no segment or no piece */
     PROGRAM_ERR_STORE = -6,   /* the program store did not keep it (app/program_slot) */
     PROGRAM_ERR_ROOM =
-        -7, /* it and what is prepared from it do not fit the store (app/program_table) */
+        -7, /* image and coefficient cache do not fit the store (app/program_table) */
     PROGRAM_ERR_KERNEL = -8, /* this controller's image does not have the kernel configured */
     /* header */
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
@@ -60,7 +60,7 @@ enum program_error {
     PROGRAM_ERR_START_MOVING = -47,      /* the program does not begin at rest */
     PROGRAM_ERR_END_MOVING = -48,        /* the program does not end at rest */
     PROGRAM_ERR_PIECE_END = -49,    /* the last piece does not end at the length of the header */
-    PROGRAM_ERR_PIECE_SHORT = -50,  /* two neighbouring pieces last no longer than two periods */
+    PROGRAM_ERR_PIECE_SHORT = -50,  /* two adjacent pieces last no longer than two periods */
     PROGRAM_ERR_BACKWARDS = -51,    /* feed below -2^-10 mm/s */
     PROGRAM_ERR_FEED = -52,         /* above the feed limit of the controller */
     PROGRAM_ERR_ACCELERATION = -53, /* above its acceleration limit */
@@ -79,13 +79,18 @@ enum program_error {
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
     PROGRAM_ERR_STOP_WORST = -64,   /* the worst stops of the header are not those of the table */
+    /* events (core/event_check.h): index = the event */
+    PROGRAM_ERR_EVENT_KIND = -100,  /* kind or channel unknown */
+    PROGRAM_ERR_EVENT_VALUE = -101, /* mask or value outside of what the kind has */
+    PROGRAM_ERR_EVENT_PLACE = -102, /* before the event before it, or outside the path */
+    PROGRAM_ERR_EVENT_DENSE = -103, /* a tick at 200 % could pass more than 16 events */
     /* chunks of a stream (core/chunk.h): index = the segment or piece of the chunk where it says so, else 0 */
     PROGRAM_ERR_CHUNK_FORMAT =
         -80, /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
     PROGRAM_ERR_CHUNK_CRC = -81, /* CRC-32 of the chunk is wrong */
     PROGRAM_ERR_CHUNK_JOB = -82, /* another job than the predecessor's, or job 0 */
     PROGRAM_ERR_CHUNK_SEQUENCE =
-        -83, /* sequence is not the predecessor's and 1; of a first chunk not 0 */
+        -83, /* sequence is not one more than the predecessor's; of a first chunk not 0 */
     PROGRAM_ERR_CHUNK_FIRST =
         -84, /* flag FIRST, but a predecessor, shared parts or a start in motion; or none of them */
     PROGRAM_ERR_CHUNK_PROGRAM = -85, /* period or axis count is not the predecessor's */
@@ -95,6 +100,8 @@ enum program_error {
     PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
     PROGRAM_ERR_CHUNK_OVER =
         -89, /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
+    PROGRAM_ERR_CHUNK_REST =
+        -79, /* behind a rest it does not begin where its predecessor ends, or flag REST is missing */
 };
 
 /* What this controller allows. */
@@ -113,8 +120,8 @@ struct program_limits {
     uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
     uint32_t chunk;        /* 1: a chunk's program may begin in motion (core/chunk.h) */
-    /* Called with `self` at every piece by the parts of the check that take long: so a main loop can give signs of life
-     * meanwhile. NULL: nobody is. */
+    /* Called with `self` at every piece by the long parts of the check, so that a main loop can send heartbeats
+     * meanwhile. May be NULL. */
     void (*attend)(void *self);
     void *self;
 };

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/program_clock.h (see there): which program time each tick has, and which feed piece that time is
+ * in. */
 #include "core/program_clock.h"
 
 uint64_t program_clock_way_q62_s(const struct program_clock *clock,

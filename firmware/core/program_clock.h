@@ -2,10 +2,10 @@
 /*
  * The program clock: which program time each tick has, and which feed piece that time is in.
  *
- * A tick advances the clock by the period times the feed override of that tick (core/override_plan decides the override).
- * At override 1, tick k is at min(k period, duration), without drift, in two resolutions: q42 is
- * floor(k period_us 2^42 / 10^6 + 1/2), which a tick uses; q32 likewise, which the object dictionary shows.
- * At another override the time is exact to 2^-62 s in each tick (docs/theory/numerics.md section 12, "Feed override").
+ * A tick advances the clock by the period times the feed override of that tick (core/override_plan decides the
+ * override). At override 1, tick k is at min(k period, duration), without drift, in two resolutions: q42 is floor(k
+ * period_us 2^42 / 10^6 + 1/2), which a tick uses; q32 likewise, which the object dictionary shows. At another override
+ * the time is exact to 2^-62 s in each tick (docs/theory/numerics.md section 12, "Feed override").
  *
  * Integers only, the same on every target. No heap; about 0.1 KiB. What a tick calls is inline here.
  */

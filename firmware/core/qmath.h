@@ -199,15 +199,15 @@ uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 /* The same, rounded up; a + b below 2^64. */
 uint64_t qmath_div_up_u64(uint64_t a, uint64_t b);
 
-/* a / b with so many bits (0 ... 32) behind the point, held at 2^60; a >= 0, b > 0. Right to a unit, and to 2^-20 of it where
- * b is at least 2^-10 of a and has 52 bits. */
+/* a / b with so many bits (0 ... 32) after the point, held at 2^60; a >= 0, b > 0. Right to a unit, and to 2^-20 of it
+ * where b is at least 2^-10 of a and has 52 bits. */
 uint64_t qmath_ratio(int64_t a, int64_t b, int bits);
 
 /* floor of the square root: 16 rounds of additions and a 32-bit division. */
 uint64_t qmath_root(uint64_t a);
 
-/* At least the square root of a, 2^30 <= a, and at most 2^-10 of it and 2 more: a straight line, off by 5 %, and one step
- * of Heron's rule, whose error is half the square of that and always above. */
+/* At least the square root of a, 2^30 <= a, and at most 2^-10 of it and 2 more: a straight line, off by 5 %, and one
+ * step of Heron's rule, whose error is half the square of that and always above. */
 static inline uint32_t qmath_root_above(uint32_t a)
 {
     uint32_t line = ((a >> 16) * 43u >> 6) + 23200u;

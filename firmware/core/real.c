@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/real.h (see there): floating-point numbers in integers, the same on every target. */
 #include "core/real.h"
 
 #include "core/qmath.h"

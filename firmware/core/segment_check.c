@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/segment_check.h (see there): the rules of segments (docs/reference/protocol.md 1.2). */
 #include "core/segment_check.h"
 
 #include "core/joint_check.h"

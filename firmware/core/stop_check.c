@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/stop_check.h (see there): how long a stop can take, and whether the stop table covers it. */
 #include "core/stop_check.h"
 
 #include "core/feed_bounds.h"

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The stop table of a program (docs/reference/protocol.md 1.4): how long a stop can take, and whether the table says so. Nothing in
- * the image is believed: the bounds follow from the feed pieces, the override bounds and the numbers alone
- * (docs/theory/numerics.md section 7, "Stops"). Integer arithmetic; every value is rounded so that a bound is never too short.
+ * The stop table of a program (docs/reference/protocol.md 1.4): how long a stop can take, and whether the bounds in the
+ * table cover that. The table's bounds are not trusted: they are computed anew from the feed pieces, the override
+ * bounds and the stop parameters (docs/theory/numerics.md section 7, "Stops"). Integer arithmetic; every value is
+ * rounded so that a bound is never too short.
  *
- * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into the
- * next. About 10 000 instructions per piece and kind. Main loop.
+ * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into
+ * the next. About 10 000 instructions per piece and kind. Main loop.
  */
 #ifndef HODOGRAPH_CORE_STOP_CHECK_H
 #define HODOGRAPH_CORE_STOP_CHECK_H
@@ -15,8 +16,8 @@
 #include "core/program.h"
 #include "core/program_check.h"
 
-/* Ticks of a stop that are not in the continuous curve: until the command takes effect, and what the brake takes more
- * (tests/unit/test_path_brake.c). */
+/* Ticks of a stop that are not in the continuous curve: until the command takes effect, and the excess of a brake in
+ * whole ticks (tests/unit/test_path_brake.c). */
 #define STOP_TICKS 9u
 /* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
 #define STOP_WINDOW_TICKS 6u
@@ -34,9 +35,9 @@ struct stop_walk {
     const struct program *program;
     enum program_stop_kind kind;
     uint64_t window_q32_s;
-    struct stop_bound own[STOP_WINDOW];   /* of the pieces behind, the nearest first, */
+    struct stop_bound own[STOP_WINDOW];   /* of the pieces after it, the nearest first, */
     uint64_t duration_q32_s[STOP_WINDOW]; /* and their durations */
-    struct stop_bound next;               /* bound of the piece behind */
+    struct stop_bound next;               /* bound of the next piece */
     uint32_t count;
 };
 
@@ -52,9 +53,9 @@ struct stop_extent {
 void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
                        struct stop_extent *out);
 
-/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate adds.
- * A rate that still rises is below the greatest by what it goes up while its slope is taken back, in cut_us at least: so of
- * the slope only that adds to the speed which the brake's jerk takes longer for. um, s; us. */
+/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate
+ * adds. A rate that still rises is below the greatest one by what it gains until its slope is 0, which takes at least
+ * cut_us. So the slope adds to the speed only for the time that the brake's jerk takes longer than that. um, s; us. */
 struct stop_start {
     uint64_t speed_um;
     uint64_t rising_um;
@@ -72,7 +73,7 @@ uint64_t stop_level_slope_q16(const struct program_override *bounds, uint32_t le
 /* The brake of the table alone: its continuous curve. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
 
-/* Begins behind the last piece of a program whose pieces and segments have passed their checks. */
+/* Begins after the last piece of a program whose pieces and segments have passed their checks. */
 void stop_walk_begin(struct stop_walk *walk, const struct program *p, enum program_stop_kind kind);
 
 /* The bound of the piece before: the first call gives that of the last piece, and so on. */

@@ -8,9 +8,9 @@
  * Three contexts (drawn in docs/reference/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
  *   timer     the timer interrupt: calls port_handlers.tick once a period
- *   mainline  main(): everything that may wait
+ *   main loop  main(): everything that may wait
  * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each
- * other nor a critical section of the mainline, so data shared with the mainline needs no other
+ * other nor a critical section of the main loop, so data shared with the main loop needs no other
  * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
  * `receive`.) On Linux one thread stands for both interrupts.
  *
@@ -41,11 +41,11 @@ enum port_error {
 int port_begin(int argc, char **argv);
 
 /* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
- * failed on the way (the bus went away); that has been reported. Mainline. */
+ * failed on the way (the bus went away); that has been reported. Main loop. */
 int port_end(void);
 
 /* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without
- * such a wish. */
+ * such a request. */
 bool port_stop_requested(void);
 
 /* True when it has been asked for a second time: not along the path any more, but as quickly as the drives can. */
@@ -57,7 +57,7 @@ uint8_t port_node_id(void);
 
 /* --- CAN, classic frames --- */
 
-/* Lets only frames that pass one of them through to the receive handler. At most PORT_FILTERS of them. Mainline,
+/* Lets only frames that pass one of them through to the receive handler. At most PORT_FILTERS of them. Main loop,
  * before port_start(). */
 #define PORT_FILTERS 16
 int port_can_accept(const struct can_match *filters, size_t count);
@@ -76,10 +76,10 @@ struct port_handlers {
     void *self; /* handed to both */
     /* now_us: port_time_us() of this interrupt, so that the clock is read once only. */
     void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
-    /* late_ns: how long after its due time the tick began (4.29 s at most are told). A late tick is
-     * called late. Where the port has the choice it skips none, and no two are closer than three quarters
-     * of a period; a timer whose interrupts merge (SysTick) drops those that are a whole period late and
-     * is on time with the next. Either way a program goes on with its next tick: only time is lost. */
+    /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A late tick is called late.
+     * Where the port has the choice it skips none, and no two are closer than three quarters of a period; a timer whose
+     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. Either way a
+     * program goes on with its next tick: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
@@ -87,21 +87,22 @@ struct port_handlers {
 uint32_t port_time_ns(void); /* wraps after 4.29 s */
 uint32_t port_time_us(void); /* wraps after 71 minutes */
 
-/* Turns both interrupts on; the first tick comes one period later. Mainline, once. */
+/* Turns both interrupts on; the first tick comes one period later. Main loop, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* Changes the period: that before the next tick, or, where a timer has loaded it already, that behind it. */
+/* Changes the period: that before the next tick, or, where a timer has loaded it already, that after it. */
 void port_tick_period(uint32_t period_us);
 
 /* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
- * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler:
- * all drives have answered), for guard_us at most; then it starts late rather than on time. While the host as a whole
- * stalls the guard time does not run. At lock step the tick starts then at once if `hurry`. A board, whose timer knows nothing but the clock, ignores both. */
+ * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler: all drives have
+ * answered), for guard_us at most; then it starts late rather than on time. While the host as a whole stalls the guard
+ * time does not run. At lock step the tick starts then at once if `hurry`. A board, whose timer knows nothing but the
+ * clock, ignores both. */
 void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 
-/* Whether ticks have to come in time because drives are real: then none is put off for a mainline that starves. At first
- * they have not. Boards, on which ticks are interrupts, ignore it. Mainline. */
+/* Whether ticks have to come in time because drives are real: then none is put off for a main loop that starves. At
+ * first they have not. Boards, on which ticks are interrupts, ignore it. Main loop. */
 void port_tick_urgent(bool urgent);
 
 /* How well ticks come in time. Boards: PORT_TIMING_KEPT. Any context. */
@@ -112,21 +113,22 @@ enum port_timing {
 };
 enum port_timing port_timing(void);
 
-/* --- Mainline --- */
+/* --- Main loop --- */
 
-/* Critical section: holds off both interrupts. Short, not nested, mainline only. */
+/* Critical section: holds off both interrupts. Short, not nested, main loop only. */
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a wish to stop, or timeout_us; sometimes less. Mainline, outside the critical section. */
+/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical section. */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
-/* Work that is longer than usual has got further: the mainline goes on, though it does not wait. A port with a watchdog feeds
- * it, provided that ticks go on as well; others have nothing to do. Mainline. */
+/* Work that is longer than usual has got further: the main loop goes on, though it does not wait. A port with a
+ * watchdog feeds it, provided that ticks go on as well; others have nothing to do. Main loop. */
 void port_progress(void);
 
-/* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Mainline --- */
+/* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Main
+ * loop --- */
 
 #define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */
 #define PORT_STORE_PARAMETERS 2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
@@ -135,8 +137,9 @@ void port_progress(void);
 
 uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */
 
-/* Erases a bank, its last 16 bytes first; then writes go in ascending order. The one gap that may be left is before the last 16 bytes, which are
- * written at once. What is written can be read at multiples of 8 bytes, and after the last write. 0 or PORT_ERR_STORE. */
+/* Erases a bank, its last 16 bytes first; then writes go in ascending order. The one gap that may be left is before the
+ * last 16 bytes, which are written at once. What is written can be read at multiples of 8 bytes, and after the last
+ * write. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 
@@ -145,8 +148,8 @@ const uint8_t *port_store_data(unsigned bank);
 
 /* --- RAM for chunks of streamed jobs --- */
 
-/* The memory of the ring (app/stream), aligned to 8, and its bytes; 0: this port streams nothing. Lost with the power. Always
- * the same. Main loop. */
+/* The memory of the ring (app/stream), aligned to 8, and its bytes; 0: this port streams nothing. Lost with the power.
+ * Always the same. Main loop. */
 uint8_t *port_stream_memory(uint32_t *size);
 
 /* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is streamed. */
@@ -159,7 +162,7 @@ enum port_level {
     PORT_WARNING, /* always */
 };
 
-/* One line to the console: a fixed text and a number. Mainline. */
+/* One line to the console: a fixed text and a number. Main loop. */
 void port_log(enum port_level level, const char *text, int32_t value);
 
 #endif

@@ -31,7 +31,7 @@ $(foreach t,$(TARGETS) $(BOARDS),$(eval $(t)_CORE := $(if $(filter rv32,$(t)),rv
 
 # An image is a main with what it is linked from besides core, canopen, app and the dictionary; the targets that it is
 # for, where not all; kernels, where not the target's; and what tools/check_image.py has to allow.
-IMAGES := setpoints setpoints_float controller isr taylor interrupted checker
+IMAGES := setpoints setpoints_float controller isr taylor interrupted checker stop_checker
 setpoints_MAIN := tests/target/setpoints.c
 setpoints_SRC  := tests/target/commands.c tests/target/table.c tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
 
@@ -55,8 +55,12 @@ taylor_TARGETS := an385 an386
 taylor_CHECK   := --soft-float
 
 checker_MAIN    := tests/target/checker.c
-checker_SRC     := tests/target/exit.c $(wildcard firmware/port/semihost/*.c)
+checker_SRC     := tests/target/exit.c tests/target/checked.c $(wildcard firmware/port/semihost/*.c)
 checker_TARGETS := an386 microbit
+
+stop_checker_MAIN    := tests/target/stop_checker.c
+stop_checker_SRC     := $(checker_SRC)
+stop_checker_TARGETS := an386
 
 controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)

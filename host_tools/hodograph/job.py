@@ -8,7 +8,7 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -18,9 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .config import Machine, PathFile, SpacePathSpec
+from .config.outputs import Outputs
 from .errors import InputError, PlanError
+from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
+from .job_outputs import SectionCommands, is_output, section_events
 from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
@@ -34,7 +37,9 @@ from .toolpath.files import ReadOptions, is_gcode, read_toolpath
 from .toolpath.fit.fitting import FittedPath, Tolerance, fit
 from .toolpath.fit.sections import Section, Toolpath, cut_at, divided
 from .toolpath.fit.speeds import MotionLimits
+from .toolpath.fit.turning import with_turning
 from .toolpath.moves import (
+    AXES,
     AnalogOutput,
     Command,
     Coolant,
@@ -64,6 +69,7 @@ _IGNORED: dict[tuple[type[Command], ...], str] = {
     (DigitalOutput, AnalogOutput): "outputs (M62 to M65, M67, M68)",
 }
 _LONGEST_NAME = 40
+_ROUNDING_MM = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +77,12 @@ class SectionPipeline(Pipeline):
     """A pipeline whose curve is that of a section."""
 
     fitted: FittedPath | None = None
+    given_events: Events = field(default_factory=no_events)
+
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path."""
+        return self.given_events
 
     @cached_property
     def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
@@ -265,7 +277,8 @@ def load_job(
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
     sections = tuple(made for section in path.sections for made in maker.made(section))
-    notes += _ignored_commands(path, file)
+    notes += _ignored_commands(path, file, machine.outputs)
+    sections = _with_outputs(sections, path.after, machine, file)
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
@@ -279,14 +292,30 @@ def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Ite
             yield command
 
 
-def _ignored_commands(path: Toolpath, file: Path) -> Iterator[str]:
+def _with_outputs(
+    sections: tuple[JobSection, ...], after: tuple[Command, ...], machine: Machine, file: Path
+) -> tuple[JobSection, ...]:
+    """The sections, with the outputs in their programs."""
+    if machine.outputs is None:
+        return sections
+    commands = [
+        SectionCommands(one.before, one.events, one.fitted.curve.length_mm) for one in sections
+    ]
+    every = section_events(commands, after, machine.outputs, file)
+    return tuple(
+        replace(one, pipeline=replace(one.pipeline, given_events=events))
+        for one, events in zip(sections, every, strict=True)
+    )
+
+
+def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> Iterator[str]:
     """Notes on commands that the machine does not execute, one for each kind."""
     at_rest = [command for section in path.sections for command in section.before]
     on_the_way = [event.command for section in path.sections for event in section.events]
     lines: dict[str, list[int]] = {}
     for command in [*at_rest, *path.after, *on_the_way]:
         for kinds, text in _IGNORED.items():
-            if isinstance(command, kinds):
+            if isinstance(command, kinds) and not is_output(command, outputs):
                 lines.setdefault(text, []).append(command.line)
     for text, where in lines.items():
         more = f" and {len(where) - 1} more" if len(where) > 1 else ""
@@ -330,7 +359,7 @@ class SectionMaker:
 
     @property
     def _limits(self) -> MotionLimits:
-        axes = self.machine.path_axes
+        axes = self.machine.path_axes[:3]
         return MotionLimits(
             min(self.machine.feed_mm_s, *(axis.velocity_mm_s for axis in axes)),
             min(self.machine.acceleration_mm_s2, *(axis.acceleration_mm_s2 for axis in axes)),
@@ -348,7 +377,28 @@ class SectionMaker:
                 f'{self.machine.file.name} follow a path: name three of them, path = ["x", "y", "z"], at its top'
             )
 
+    def _turned(self, section: Section, fitted: FittedPath) -> FittedPath:
+        """With the axes of the machine that turn along. Raises InputError and PlanError, naming file and line."""
+        angles, extra = section.reference.turn_deg, self.machine.path_axes[3:]
+        if angles is None:
+            return fitted
+        names = [axis.name.lower() for axis in extra]
+        for k, name in enumerate(AXES[3:]):
+            if name not in names and angles[:, k].any():
+                line = section.reference.line[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
+                raise InputError(
+                    f"{self.file}:{line}: the move turns {name.upper()}, but no axis {name} of "
+                    f'{self.machine.file.name} follows the path: name it behind "z" in path = [...] at its top, '
+                    "or leave it out"
+                )
+        columns = [AXES.index(name) - 3 if name in AXES[3:] else None for name in names]
+        try:
+            return with_turning(fitted, columns, section.tolerance_mm)
+        except PlanError as error:
+            raise PlanError(f"{self.file}: {error}") from None
+
     def _section(self, section: Section, fitted: FittedPath) -> JobSection:
+        fitted = self._turned(section, fitted)
         nominal, zones = _feeds(fitted)
         first = int(section.reference.line[0])
         nodes = np.asarray(fitted.curve.nodal_points)
@@ -372,21 +422,28 @@ class SectionMaker:
 
     def _check_travel(self, section: Section, fitted: FittedPath) -> None:
         """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""
-        coefficients = fitted.curve.position_coefficients
-        for k, axis in enumerate(self.machine.path_axes[:3]):
+        curve, reference = fitted.curve, section.reference
+        coefficients, given = curve.position_coefficients, reference.point
+        if curve.extra_axes:
+            coefficients = np.concatenate((coefficients, curve.extra), axis=1)
+            starts = np.clip(fitted.arc_length_at(reference.place_mm), 0.0, curve.length_mm)
+            given = np.concatenate((given, curve.extra_point(starts)), axis=1)
+        for k, axis in enumerate(self.machine.path_axes[: coefficients.shape[1]]):
             offset = self.machine.offset_mm[k]
             low = coefficients[:, k].min(axis=1) + offset
             high = coefficients[:, k].max(axis=1) + offset
-            out = (low < axis.travel_min_mm) | (high > axis.travel_max_mm)
+            out = (low < axis.travel_min_mm - _ROUNDING_MM) | (
+                high > axis.travel_max_mm + _ROUNDING_MM
+            )
             if not out.any():
                 continue
-            programmed = section.reference.point[1:, k] + offset
+            programmed = given[1:, k] + offset
             beyond = (programmed < axis.travel_min_mm) | (programmed > axis.travel_max_mm)
             chord = _chord_of(fitted, int(np.argmax(out)))
             line = section.reference.line[int(np.argmax(beyond)) if beyond.any() else chord]
             raise PlanError(
-                f"{self.file}:{line}: {axis.name} goes to {low.min():.6g} … {high.max():.6g} mm with the work offset, "
-                f"its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} mm: "
+                f"{self.file}:{line}: {axis.name} goes to {low.min():.6g} … {high.max():.6g} {axis.unit} with the work "
+                f"offset, its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} {axis.unit}: "
                 "change [work] offset_mm, or the program"
             )
 
@@ -417,7 +474,7 @@ def _feeds(fitted: FittedPath) -> tuple[float, tuple[FeedZone, ...]]:
 
 @dataclass(frozen=True, eq=False)
 class JobMotion:
-    """A run of a job: the motions of its sections, one behind the other.
+    """A run of a job: the motions of its sections, one after the other.
 
     The last point of a section is the first one of the next and counts once. Dwells are not part of it.
     """

@@ -152,7 +152,7 @@ def run_job(
         )
         _require_end(at, made, program, place)
         passed += program.ticks
-        _say(at, job.file, [command for _, command in section.events])
+        say(at, job.file, [command for _, command in section.events])
         try:
             file = _record_of(record, number, job)
             runs.append(analysed(at, job.machine, program.image, made.kernel, recorded, file))
@@ -204,14 +204,14 @@ def _require_end(at: RunSession, made: PreparedJob, program: NativeProgram, plac
 def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: Operator) -> None:
     """What happens at rest, in its order. Commands that the machine has nothing for are passed."""
     for command in commands:
-        _say(at, file, [command])
+        say(at, file, [command])
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
         for line, code in stops([command]):
             operator(f"{file}:{line}: {code}", lambda: _look(at, _LOOK_S))
 
 
-def _say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
+def say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
     """Tells the messages among commands. Those on the way of a section are told at its end."""
     for command in commands:
         if isinstance(command, Message):

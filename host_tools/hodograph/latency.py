@@ -50,7 +50,7 @@ class Load:
 class Latency:
     """Lateness of ticks.
 
-    lateness_us  (n,) of each SYNC behind its place in the grid of periods
+    lateness_us  (n,) of each SYNC after its place in the grid of periods
     missed       ticks that did not come
     """
 
@@ -101,7 +101,7 @@ def is_realtime_kernel() -> bool:
 def lateness(times_us: Real, period_us: float) -> tuple[Real, int]:
     """Lateness (n,) of ticks at `times_us` (n,), and how many are missing between them.
 
-    A tick is late behind the earliest one of those around it, on a grid of periods. A gap of more than a period begins
+    A tick is late after the earliest one of those around it, on a grid of periods. A gap of more than a period begins
     a new grid, as the controller's clock does.
     """
     gaps = np.diff(times_us)

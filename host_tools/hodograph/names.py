@@ -41,6 +41,9 @@ POINT_SUFFIXES = (".csv", ".txt")
 TOOLPATH_SUFFIXES = (*GCODE_SUFFIXES, *DRAWING_SUFFIXES, *POINT_SUFFIXES)
 """Names of toolpath files end so, in any case of letters."""
 
+PATH_SUFFIX = ".toml"
+"""Names of path files end so where other files are allowed too."""
+
 STANDARD_INPUT = "-"
 """Stands for G-code from standard input."""
 

@@ -25,6 +25,7 @@ from .config import (
     load_path_file,
 )
 from .errors import InputError, PlanError
+from .events import Events
 from .feed import (
     AxisLimits,
     ControllerLimits,
@@ -43,6 +44,7 @@ from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
 from .names import AXES
 from .native.brake_check import BrakeCheck
 from .native.program import NativeFault, NativeLimits, NativeProgram
+from .path_outputs import events_on_path
 from .program import (
     Compilation,
     Program,
@@ -168,11 +170,14 @@ def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault 
 class ProvedStops:
     """What is proved of the stops of one kind: from how many feed pieces one may begin, from how many of them all stops
     keep the limits of the axes until standstill, and where the others begin, mm.
+
+    time_share   share of the time of the pieces from which one may begin that proved ones last: pieces differ in length
     """
 
     kind: str
     pieces: int
     open_mm: tuple[float, ...]
+    time_share: float
 
     @property
     def proved(self) -> int:
@@ -192,16 +197,16 @@ def proved_stops(
     (firmware/core/brake_check.h).
     """
     check = BrakeCheck(native, NativeLimits(**asdict(program_limits(machine))))
+    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
     out = []
     for kind, name in ((HOLD, "hold"), (FAULT, "fault")):
         codes = program.stops.codes[:, kind]
-        pieces = np.flatnonzero(codes[:, DECELERATION]).tolist()
-        places = [
-            float(program.piece_starts_mm[piece])
-            for piece in pieces
-            if not check.proves(piece, kind, codes[piece].tolist())
-        ]
-        out.append(ProvedStops(name, len(pieces), tuple(places)))
+        pieces = np.flatnonzero(codes[:, DECELERATION])
+        keeps = np.array([check.proves(i, kind, codes[i].tolist()) for i in pieces.tolist()], bool)
+        whole_s = float(duration_s[pieces].sum())
+        share = float(duration_s[pieces[keeps]].sum()) / whole_s if whole_s > 0.0 else 1.0
+        places = tuple(program.piece_starts_mm[pieces[~keeps]].tolist())
+        out.append(ProvedStops(name, pieces.size, places, share))
     return tuple(out)
 
 
@@ -431,9 +436,15 @@ class Pipeline:
                     limits,
                     machine.period_us,
                     self.stop_terms,
+                    self.events,
                 ),
                 self._replan,
             )
+
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path. Raises InputError: one that the machine does not have."""
+        return events_on_path(self.file, self.machine, self.curve)
 
     @property
     def stop_terms(self) -> StopTerms:

@@ -22,7 +22,7 @@ from .config.axis_table import (
     in_unit,
 )
 from .config.drive_file import MOTOR_GAINS
-from .config.path_file import COORDINATE_LIMIT_MM
+from .config.path_file import COORDINATE_LIMIT_MM, LONGEST_DWELL_MS, STOPS
 from .errors import InputError
 from .faults.scenario import ACTIONS, NO_LIMIT
 from .feed.limits import GREATEST_RESERVE, LEAST_RESERVE, POLICIES
@@ -133,16 +133,88 @@ def _path_file() -> Schema:
     return _table(
         "A path file of Hodograph",
         {
-            "path": _curve(),
+            "path": _either(
+                "The path, or [[path]]: several paths with rests between them, as one job",
+                _table("The curve", *_curve()),
+                _list("Paths, each of which begins where the one before ends", _listed_path()),
+            ),
             "feed": _feed(),
             "limits": _limits(),
             "machine": _table(
                 "The machine that the path runs on",
                 {"file": _text("Machine file, relative to this file")},
             ),
+            "output": _list("Outputs that switch on the path", _path_output()),
         },
         ("path",),
         {"title": "Path file"},
+    )
+
+
+def _path_output() -> Schema:
+    places, levels = ("at_mm", "at_point", "at_fraction"), ("on", "value", "per_mm_s")
+    return _table(
+        "An output that switches at a place; one key for the place, one for what becomes of it",
+        {
+            "name": _text("The output, as the machine file calls it"),
+            "at_mm": _number("Arc length", 0, 2**22),
+            "at_point": _integer("Number of a point of `through`, from 0", 0, 10**7),
+            "at_fraction": _number("Share of the path's length", 0, 1),
+            "on": _flag("Level of a digital output"),
+            "value": _number("Value of an analogue output, in its unit", -1e12, 1e12),
+            "per_mm_s": _number(
+                "From here on the analogue output follows the feed, by so much for each mm/s",
+                -1e12,
+                1e12,
+            ),
+        },
+        ("name",),
+        {"allOf": [{"oneOf": [{"required": [key]} for key in keys]} for keys in (places, levels)]},
+    )
+
+
+def _outputs() -> Schema:
+    digital = _table("A digital output", {"digital": _integer("Number", 0, 15)}, ("digital",))
+    analogue = _table(
+        "An analogue output",
+        {
+            "analogue": _integer("Number", 0, 2),
+            "scale": _number("Value on the bus for one unit, not 0", -1e9, 1e9, 1.0),
+            "unit": _text("What the value is in"),
+        },
+        ("analogue",),
+    )
+    channels: Schema = {
+        "type": "object",
+        "description": "The outputs by name",
+        "propertyNames": {"pattern": "^[A-Za-z][A-Za-z0-9_]*$"},
+        "additionalProperties": {"anyOf": [digital, analogue]},
+        "minProperties": 1,
+    }
+    codes = {
+        "spindle": "Digital output: the spindle turns (M3, M4)",
+        "spindle_reverse": "Digital output: counterclockwise (M4)",
+        "speed": "Analogue output: S while the spindle turns",
+        "mist": "Digital output: M7",
+        "flood": "Digital output: M8",
+    }
+    return _table(
+        "An I/O module by CiA 401, whose outputs paths switch",
+        {
+            "node": _integer("Node number", 1, 127),
+            "delay_ticks": _integer("Ticks by which the outputs are held back", 0, 8, 1),
+            "keep_at_stop": _flag("Outputs stay on at a stop", False),
+            "keep_at_fault": _flag("And at a fault, a quick stop and with the drives off", False),
+            "off_at_end": _flag("Outputs go off at the end of a program", False),
+            "off_in_hold": _flag("Outputs are off during a feed hold", False),
+            "vendor": _integer("Vendor that the module must have; 0: any", 0, U32_MAX, 0),
+            "product": _integer("Product that it must have; 0: any", 0, U32_MAX, 0),
+            "channel": channels,
+            "gcode": _table(
+                "Outputs for words of G-code", {key: _text(text) for key, text in codes.items()}
+            ),
+        },
+        ("node", "channel"),
     )
 
 
@@ -155,10 +227,19 @@ def _points(text: str) -> Schema:
     return {"type": "array", "minItems": 1, "anyOf": alike, "description": text}
 
 
-def _curve() -> Schema:
+def _listed_path() -> Schema:
+    properties, required, more = _curve()
+    rests = {
+        "dwell_ms": _integer("Standstill before this path", 0, LONGEST_DWELL_MS, 0),
+        "stop": _choice("Whether a program stop is before it", STOPS, STOPS[0]),
+    }
+    return _table("A curve, and the rest before it", properties | rests, required, more)
+
+
+def _curve() -> tuple[dict[str, Schema], tuple[str, ...], Schema]:
+    """Properties, those that are required, and the rest of the schema of a curve."""
     open_through = {"required": ["through"], "properties": {"closed": {"const": False}}}
-    return _table(
-        "The curve",
+    return (
         {
             "closed": _flag("Whether the end of the path is its start"),
             "control_points": _points(
@@ -295,6 +376,7 @@ def _machine_file() -> Schema:
                     )
                 },
             ),
+            "outputs": _outputs(),
             "axis": _list("The axes", _axis(), 1, MAX_AXES),
         },
         ("controller", "axis"),

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements faults/fault_log.h (see there): what was injected when, one JSON object a line. */
 #include "faults/fault_log.h"
 
 #include <inttypes.h>

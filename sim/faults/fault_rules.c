@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements faults/fault_rules.h (see there): scripted faults, one a line of text. */
 #include "faults/fault_rules.h"
 
 #include <assert.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements faults/fault_trigger.h (see there): when a fault rule acts. */
 #include "faults/fault_trigger.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements gateway/bus.h (see there): the CAN side of the gateway, its signals and its errors. */
 #define _GNU_SOURCE
 #include "gateway/bus.h"
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements gateway/fifo_side.h (see there): serves the requests of an emulated board on two FIFOs
+ * (port/mps2/exchange.h). */
 #define _GNU_SOURCE
 #include "gateway/fifo_side.h"
 

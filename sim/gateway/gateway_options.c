@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements gateway/gateway_options.h (see there): the command line of hodograph-bridge. */
 #include "gateway/gateway_options.h"
 
 #include <stdbool.h>

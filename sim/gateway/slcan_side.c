@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements gateway/slcan_side.h (see there): a stream of SLCAN lines (can/slcan.h) on a socket. */
 #define _GNU_SOURCE
 #include "gateway/slcan_side.h"
 

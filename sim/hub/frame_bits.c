@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements hub/frame_bits.h (see there): the number of bits of a CAN frame, stuff bits included. */
 #include "hub/frame_bits.h"
 
 #include <stdint.h>

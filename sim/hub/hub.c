@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements hub/hub.h (see there): CAN buses for the processes of one computer, in real or virtual time. */
 #define _GNU_SOURCE
 #include "hub/hub.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements hub/virtual_time.h (see there): the participants of virtual time, and which of them computes next. */
 #define _GNU_SOURCE
 #include "hub/virtual_time.h"
 

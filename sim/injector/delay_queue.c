@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements injector/delay_queue.h (see there): frames that go out later. */
 #include "injector/delay_queue.h"
 
 #include <string.h>

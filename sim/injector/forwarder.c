@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements injector/forwarder.h (see there): passes every frame between the controller's bus and the drives',
+ * and injects the faults of the fault rules. */
 #include "injector/forwarder.h"
 
 #include <string.h>
@@ -125,7 +127,8 @@ static void deliver(struct forwarder *forwarder, enum fault_side from,
     }
 }
 
-/* Other traffic: eight bytes that tell the frames apart. It is on the wire, so only a side that is off does not receive it. */
+/* Other traffic: eight bytes that identify the frame. It is on the wire, so only a side that is off does not receive
+ * it. */
 static void flood(struct forwarder *forwarder, struct fault_trigger *trigger)
 {
     const bool receives[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),

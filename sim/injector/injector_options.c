@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements injector/injector_options.h (see there): the command line of hodograph-injector. */
 #include "injector/injector_options.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements injector/outbox.h (see there): frames to one bus that leave together. */
 #define _GNU_SOURCE
 #include "injector/outbox.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/axis_motion.h (see there): the simulated axis of a drive node. */
 #include "node/axis_motion.h"
 
 #include <stdlib.h>

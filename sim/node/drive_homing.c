@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drive_homing.h (see there): the homing mode of a simulated drive. */
 #include "node/drive_homing.h"
 
 #include <stddef.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drive_node.h (see there): one simulated servo drive on the bus. */
 #include "node/drive_node.h"
 
 #include <string.h>

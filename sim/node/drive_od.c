@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drive_od.h (see there): the object dictionary of a simulated drive beside its table (drive.eds). */
 #include "node/drive_od.h"
 
 #include <stddef.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drive_pdos.h (see there): the PDOs of a simulated drive. */
 #include "node/drive_pdos.h"
 
 enum { FIRST_RPDO = 0x1400, FIRST_TPDO = 0x1800 };

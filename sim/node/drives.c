@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/drives.h (see there): the simulated drives of one process on one SocketCAN bus. */
 #define _GNU_SOURCE
 #include "node/drives.h"
 
@@ -53,8 +54,28 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
         }
         drives->count++;
     }
+    if (options->module != 0) {
+        io_module_init(&drives->module, options->module, port);
+    }
     node_faults_init(&drives->faults, &drives->rules, drives->nodes, drives->count, drives_note);
     return 0;
+}
+
+/* What the module receives beside what the drives do; returns how many there are. */
+static size_t module_filters(struct io_module *module, struct can_match filters[])
+{
+    size_t n = 0;
+    if (module->id == 0) {
+        return 0;
+    }
+    filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + module->id), CAN_ID_MAX};
+    for (int k = 0; k < IO_MODULE_RPDOS; k++) {
+        if (module->rpdos[k].valid) {
+            filters[n++] = (struct can_match){module->rpdos[k].cob_id, CAN_ID_MAX};
+        }
+    }
+    module->moved = false;
+    return n;
 }
 
 /* Synchronous RPDOs need not wake the process before SYNC; fault rules act on each frame as it comes. */
@@ -75,7 +96,7 @@ static int drives_defer(struct drives *drives)
 
 int drives_filter(struct drives *drives)
 {
-    struct can_match filters[4 + (1 + DRIVE_PDOS) * NODE_OPTIONS_AXES] = {
+    struct can_match filters[4 + (1 + DRIVE_PDOS) * NODE_OPTIONS_AXES + 1 + IO_MODULE_RPDOS] = {
         {COB_NMT, CAN_ID_MAX}, {COB_SYNC, CAN_ID_MAX}, {COB_HEARTBEAT, 0x780}};
     size_t n = 3;
     if (drives->rules.count > 0) {
@@ -91,6 +112,7 @@ int drives_filter(struct drives *drives)
         }
         node->pdos.moved = false;
     }
+    n += module_filters(&drives->module, &filters[n]);
     const int error = can_socket_filter(&drives->socket, filters, n);
     return error != 0 ? error : drives_defer(drives);
 }
@@ -121,6 +143,10 @@ static void drives_take(struct drives *drives, const struct can_msg *frame)
     for (size_t i = 0; i < drives->count; i++) {
         drive_node_receive(&drives->nodes[i], frame);
         moved = moved || drives->nodes[i].pdos.moved;
+    }
+    if (drives->module.id != 0) {
+        io_module_receive(&drives->module, frame);
+        moved = moved || drives->module.moved;
     }
     if (moved) {
         const int error = drives_filter(drives);
@@ -164,5 +190,8 @@ void drives_process(struct drives *drives, uint32_t elapsed_us)
     }
     for (size_t i = 0; i < drives->count; i++) {
         drive_node_process(&drives->nodes[i], elapsed_us);
+    }
+    if (drives->module.id != 0) {
+        io_module_process(&drives->module, elapsed_us);
     }
 }

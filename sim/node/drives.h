@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* drives: the simulated drives of one process on one SocketCAN bus.
+/* drives: the simulated drives of one process on one SocketCAN bus, and its I/O module.
  *
  * All in one thread. Bus errors are kept in `failed`; the caller checks it. Frames that the interface has no room for
  * are lost.
@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "node/drive_node.h"
+#include "node/io_module.h"
 #include "node/node_faults.h"
 #include "node/node_options.h"
 #include "port/linux/can_socket.h"
@@ -20,6 +21,7 @@ struct drives {
     struct can_socket socket;
     struct drive_node nodes[NODE_OPTIONS_AXES];
     size_t count;
+    struct io_module module;   /* id 0: none */
     struct fault_rules rules;  /* set before drives_init; none: all zero */
     struct node_faults faults; /* in use when there are rules */
     int failed;                /* negative errno of the bus, 0: none */

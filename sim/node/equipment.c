@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/equipment.h (see there): limit switches, home switch and brake of a simulated axis. */
 #include "node/equipment.h"
 
 void equipment_init(struct equipment *e, const struct drive_config *config)

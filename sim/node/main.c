@@ -91,7 +91,8 @@ static int start(struct drives *drives, const struct node_options *options)
     if (signals < 0) {
         return fail(EXIT_BUS, strerror(errno));
     }
-    (void)snprintf(name, sizeof name, "drive-%u", drives->nodes[0].id);
+    (void)snprintf(name, sizeof name, "drive-%u",
+                   options->axis_count > 0 ? drives->nodes[0].id : options->module);
     (void)clock_join(options->bus,
                      name); /* opening the socket reports what is wrong with the bus */
     if (can_socket_open(&drives->socket, options->bus, reason, sizeof reason) != 0) {

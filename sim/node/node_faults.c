@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/node_faults.h (see there): faults injected into simulated drives. */
 #include "node/node_faults.h"
 
 #include <assert.h>

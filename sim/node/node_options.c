@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/node_options.h (see there): the command line of hodograph-drive. */
 #include "node/node_options.h"
 
 #include <errno.h>
@@ -10,11 +11,14 @@
 #include "port/linux/long_options.h"
 
 const char node_options_help[] =
-    "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--faults FILE]\n"
+    "usage: hodograph-drive --bus INTERFACE --axis KEY=VALUE,... [--axis ...] [--module NODE]\n"
+    "                       [--faults FILE]\n"
     "\n"
-    "Simulated CiA 402 servo drives on a SocketCAN bus, one per --axis (at most 6).\n"
+    "Simulated CiA 402 servo drives on a SocketCAN bus, one per --axis (at most 6), and an I/O\n"
+    "module (CiA 401) with 16 digital and 3 analogue outputs.\n"
     "\n"
     "  --bus INTERFACE  a CAN interface that is up, such as vcan0\n"
+    "  --module NODE    the I/O module; without --axis nothing else\n"
     "  --faults FILE    fault rules, one a line (docs/reference/protocol.md section 4); what they "
     "do is\n"
     "                   printed, one JSON object a line\n"
@@ -236,14 +240,30 @@ static enum node_options_result add_axis(struct node_options *options, char *spe
     return NODE_OPTIONS_OK;
 }
 
+static enum node_options_result set_module(struct node_options *options,
+                                           const struct long_options *line)
+{
+    unsigned long node = 0;
+    if (!read_whole(line->value, 127u, &node) || node < 2u) {
+        return wrong(line, "--module needs a node from 2 to 127, not", line->value);
+    }
+    options->module = (uint8_t)node;
+    return NODE_OPTIONS_OK;
+}
+
 static enum node_options_result check(const struct node_options *options,
                                       const struct long_options *line)
 {
     if (options->bus == NULL) {
         return wrong(line, "the option is missing:", "--bus");
     }
-    if (options->axis_count == 0) {
+    if (options->axis_count == 0 && options->module == 0) {
         return wrong(line, "the option is missing:", "--axis");
+    }
+    for (size_t i = 0; i < options->axis_count; i++) {
+        if (options->axes[i].node == options->module) {
+            return wrong(line, "--module and an axis have the same", "node");
+        }
     }
     return NODE_OPTIONS_OK;
 }
@@ -251,16 +271,16 @@ static enum node_options_result check(const struct node_options *options,
 enum node_options_result node_options_parse(struct node_options *options, int argc, char **argv,
                                             char *reason, size_t size)
 {
-    static const struct option known[] = {{"help", no_argument, NULL, 'h'},
-                                          {"bus", required_argument, NULL, 'b'},
-                                          {"faults", required_argument, NULL, 'f'},
-                                          {"axis", required_argument, NULL, 'a'},
-                                          {NULL, 0, NULL, 0}};
+    static const struct option known[] = {
+        {"help", no_argument, NULL, 'h'},         {"bus", required_argument, NULL, 'b'},
+        {"faults", required_argument, NULL, 'f'}, {"axis", required_argument, NULL, 'a'},
+        {"module", required_argument, NULL, 'm'}, {NULL, 0, NULL, 0}};
     struct long_options line = long_options_begin(argc, argv, known, reason, size);
     line.quoted = true;
     options->bus = NULL;
     options->faults = NULL;
     options->axis_count = 0;
+    options->module = 0;
     for (;;) {
         switch (long_options_next(&line)) {
         case LONG_OPTIONS_END:
@@ -275,6 +295,11 @@ enum node_options_result node_options_parse(struct node_options *options, int ar
             break;
         case 'a':
             if (add_axis(options, line.value, &line) != NODE_OPTIONS_OK) {
+                return NODE_OPTIONS_WRONG;
+            }
+            break;
+        case 'm':
+            if (set_module(options, &line) != NODE_OPTIONS_OK) {
                 return NODE_OPTIONS_WRONG;
             }
             break;

@@ -21,6 +21,7 @@ struct node_options_axis {
 struct node_options {
     const char *bus;    /* points into argv */
     const char *faults; /* a file of fault rules, into argv; NULL: none */
+    uint8_t module;     /* node of an I/O module; 0: none */
     size_t axis_count;
     struct node_options_axis axes[NODE_OPTIONS_AXES];
 };

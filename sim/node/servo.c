@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/servo.h (see there): the CiA 402 part of a simulated drive, without its communication. */
 #include "node/servo.h"
 
 #define CONTROL_HOMING_START 0x0010u

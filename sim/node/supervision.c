@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/supervision.h (see there): what a simulated drive supervises in each period. */
 #include "node/supervision.h"
 
 #include "canopen/emcy.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/sync_clock.h (see there): the time base of a simulated drive. */
 #include "node/sync_clock.h"
 
 void sync_clock_reset_counter(struct sync_clock *clock, uint8_t overflow)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/axis_run.h (see there): one axis under given setpoints and offsets, for fits of its plant. */
 #include "offline/axis_run.h"
 
 #include "plant/influence.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/contour.h (see there): the contour error: distance of a position from the exact curve. */
 #include "offline/contour.h"
 
 #include <math.h>

@@ -52,7 +52,7 @@ void contour_begin(struct contour *contour, const struct program *program,
 double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);
 
 /* n points in bus counts at once: errors in um. arc_length_q40_mm as the interpolator gives it; act_counts
- * holds `stride` numbers for each point, one for each path axis of the program, of which those behind z count for nothing: the
+ * holds `stride` numbers for each point, one for each path axis of the program, of which those after z count for nothing: the
  * contour is that of the curve. */
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/contour_curve.h (see there): places on the curve, for contour.c. */
 #include "offline/contour_curve.h"
 
 #include <math.h>

@@ -47,8 +47,8 @@ void contour_view(const struct contour *c, struct place place, const double poin
 /* Distance of a point from a place. */
 double contour_gap(const struct contour *c, struct place place, const double point[3]);
 
-/* Takes a parameter that has left [0, 1] over into the neighbouring segment, beyond the start of a
- * closed path too. False at the end of an open path: xi is clamped. */
+/* Takes a parameter that has left [0, 1] over into the adjacent segment, beyond the start of a closed path too. False
+ * at the end of an open path: xi is clamped. */
 bool contour_cross(const struct contour *c, struct place *p);
 
 #endif

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/offline.h (see there): interpolation, rounding and simulated axes in one process, without a
+ * bus. */
 #include "offline/offline.h"
 
 #include <stddef.h>
 
 #include "core/counts.h"
 
-typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 136 ? 1 : -1];
+typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 144 ? 1 : -1];
 
 static int offline_start_point(struct offline *sim, int32_t start[PROGRAM_AXES])
 {
@@ -74,6 +76,7 @@ int offline_begin(struct offline *sim, const struct program *program,
         influence_none(&sim->influences[axis], &drives[axis]);
     }
     feed_override_begin(&sim->feed, program, program->header.period_us, 0);
+    path_outputs_begin(&sim->outputs, program, -1);
     sim->orders = NULL;
     sim->order_count = 0;
     sim->next_order = 0;
@@ -155,10 +158,12 @@ static void offline_order(struct offline *sim, const struct offline_order *order
     case OFFLINE_ORDER_STOP:
         offline_order_stop(sim, PROGRAM_STOP_HOLD);
         feed_override_stop(&sim->feed);
+        path_outputs_clear(&sim->outputs); /* as a controller that is not told otherwise */
         break;
     case OFFLINE_ORDER_FAULT_STOP:
         offline_order_stop(sim, PROGRAM_STOP_FAULT);
         feed_override_fault_stop(&sim->feed);
+        path_outputs_clear(&sim->outputs); /* as a controller that is not told otherwise */
         break;
     case OFFLINE_ORDER_RESUME:
         feed_override_resume(&sim->feed);
@@ -200,6 +205,8 @@ static int offline_command(struct offline *sim, struct offline_row *row)
             follows ? counts_from_q40_mm(point.position_q40[axis], sim->configs[axis].counts_per_mm)
                     : 0;
     }
+    path_outputs_step(&sim->outputs, row->arc_length_q40_mm, row->feed_q32_mm_s);
+    row->outputs = sim->outputs.values;
     row->tick = sim->tick++;
     return 0;
 }

@@ -6,7 +6,7 @@
  * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
  * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
- * repeat its end point (settling), those behind a stop its place of rest.
+ * repeat its end point (settling), those after a stop its place of rest.
  *
  * Use: offline_begin, then offline_run as often as wanted. No heap: the caller lends the segment array, and
  * the program, its image, its coefficient records and the segments must outlive the simulation. Main loop only.
@@ -20,13 +20,14 @@
 #include "core/feed_override.h"
 #include "core/feedforward.h"
 #include "core/interpolator.h"
+#include "core/path_outputs.h"
 #include "core/program.h"
 #include "offline/contour.h"
 #include "offline/offline_fault.h"
 #include "plant/drive.h"
 #include "plant/influence.h"
 
-/* One tick; 136 bytes without holes, 0 for axes beyond those of the program. Python maps it as a numpy record. */
+/* One tick; 144 bytes without holes, 0 for axes beyond those of the program. Python maps it as a numpy record. */
 struct offline_row {
     int64_t arc_length_q40_mm;
     int64_t feed_q32_mm_s;            /* along the path */
@@ -36,6 +37,7 @@ struct offline_row {
     int32_t act_counts[PROGRAM_AXES];
     int16_t volts_mv[PROGRAM_AXES];
     uint32_t tick;
+    struct path_outputs_values outputs; /* on the path; those of a stop are off */
 };
 
 enum offline_order_kind {
@@ -76,6 +78,7 @@ enum offline_error {
 struct offline {
     struct interpolator interp;
     struct feed_override feed;
+    struct path_outputs outputs;
     const struct offline_order *orders; /* borrowed */
     uint32_t order_count;
     uint32_t next_order;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/offline_fault.h (see there): faults of a run without a bus. */
 #include "offline/offline_fault.h"
 
 #include "core/program.h"

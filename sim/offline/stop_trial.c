@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_trial.h (see there): random sequences of commands, and whether their stops keep limits
+ * and bounds. */
 #include "offline/stop_trial.h"
 
 #include <math.h>
@@ -13,7 +15,7 @@
 #define HISTORY       3u
 #define NOISE_MM_S3 20.0 /* of a kernel in third differences at 1 kHz; docs/theory/numerics.md 16 */
 
-#define ARC PROGRAM_AXES /* behind the axes of a setpoint: its arc length */
+#define ARC PROGRAM_AXES /* after the axes of a setpoint: its arc length */
 
 /* A motion under commands, with its last setpoints: path axes and arc length in mm. */
 struct course {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stream.h (see there): a job in chunks without a bus. */
 #include "offline/stream.h"
 
 #include <stddef.h>
@@ -71,21 +72,40 @@ static void take_over(struct offline_stream *s)
         return;
     }
     coefficient_cache_used(&s->cache);
+    if (chunk_begins_at_rest(&next->chunk)) {
+        const uint32_t ticks = chunk_rest_ticks(&next->chunk);
+        s->rest_ticks = ticks > s->waited_ticks ? ticks - s->waited_ticks : 0u;
+    }
     s->active = next;
     s->resting += rests ? 1u : 0u;
     s->moving += rests ? 0u : 1u;
 }
 
+/* At the end of a chunk, and the next one is not there. */
+static int misses_next(const struct offline_stream *s)
+{
+    const struct offline_part *next = s->active->next;
+    return feed_override_waits(&s->feed) && (next == NULL || !chunk_begins_at_rest(&next->chunk));
+}
+
 static int tick(struct offline_stream *s, struct interpolator_point *point)
 {
     make_records(s);
+    s->waited_ticks = feed_override_waits(&s->feed) ? s->waited_ticks : 0u;
     take_over(s);
+    s->waited_ticks += feed_override_waits(&s->feed) ? 1u : 0u;
+    s->ticks++;
+    if (s->rest_ticks != 0u) {
+        s->rest_ticks--;
+        *point = s->last;
+        return 0;
+    }
     const int result = feed_override_next(&s->feed, &s->interp, point);
-    const uint32_t waits = feed_override_waits(&s->feed) ? 1u : 0u;
+    const uint32_t waits = misses_next(s) ? 1u : 0u;
     point->arc_length_q40_mm += s->active->chunk.job_start_q40_mm;
     s->underruns += waits & ~s->rested;
     s->rested = waits;
-    s->ticks++;
+    s->last = *point;
     return result;
 }
 

@@ -2,8 +2,9 @@
 /*
  * A job in chunks without a bus: what the controller makes of chunks that come when they come (docs/reference/protocol.md
  * 1.7). Chunks are opened, checked and taken over by the code of the controller, one try before each tick; commands are
- * those of the feed override. Gives setpoints as the controller would, bit for bit, from records of what is near the motion
- * only, as there (core/coefficient_cache.h); they are made before each tick.
+ * those of the feed override. Dwells between chunks take their ticks, program stops no time. Gives setpoints as the controller
+ * would, bit for bit, from records of what is near the motion only, as there (core/coefficient_cache.h); they are made before
+ * each tick.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
  * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of each
@@ -35,10 +36,13 @@ struct offline_stream {
     struct offline_part *active; /* NULL before the first chunk, */
     struct offline_part *newest; /* and the last one accepted */
     uint64_t ticks;
-    uint32_t moving;    /* takeovers in motion, */
-    uint32_t resting;   /* and at rest */
-    uint32_t underruns; /* rests at the end of a tail */
-    uint32_t rested;    /* 1: at the last tick it was at one */
+    uint32_t moving;                /* takeovers in motion, */
+    uint32_t resting;               /* and at rest */
+    uint32_t underruns;             /* rests at the end of a tail */
+    uint32_t rested;                /* 1: at the last tick it was at one */
+    uint32_t rest_ticks;            /* left before a chunk that begins at rest, */
+    uint32_t waited_ticks;          /* and at the end of its predecessor, without it */
+    struct interpolator_point last; /* setpoint, with the arc length of the job */
 };
 
 /* The memory of the cache, aligned to COEFFICIENTS_ALIGNMENT: 8 KiB are as on a small controller. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/drive.h (see there): one simulated servo axis in cyclic synchronous position mode. */
 #include "plant/drive.h"
 
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/drive_config.h (see there): the figures that describe a simulated axis. */
 #include "plant/drive_config.h"
 
 #include <stdbool.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/encoder.h (see there): the encoder on the motor shaft. */
 #include "plant/encoder.h"
 
 #include <assert.h>

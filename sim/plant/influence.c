@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/influence.h (see there): what acts on an axis beside its setpoints: load, friction, faults. */
 #include "plant/influence.h"
 
 void influence_none(struct influence *influence, const struct drive_config *config)

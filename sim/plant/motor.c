@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/motor.h (see there): motor and ball screw. */
 #include "plant/motor.h"
 
 #include <assert.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements plant/overload.h (see there): thermal model of a motor and its power stage (I2t). */
 #include "plant/overload.h"
 
 void overload_init(struct overload *overload, double peak, double time_s)

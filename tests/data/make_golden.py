@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hodograph.events import ANALOGUE, DIGITAL, PROPORTIONAL, Event, events_of
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.pieces import FeedPieces
 from hodograph.program import Program, ProgramLimits, ProgramOptions, compile_program, encode
@@ -40,6 +41,13 @@ EXAMPLES = HERE.parent.parent / "examples"
 MM = 1 << 40
 
 LIMITS = ProgramLimits(1000, 500_000, 5_000_000, 200_000, (-200 * MM,) * 2, (200 * MM,) * 2, 250)
+EVENTS = (
+    Event(0, DIGITAL, 0, 0x8001, 0x0001),
+    Event(20 * MM, ANALOGUE, 0, 0, -1000),
+    Event(20 * MM + 1, PROPORTIONAL, 2, 0, 65536),
+)
+DENSE = Event(20 * MM, DIGITAL, 0, 1, 1)
+
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
 
 
@@ -81,6 +89,9 @@ def good() -> dict[str, Program]:
         "line": program(line(-30 + 10j, 90 - 20j), FeedRequest("quintic", 200.0, 0.2), "line"),
         "line_slow": program(line(0, 0.5 + 0.25j), FeedRequest("quintic", 0.05, 0.5), "line slow"),
         "line_tiny": program(line(5, 5.002), FeedRequest("minimax", 10.0, 0.05), "line tiny"),
+        "alpha_events": replace(
+            program(alpha, FeedRequest("minimax", 100.0, 0.1), "alpha"), events=events_of(EVENTS)
+        ),
         "alpha_offset": program(alpha, exponential, "alpha, shifted", offset_mm=(100.0, -57.25)),
     }
 
@@ -88,6 +99,13 @@ def good() -> dict[str, Program]:
 def base() -> Program:
     """What the broken images are made from: small, with enough segments and pieces for every rule."""
     return program(example("alpha"), FeedRequest("minimax", 100.0, 0.1), "broken")
+
+
+def _with_event(p: Program, event: Event) -> Program:
+    """A program with good events and this one, by its place behind the last of them."""
+    wrong = event._replace(place_q40=EVENTS[-1].place_q40 + event.place_q40)
+    table = np.array([*map(tuple, EVENTS), tuple(wrong)], dtype=events_of(EVENTS).dtype)
+    return replace(p, events=table)
 
 
 def segments(p: Program, **change: Callable[[np.ndarray], None]) -> Program:
@@ -250,7 +268,7 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "period": (patch(image, 16, struct.pack("<I", 1500)), "PERIOD", 0),
         "period_used": (encode(_other_period(2000)), "PERIOD_USED", 0),
         "flags": (patch(image, 28, b"\x02\x00"), "FLAGS", 0),
-        "reserved_76": (patch(image, 76, b"\x01"), "FLAGS", 0),
+        "event_count": (patch(image, 76, b"\x01"), "SIZE", 0),
         "axes": (patch(image, 30, b"\x07\x00"), "AXES", 0),
         "duration": (encode(replace(p, duration_q32_s=p.duration_q32_s + 1)), "DURATION", 0),
         "length_zero": (encode(replace(p, length_q40=0)), "LENGTH", 0),
@@ -328,6 +346,12 @@ def broken() -> dict[str, tuple[bytes, str, int]]:
         "stop_fault_bound": (encode(_said(p, 7, FAULT, -100)), "STOP_BOUND", 7),
         "stop_long": (encode(_said(p, 3, FAULT, 300_000)), "STOP_LONG", 3),
         "stop_worst": (patch(image, 112, b"\0"), "STOP_WORST", 0),
+        "event_kind": (encode(_with_event(p, Event(0, 4, 0, 0, 0))), "EVENT_KIND", 3),
+        "event_channel": (encode(_with_event(p, Event(0, 2, 3, 0, 0))), "EVENT_KIND", 3),
+        "event_value": (encode(_with_event(p, Event(0, 1, 0, 1, 2))), "EVENT_VALUE", 3),
+        "event_order": (encode(_with_event(p, Event(-1, 1, 0, 1, 1))), "EVENT_PLACE", 3),
+        "event_beyond": (encode(_with_event(p, Event(200 * MM, 1, 0, 1, 1))), "EVENT_PLACE", 3),
+        "event_dense": (encode(replace(p, events=events_of([DENSE] * 17))), "EVENT_DENSE", 16),
         "stop_worst_way": (patch(image, 124, bytes(4)), "STOP_WORST", 0),
         "stop_none": (encode(replace(p, stops=no_stops(m))), "STOP_BOUND", m - 1),
         "jerk": (encode(program(straight, hard, "broken", controller=wild)), "JERK", -1),

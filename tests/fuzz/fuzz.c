@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements fuzz.h (see there): support of the fuzz harnesses. */
 #include "fuzz.h"
 
 #include <stdio.h>

@@ -247,7 +247,7 @@ static struct program_limits no_axis_limits(void)
     return limits;
 }
 
-/* Positions of the last four ticks, the newest first; before the program and behind it the axes stand. */
+/* Positions of the last four ticks, the newest first; before the program and after it the axes stand. */
 struct trail {
     double mm[4][2];
     double period_s;

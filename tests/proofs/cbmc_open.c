@@ -70,7 +70,8 @@ void harness(void)
         prove(segment == (h->axis_count == 2u ? 72u : 104u + 38u * extras));
         prove(h->header_size == 112u + 8u * h->axis_count);
         prove(p.size == h->header_size + (uint64_t)h->segment_count * segment +
-                            (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE));
+                            (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
+                            (uint64_t)h->event_count * PROGRAM_EVENT_SIZE);
         reached();
     }
 }

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Segments and pieces lie inside the image: every record begins where it has its whole length before the end of an
+ * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of an
  * image of up to 256 KiB (a bank of the STM32G474) that program_open accepts, and its readers stay inside the record.
  * (For any size: h + s i + s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.)
  *
  * prover: cbmc
  * options: --unwind 40
- * replaces: segment_bytes:some_segment piece_bytes:some_piece
- * shows: read_u16 read_u32 read_u64 segment_bytes piece_bytes
+ * replaces: segment_bytes:some_segment piece_bytes:some_piece event_bytes:some_event
+ * shows: read_u16 read_u32 read_u64 segment_bytes piece_bytes event_bytes
+ * mutant: core/program.c: out->value = (int32_t)read_u32(b + 12) => out->value = (int32_t)read_u32(b + 13)
  * mutant: core/program.c: b[81u + k] => b[82u + k]
  * mutant: core/program.c: b + 32 + 16 * k => b + 40 + 16 * k
  * mutant: core/program.c: b + 32 + 24 * k + 6 * component => b + 40 + 24 * k + 6 * component
@@ -37,6 +38,13 @@ const uint8_t *some_piece(const struct program *p, uint32_t i)
     return __CPROVER_allocate(PROGRAM_PIECE_SIZE, 0);
 }
 
+const uint8_t *some_event(const struct program *p, uint32_t i)
+{
+    (void)p;
+    (void)i;
+    return __CPROVER_allocate(PROGRAM_EVENT_SIZE, 0);
+}
+
 static void readers(void)
 {
     struct program p;
@@ -50,6 +58,9 @@ static void readers(void)
     program_piece_get(&p, i, &c);
     program_piece_duration(&p, i);
     program_piece_override(&p, i, &bounds);
+    struct program_event event;
+    program_event_get(&p, i, &event);
+    program_event_place(&p, i);
 }
 
 /* In a program with so many path axes. */
@@ -65,6 +76,7 @@ static void places(uint32_t axis_count)
     h.image_size = nondet_uint32();
     h.segment_count = nondet_uint32();
     h.piece_count = nondet_uint32();
+    h.event_count = nondet_uint32();
     if (check_size(&h, size) != 0) {
         return;
     }
@@ -75,6 +87,10 @@ static void places(uint32_t axis_count)
     if (i < h.piece_count) {
         prove(pieces + (uint64_t)i * PROGRAM_PIECE_SIZE + PROGRAM_PIECE_SIZE <= size);
         reached();
+    }
+    uint64_t events = pieces + (uint64_t)h.piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
+    if (i < h.event_count) {
+        prove(events + (uint64_t)i * PROGRAM_EVENT_SIZE + PROGRAM_EVENT_SIZE <= size);
     }
 }
 

@@ -20,11 +20,13 @@
  * mutant: core/feed_override.c: f->at_end = f->goes_on != 0u ? state_at_tail_end(state) : FEED_ENDED; => f->at_end = FEED_ENDED;
  * mutant: core/feed_override.c: return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED; => return FEED_STOPPED;
  * mutant: core/feed_override.c: 0u : f->clock.piece - next->piece_shift; => 0u : f->clock.piece;
- * mutant: core/feed_override.c: segment == NULL || (!resting && record == NULL)) { => segment == NULL) {
+ * mutant: core/feed_override.c: segment == NULL || (at.by_arc == 0u && record == NULL)) { => segment == NULL) {
  * mutant: core/feed_override.c: || segment == NULL || => ||
  * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((bisects && record == NULL) ||
  * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((plan && record == NULL) ||
  * mutant: core/feed_override.c: override_plan_let_go(&f->plan); =>
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase == PHASE_PLAN;
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->state == FEED_HELD || f->state == STATE_WAITING;
  */
 #include <stddef.h>
 
@@ -60,7 +62,7 @@ int64_t program_piece_start(const struct program *p, uint32_t i)
 static void any_chunk(uint32_t n)
 {
     struct chunk *c = &chunks[n];
-    c->flags = nondet_uint32() & (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST);
+    c->flags = nondet_uint32() & (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST);
     c->program.header.piece_count = (uint32_t)any_between(1, PIECES);
     c->program.header.length_q40_mm = any_between(1, LENGTH);
     c->program.header.axis_count = PROGRAM_PLANE;
@@ -84,6 +86,9 @@ static void second_follows_first(void)
 {
     struct chunk *next = &chunks[1];
     const uint32_t before = chunks[0].program.header.piece_count;
+    if (chunk_begins_at_rest(next)) {
+        return; /* no shifts, shares nothing */
+    }
     next->piece_shift = (uint32_t)any_between(0, PIECES);
     next->shared_pieces = (uint32_t)any_between(1, PIECES);
     assume(next->piece_shift + next->shared_pieces < before);
@@ -151,6 +156,13 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
 {
     (void)plan;
     (void)p;
+}
+
+void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
+{
+    prove(least == &chunks[1].least);
+    plan->started = 0;
+    carried++;
 }
 
 void override_plan_limit(struct override_plan *plan, int64_t most_q57)
@@ -558,6 +570,15 @@ static void kept_at_rest(const struct feed_override *before)
     prove(f.point.arc_length_q40_mm >= starts[1][0]);
 }
 
+/* Behind a rest: as at the start of a program, running before and after. */
+static void begun_at_rest(const struct feed_override *before)
+{
+    prove(before->phase == PHASE_PLAN && before->state == STATE_WAITING);
+    prove(f.phase == PHASE_PLAN && f.state == FEED_RUNNING && f.plan.started == 0);
+    prove(f.clock.piece == 0u && f.clock.time_q42_s == 0u && f.clock.rest == 0u &&
+          f.clock.fine == 0u && f.point.arc_length_q40_mm == 0);
+}
+
 static void take_over(void)
 {
     const int resting = rests(&f);
@@ -574,6 +595,12 @@ static void take_over(void)
     }
     prove(before.goes_on == 1u && carried == 1u);
     prove(before.phase != PHASE_BRAKE);
+    if (chunk_begins_at_rest(&chunks[1])) {
+        begun_at_rest(&before);
+        prove(is_sound(1));
+        kept(&before, 0);
+        return;
+    }
     prove(f.clock.rest == before.clock.rest && f.clock.fine == before.clock.fine);
     prove(before.point.arc_length_q40_mm ==
           f.point.arc_length_q40_mm + chunks[1].arc_shift_q40_mm);

@@ -6,7 +6,7 @@
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
  * assumes: program_piece_get program_segment_start feed_bounds_within
- * shows: crossing_check_all
+ * shows: crossing_check_all crossing_slow_enough
  * mutant: core/crossing_check.c: *index + 2u < p->header => *index + 1u < p->header
  * mutant: core/crossing_check.c: *first + 1 < p->header => *first < p->header
  * mutant: core/crossing_check.c: (length_q40 >> 16) => length_q40

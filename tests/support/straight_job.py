@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,15 +13,14 @@ from hodograph.feed.pieces import FeedPieces
 from hodograph.program.image import Program, encode
 from hodograph.program.stop_planning import with_bounds
 from hodograph.program.stops import Stops
+from hodograph.stream.chunk import Chunk, ChunkHeader
 
 Q32, Q40, Q44 = 1 << 32, 1 << 40, 1 << 44
-FIRST, LAST = 1, 2
 RAMP_S, EVEN_S, RAMP_MM, SEGMENT_MM = 0.5, 1 / 32, 4, 4
 UP, EVEN, DOWN = (0, 0, 0, 20, -24, 8, 0), (0.5, 0, 0, 0, 0, 0, 0), (8, 0, 0, -20, 24, -8, 0)
 """Coefficients of arc length in the time of a piece, mm."""
 STOP_CODES = ((118, 124, 118), (134, 132, 134))
 LEVELS = 7  # of the override bounds
-HEADER = struct.Struct("<4sHHIIIIIIIIqQqIIII")
 
 
 @dataclass(frozen=True)
@@ -99,26 +96,25 @@ def program(part: Part) -> Program:
 
 
 def chunk(part: Part, sequence: int, job: int) -> bytes:
-    """The chunk, sealed."""
-    image = encode(program(part))
+    """The bytes of a chunk."""
     shift = segment_of(part.begin) - segment_of(part.previous)
     follows = part.begin > 0
-    fields = (
-        part.begin - part.previous if follows else 0,
-        shift,
-        part.joint - part.begin if follows else 0,
-        segment_of(part.joint) + 1 - segment_of(part.begin) if follows else 0,
-        shift * SEGMENT_MM * Q40,
-        round((time_s(part.begin) - time_s(part.previous)) * Q32) if follows else 0,
-        segment_of(part.begin) * SEGMENT_MM * Q40,
+    lag_s = time_s(part.begin) - time_s(part.previous)
+    header = ChunkHeader(
+        first=not follows,
+        last=part.last,
+        job=job,
+        sequence=sequence,
+        piece_shift=part.begin - part.previous if follows else 0,
+        segment_shift=shift,
+        shared_pieces=part.joint - part.begin if follows else 0,
+        shared_segments=segment_of(part.joint) + 1 - segment_of(part.begin) if follows else 0,
+        arc_shift_q40=shift * SEGMENT_MM * Q40,
+        time_shift_q32_s=round(lag_s * Q32) if follows else 0,
+        job_start_q40=segment_of(part.begin) * SEGMENT_MM * Q40,
+        line=100 + sequence,
     )
-    flags = (0 if follows else FIRST) | (LAST if part.last else 0)
-    size = HEADER.size + len(image)
-    head = HEADER.pack(
-        b"HDGC", 1, flags, size, 0, job, sequence, *fields, 100 + sequence, 0xFFFFFFFF, 0, 0
-    )
-    crc = zlib.crc32(head[16:] + image, zlib.crc32(head[4:12]))
-    return head[:12] + crc.to_bytes(4, "little") + head[16:] + image
+    return Chunk(header, encode(program(part))).encode()
 
 
 def chunks(count: int, job: int) -> list[bytes]:

@@ -8,6 +8,7 @@ from contextlib import ExitStack, contextmanager
 
 import can
 import numpy as np
+from canopen_bench import NOTHING
 from numpy.typing import NDArray
 
 from bench import Bench
@@ -29,7 +30,7 @@ class Neighbour:
     """A node that sends what it likes, in the time of the test."""
 
     def __init__(self, channel: str) -> None:
-        self._bus = LocalBus(channel)
+        self._bus = LocalBus(channel, can_filters=NOTHING)
 
     def send(self, identifier: int, data: bytes) -> None:
         """One frame."""

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import can
 import pytest
+from canopen_bench import NOTHING
 
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
@@ -72,7 +73,7 @@ class Noise:
         self._thread = threading.Thread(target=self._work, daemon=True)
 
     def _work(self) -> None:
-        with LocalBus(self._channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}]) as bus:
+        with LocalBus(self._channel, can_filters=NOTHING) as bus:
             self._joined.set()
             while not self._ended:
                 for _ in range(self._chance.randint(1, BURST)):

@@ -13,12 +13,13 @@ import can
 import pytest
 from canopen.pdo.base import PdoMap
 from canopen.profiles import p402
-from canopen_bench import DRIVE, DRIVE_EDS, client, dictionary, drive_process, let_pass, until
+from canopen_bench import DRIVE, DRIVE_EDS, NOTHING, client, drive_process, let_pass, until
 
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.sdo.network import Network
+from hodograph.data import object_dictionary
 
 PERIOD_S = 0.001
 SETPOINT_AHEAD_S = 0.0002
@@ -63,7 +64,7 @@ class Master:
         assert self._joined.wait(30.0)  # time stands still for it meanwhile
 
     def _work(self) -> None:
-        with LocalBus(self._channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}]) as bus:
+        with LocalBus(self._channel, can_filters=NOTHING) as bus:
             self._joined.set()
             while not self._ended:
                 self.tick(bus)
@@ -92,7 +93,7 @@ class Master:
 
 @contextmanager
 def set_up(hub: LocalHub, monkeypatch: pytest.MonkeyPatch, axis: str = "") -> Iterator[Master]:
-    node: Any = p402.BaseNode402(DRIVE, dictionary(DRIVE_EDS, DRIVE))
+    node: Any = p402.BaseNode402(DRIVE, object_dictionary(DRIVE_EDS, DRIVE))
     with drive_process(hub, axis=axis), client(hub, node) as network:
         monkeypatch.setattr(p402, "time", SimpleNamespace(monotonic=network.clock.now_s))
         let_pass(network, 0.2)

@@ -12,13 +12,14 @@ from typing import Any
 
 import canopen
 import pytest
-from canopen_bench import CONTROLLER_EDS, DRIVE_EDS, FIGURES, dictionary, until
+from canopen_bench import CONTROLLER_EDS, DRIVE_EDS, FIGURES, until
 
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process
 from hodograph.bus.sdo.network import Network
+from hodograph.data import object_dictionary
 from hodograph.pipeline import load_pipeline
 from hodograph.program import encode
 
@@ -40,7 +41,7 @@ class Machine:
     def __init__(self, root: Path, hub: LocalHub, clock: VirtualClock) -> None:
         self.root, self.hub, self.clock = root, hub, clock
         self.network = Network(LocalBus(hub.address.channel, can_filters=FILTERS))
-        node: Any = self.network.add_node(1, dictionary(CONTROLLER_EDS, 1))
+        node: Any = self.network.add_node(1, object_dictionary(CONTROLLER_EDS, 1))
         self.sdo = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
         beats: list[int] = []
@@ -244,7 +245,7 @@ def test_a_signal_stops_the_axes_and_ends(
     assert machine.clock.await_end(controller.name, controller.child, 15.0) == 0
     assert machine.clock.now_s() - begun_s < 0.35
     assert controller.text() == ""
-    drive: Any = machine.network.add_node(2, dictionary(DRIVE_EDS, 2)).sdo
+    drive: Any = machine.network.add_node(2, object_dictionary(DRIVE_EDS, 2)).sdo
     assert drive[0x6041].raw & 0x6F == 0x40  # Switch on disabled
 
 
@@ -270,5 +271,5 @@ def test_a_signal_stops_an_optimal_program(
     assert machine.clock.await_end(controller.name, controller.child, 15.0) == 0
     assert machine.clock.now_s() - begun_s < 0.8
     for node in (2, 3):
-        drive: Any = machine.network.add_node(node, dictionary(DRIVE_EDS, node)).sdo
+        drive: Any = machine.network.add_node(node, object_dictionary(DRIVE_EDS, node)).sdo
         assert drive[0x6041].raw & 0x6F == 0x40  # Switch on disabled

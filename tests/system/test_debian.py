@@ -29,6 +29,7 @@ su user -c 'cd && cp -r /usr/share/hodograph/examples/embed . && cd embed && mak
 su user -c 'cd && embed/setpoints /tmp/alpha.hdgp > setpoints.txt'
 su user -c 'cd && cmake -S embed -B cmake && cmake --build cmake && cmake/setpoints /tmp/alpha.hdgp > cmake.txt'
 zcat /usr/share/man/man1/hodograph.1.gz | grep -q 'hodograph scan'
+zcat /usr/share/man/man1/hodograph-hub.1.gz | grep -q bitrate
 grep -q -- --assign /usr/share/bash-completion/completions/hodograph
 ls /usr/share/zsh/vendor-completions/_hodograph /usr/share/fish/vendor_completions.d/hodograph.fish
 ldd /home/user/embed/setpoints | grep libhodograph > /home/user/linked.txt
@@ -79,6 +80,14 @@ def test_the_same_bytes_again(packages: Path, tmp_path: Path) -> None:
     assert names == sorted(file.name for file in tmp_path.glob("*.deb"))
     for name in names:
         assert (tmp_path / name).read_bytes() == (packages / name).read_bytes(), name
+
+
+@pytest.mark.timeout(3600)
+def test_lintian_has_nothing_to_say(packages: Path) -> None:
+    """What it finds in files of others has an override with its reason."""
+    output(sys.executable, ROOT / "tools/packages.py", "clean-root")
+    words = ("--allow-root", "--tag-display-limit", "0")
+    assert output("lintian", *words, *sorted(packages.glob("*.deb"))).splitlines() == []
 
 
 @pytest.mark.timeout(3600)

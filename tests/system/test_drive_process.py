@@ -12,13 +12,14 @@ from pathlib import Path
 import can
 import canopen
 import pytest
-from canopen_bench import DRIVE_EDS, FIGURES, dictionary, let_pass, listener
+from canopen_bench import DRIVE_EDS, FIGURES, let_pass, listener
 
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.local_bus import LocalBus
 from hodograph.bus.processes import Process
 from hodograph.bus.sdo.network import Network
+from hodograph.data import object_dictionary
 
 DRIVE = "build/bin/hodograph-drive"
 MODELLED = {0x1018, 0x2101, 0x6041, 0x6062, 0x6063, 0x6064, 0x6075, 0x6076, 0x607A, 0x6092}
@@ -76,7 +77,7 @@ def drives(root: Path, hub: LocalHub, clock: VirtualClock) -> Iterator[Process]:
 def network(hub: LocalHub, drives: Process) -> Iterator[Network]:
     network = Network(LocalBus(hub.address.channel))
     for node in (42, 43):
-        network.add_node(node, dictionary(DRIVE_EDS, node)).sdo.RESPONSE_TIMEOUT = 2.0
+        network.add_node(node, object_dictionary(DRIVE_EDS, node)).sdo.RESPONSE_TIMEOUT = 2.0
     yield network
     network.disconnect()
 

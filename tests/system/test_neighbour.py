@@ -27,6 +27,7 @@ from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo import node
+from hodograph.bus.sdo.channel_lock import Turns
 from hodograph.bus.sdo.controller import BOOT, FAULT_STATE, HELD, OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import COMMAND, FAULT, HOLD, QUICK_STOP
 from hodograph.bus.sdo.objects import STOP as STOP_COMMAND
@@ -276,6 +277,26 @@ def test_a_command_to_stop_beside_another_computers_transfer(
         state = {"stop": READY, "hold": HELD, "quick-stop": OFF}[command]
         stranger.send(b"\x80" + program + b"\0\0\4\5")
     bench.controller.wait_for((state,), 2.0)
+
+
+@pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])
+def test_a_command_to_stop_beside_one_that_ctrl_z_has_stopped(
+    moving: Moving, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bench, _ = moving(1.0)
+    turns = Turns(bench.bus, bench.machine.node, bench.clock)
+
+    with turns.turn():
+        begun_s = bench.clock.now_s()
+        assert main([command]) == 4
+        taken_s = bench.clock.now_s() - begun_s
+    turns.close()
+
+    assert taken_s < 5.0
+    assert (
+        "has taken the command, but whether the axes stand is not known" in capsys.readouterr().err
+    )
+    assert bench.controller.state() == {"stop": READY, "hold": HELD, "quick-stop": OFF}[command]
 
 
 @pytest.mark.parametrize("command", ["stop", "hold", "quick-stop"])

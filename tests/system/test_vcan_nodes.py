@@ -19,12 +19,12 @@ from canopen_bench import (
     DRIVE,
     DRIVE_EDS,
     FIGURES,
-    dictionary,
     frames_of,
     program,
 )
 
 from hodograph.bus.processes import Process
+from hodograph.data import object_dictionary
 
 pytestmark = pytest.mark.bus
 
@@ -66,7 +66,7 @@ def nodes(root: Path) -> Iterator[canopen.Network]:
         network.connect(interface="socketcan", channel="vcan0", can_filters=filters)
         stack.callback(network.disconnect)
         for node, eds in ((CONTROLLER, CONTROLLER_EDS), (DRIVE, DRIVE_EDS)):
-            network.add_node(node, dictionary(eds, node)).sdo.RESPONSE_TIMEOUT = LIMIT_S
+            network.add_node(node, object_dictionary(eds, node)).sdo.RESPONSE_TIMEOUT = LIMIT_S
         yield network
 
 

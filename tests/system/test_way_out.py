@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import can
 import numpy as np
 import pytest
+from canopen_bench import NOTHING
 from numpy.typing import NDArray
 
 from bench import EXAMPLES, Bench, MakeBench
@@ -37,7 +38,7 @@ STATE_BITS, POWERED = 0x6F, (0x27, 0x07)
 STANDS_COUNTS = 2000
 """2 um: the last of the settling."""
 LATE_US = 7000
-"""A round of the mainline, and the ticks until its word is on the bus."""
+"""A round of the main loop, and the ticks until its word is on the bus."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,7 @@ def test_a_lost_host_stops_the_axes_on_the_path(
     bench = make_bench(file=PAPER_HEART)
     assert main(["goto", HEART]) == 0
     bench.controller.write(0x1016, 1, HOST_NODE << 16 | SILENT_MS)
-    host = LocalBus(bench.bus.channel, can_filters=[{"can_id": 0x7FF, "can_mask": 0x7FF}])
+    host = LocalBus(bench.bus.channel, can_filters=NOTHING)
     beat = can.Message(arbitration_id=0x700 + HOST_NODE, data=[5], is_extended_id=False)
     with Recorder(bench.bus) as recorder:
         assert main(["start"]) == 0

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements commands.h (see there): commands to a motion, read from a file. */
 #include "commands.h"
 
 #include "port/semihost/semihost.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* How an image of the tests ends: startup_exit() of port/cortex_m/startup.h. */
 #include "port/cortex_m/startup.h"
 #include "port/semihost/semihost.h"
 

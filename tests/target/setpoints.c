@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * An image that runs programs without a bus: KERNEL FILE [COMMANDS [TIMES]], KERNEL 0 fixed or 1 float. The store (which the
- * emulator fills) holds one program image, or several one behind the other; the setpoints of all ticks of all of them,
+ * emulator fills) holds one program image, or several one after the other; the setpoints of all ticks of all of them,
  * i32 of all path axes, go to FILE on the host. So every target can be asked for its bits, however little memory it has. What
  * is run is what the controller's tick runs.
  *
@@ -100,7 +100,7 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel, int fi
     return run(file);
 }
 
-/* At least one; behind the last one there is no further "HDGP". */
+/* At least one; after the last one there is no further "HDGP". */
 static int run_all(char *words[WORD_COUNT], int file)
 {
     uint32_t done = 0;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements table.h (see there): the place after the programs in the store where coefficient records go. */
 #include "table.h"
 
 #include <string.h>

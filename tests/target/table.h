@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * table: the place behind the programs in the store where a program's coefficient records (core/coefficients.h) go.
+ * table: the place after the programs in the store where a program's coefficient records (core/coefficients.h) go.
  */
 #ifndef TARGET_TABLE_H
 #define TARGET_TABLE_H

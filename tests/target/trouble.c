@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements trouble.h (see there): what the drives of isr.c do wrong, by a word of the command line. */
 #include "trouble.h"
 
 #include <string.h>

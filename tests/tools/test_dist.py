@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from dist.make_release import make_release
-from dist.programs import PROGRAMS
+from dist.make_release import build_environment, make_release
+from dist.programs import PROGRAMS, programs_for
 
 ROOT = Path(__file__).resolve().parents[2]
 HANGS_S = 600.0
@@ -56,6 +56,21 @@ def test_the_wheel_alone_runs_the_demo(tmp_path: Path) -> None:
     demo = python(environment, tmp_path, "-m", "hodograph", "demo", "--no-browser", "--json")
     assert json.loads(demo)["ticks"] > 1000
     assert (tmp_path / "hodograph-demo/report.html").exists()
+
+
+def test_the_linker_of_another_platform_stays() -> None:
+    """`make wheels` names one for each platform; without, none that searches folders of this computer."""
+    given = {"LDSHARED": "zig cc -target aarch64-linux-gnu -shared", "HODOGRAPH_BUILT_BY_MAKE": "1"}
+    built = build_environment(7, given)
+    assert built["LDSHARED"] == given["LDSHARED"]
+    assert built["HODOGRAPH_BUILT_BY_MAKE"] == ""
+    assert "-L" not in build_environment(7, {})["LDSHARED"]
+
+
+def test_other_systems_get_no_programs() -> None:
+    """They need Linux; the native module does not."""
+    assert programs_for("linux") == PROGRAMS
+    assert [programs_for(platform) for platform in ("darwin", "win32")] == [{}, {}]
 
 
 def check_wheel(wheel: Path) -> None:

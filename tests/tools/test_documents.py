@@ -6,12 +6,18 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from argparse import _SubParsersAction
 from pathlib import Path
 
 import pytest
 
+from hodograph import __version__
+from hodograph.cli.parser import make_parser
+
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "tools/README.md"])
+COMMAND = re.compile(r"(?<![\w./-])(?<!import )hodograph ([a-z][a-z-]*)([^`\n#|&;<>]*)")
+"""A command of the host tools, as a reader types it, and what follows it on the line."""
 LINK = re.compile(r"\]\(([^)#\s]+)(?:#[^)]*)?\)")
 
 
@@ -24,12 +30,50 @@ def test_links_and_merges(page: Path) -> None:
     assert marks == []
 
 
+def code(page: Path) -> str:
+    """Indented and fenced blocks and words in back quotes, without comments."""
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"^```\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    indented = re.findall(r"^    .*", text, re.MULTILINE)
+    parts = [*fenced, *indented, *re.findall(r"`([^`]+)`", text)]
+    return re.sub(r"\s# .*", "", "\n".join(parts))
+
+
+def test_commands_of_the_pages_have_their_options() -> None:
+    """Each command that a page tells to type is there, and knows the options that the page gives it."""
+    parser = make_parser()
+    (commands,) = (a.choices for a in parser._actions if isinstance(a, _SubParsersAction))
+    found = [(page.name, *match) for page in PAGES for match in COMMAND.findall(code(page))]
+    assert len(found) > 100
+    wrong = []
+    for page, name, rest in found:
+        options = set(re.findall(r"(?<!\S)\[?(--?[a-z][a-z-]*)", rest))
+        known = commands[name]._option_string_actions.keys() if name in commands else set()
+        if name not in commands or options - known:
+            wrong.append((page, name, sorted(options - known)))
+    assert wrong == []
+
+
 @pytest.mark.parametrize("tool", ["draw_figures.py", "list_api.py", "list_options.py"])
 def test_generated_pages_are_current(tool: str) -> None:
     """`make figures` and `make options` would write the same again."""
     command = [sys.executable, str(ROOT / "tools" / tool), "--check"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_every_page_has_the_version_of_the_package() -> None:
+    """It is in hodograph/__init__.py; the changelog begins with its release, and citations name it."""
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    releases = re.findall(
+        r"^## (\S+) \((?:\d{4}-\d\d-\d\d|not released yet)\)$", changes, re.MULTILINE
+    )
+    assert releases == re.findall(r"^## (\S+)", changes, re.MULTILINE)
+    assert releases[0] == __version__
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert re.findall(r"^version: (.*)$", citation, re.MULTILINE) == [__version__]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"version {__version__}." in readme.partition("## How to cite")[2]
 
 
 def test_each_tool_has_a_row() -> None:

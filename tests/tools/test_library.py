@@ -12,6 +12,7 @@ import pytest
 
 from dist.abi import differences, exported
 from dist.library import PREFIX, Abi, make_library, version
+from dist.program_page import PURPOSE, program_page
 from hodograph.native import NativeProgram
 from subprocesses import run
 
@@ -152,6 +153,26 @@ def test_from_cpp(standard: str, prefix: Path, tmp_path: Path) -> None:
     told = run(program).stdout.split()
     assert told[0] == "-1"
     assert told[-1] == version()
+
+
+def test_each_program_has_a_man_page(prefix: Path) -> None:
+    """With all that its --help says, and nothing that mandoc calls an error."""
+    programs = sorted((prefix / "bin").iterdir())
+    assert [program.name for program in programs] == sorted(PURPOSE)
+    for program in programs:
+        page = prefix / f"share/man/man1/{program.name}.1"
+        assert run("mandoc", "-Tlint", "-W", "error", page).stdout == ""
+        shown = run("mandoc", "-Tutf8", "-O", "width=200", page).stdout
+        words = re.sub(r".\x08", "", shown).split()
+        help_words = run(program, "--help").stdout.removeprefix("usage:").split()
+        assert set(help_words) <= set(words), program
+
+
+def test_a_program_for_another_processor_has_no_page(tmp_path: Path) -> None:
+    program = tmp_path / "hodograph-hub"
+    program.write_bytes(b"\x7fELF of another kind")
+    program.chmod(0o755)
+    assert program_page(program, "1") is None
 
 
 def test_install_below_destdir_and_away_again(prefix: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from dist.debian import forget_origin
 from dist.library import make_library, version
 from dist.requirements import lock_text, package_dependencies, read_lock, runtime_requirements
 
@@ -89,6 +90,19 @@ def test_list_of_components(tmp_path: Path) -> None:
         found
     )
     assert str(ROOT) not in first.read_text(encoding="utf-8")
+
+
+def test_the_place_of_the_wheel_is_forgotten(tmp_path: Path) -> None:
+    """pip writes it into two files; with it, no two Debian packages would be the same."""
+    information = tmp_path / "hodograph-1.dist-info"
+    information.mkdir()
+    (information / "direct_url.json").write_text('{"url": "file:///tmp/x"}')
+    first, last = b"hodograph/__init__.py,sha256=a,1\r\n", b"hodograph-1.dist-info/RECORD,,\r\n"
+    told = b"hodograph-1.dist-info/direct_url.json,sha256=b,24\r\n"
+    (information / "RECORD").write_bytes(first + told + last)
+    forget_origin(information)
+    assert (information / "RECORD").read_bytes() == first + last
+    assert [file.name for file in information.iterdir()] == ["RECORD"]
 
 
 PLATFORMIO = """

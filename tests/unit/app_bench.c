@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app_bench.h (see there): a whole controller on the fake port, with two fake drives and an SDO client
+ * as host, on a bus without delays. */
 #include "app_bench.h"
 
 #include <string.h>
@@ -54,6 +56,23 @@ static void to_drives(struct app_bench *bench, const struct can_msg *frame)
     }
 }
 
+static void to_module(struct app_bench *bench, const struct can_msg *frame)
+{
+    if (bench->module.id != 0u && !bench->module_dead) {
+        io_module_receive(&bench->module, frame);
+    }
+}
+
+static void from_module(void *context, const struct can_msg *frame)
+{
+    to_controller(context, frame);
+}
+
+void app_bench_add_module(struct app_bench *bench, uint8_t node)
+{
+    io_module_init(&bench->module, node, (struct drive_node_port){from_module, bench});
+}
+
 static void to_host(struct app_bench *bench, const struct can_msg *frame)
 {
     struct can_msg out;
@@ -88,6 +107,7 @@ static bool pass_frames(struct app_bench *bench)
     while (fake_port_take(&frame)) {
         watch(bench, &frame);
         to_drives(bench, &frame);
+        to_module(bench, &frame);
         to_host(bench, &frame);
         any = true;
     }
@@ -152,6 +172,9 @@ void app_bench_period_unattended(struct app_bench *bench)
     fake_port_tick(0);
     (void)pass_frames(bench);
     beat(bench);
+    if (bench->module.id != 0u && !bench->module_dead) {
+        io_module_process(&bench->module, bench->controller.config.period_us);
+    }
     bench->ticks++;
 }
 

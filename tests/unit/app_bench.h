@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * app_bench: a whole controller on the fake port, with two fake drives and an SDO client as host,
+ * app_bench: a whole controller on the fake port, with two fake drives, if wanted an I/O module, and an SDO client as host,
  * on a bus without delays.
  */
 #ifndef TESTS_UNIT_APP_BENCH_H
@@ -11,6 +11,7 @@
 #include "app/controller.h"
 #include "canopen/sdo_client.h"
 #include "fake_drive.h"
+#include "node/io_module.h"
 
 #define BENCH_DRIVES  2u
 #define BENCH_TARGETS 8192u /* of an axis that are recorded */
@@ -18,6 +19,8 @@
 struct app_bench {
     struct controller controller;
     struct fake_drive drives[BENCH_DRIVES];
+    struct io_module module; /* id 0: there is none */
+    bool module_dead;        /* it receives and sends nothing */
     struct sdo_client host;
     uint32_t ticks;
     uint32_t frames;                   /* seen on the bus */
@@ -32,10 +35,13 @@ struct app_bench {
 /* Controller and drives at power-on; drives stand at the positions. */
 void app_bench_init(struct app_bench *bench, int32_t x_counts, int32_t y_counts);
 
+/* An I/O module of this node is on the bus. */
+void app_bench_add_module(struct app_bench *bench, uint8_t node);
+
 /* The power of the controller goes off and on; drives, the store and the recorded counts stay. */
 void app_bench_power_cycle(struct app_bench *bench);
 
-/* One period: tick, answers, mainline. */
+/* One period: tick, answers, main loop. */
 void app_bench_period(struct app_bench *bench);
 void app_bench_period_unattended(struct app_bench *bench); /* without the main loop */
 void app_bench_periods(struct app_bench *bench, uint32_t count);
@@ -43,7 +49,7 @@ void app_bench_periods(struct app_bench *bench, uint32_t count);
 /* Periods until the state; fails the test when it takes more than `most`. Returns how many. */
 uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint32_t most);
 
-/* Delivers all frames that are under way, and lets the mainline do what they ask for. */
+/* Delivers all frames that are under way, and lets the main loop do what they ask for. */
 void app_bench_settle(struct app_bench *bench);
 
 /* The host. Results: abort codes. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app_image.h (see there): a program small enough to be written by hand. */
 #include "app_image.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements chunk_image.h (see there): chunks of a job that is small enough to be written by hand. */
 #include "chunk_image.h"
 
 #include <string.h>
@@ -146,9 +147,11 @@ uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t
     if (plan->from > 0u) {
         put_shifts(bytes, plan);
     }
-    put_i64(bytes + 56, (int64_t)segment_of(plan->from) * SEGMENT_MM * Q40);
+    put_i64(bytes + 56, (plan->job_mm + (int64_t)segment_of(plan->from) * SEGMENT_MM) * Q40);
     cob_put(bytes + 64, 100u + plan->sequence, 4);
     cob_put(bytes + 68, remaining_ms(plan), 4);
+    cob_put(bytes + 72, plan->rest_ms, 4);
+    cob_put(bytes + 76, plan->rest_flags, 4);
     chunk_image_seal(bytes);
     return size;
 }

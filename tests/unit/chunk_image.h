@@ -20,7 +20,10 @@ struct chunk_plan {
     uint32_t flags;    /* CHUNK_FLAG_... */
     uint32_t job;
     uint32_t sequence;
-    uint32_t whole_to; /* `to` of the job, for its remaining time; 0: not known */
+    uint32_t whole_to;   /* `to` of the job, for its remaining time; 0: not known */
+    uint32_t rest_ms;    /* with CHUNK_FLAG_REST, whose `from` is 0: dwell before it, */
+    uint32_t rest_flags; /* and what kind of stop */
+    uint32_t job_mm;     /* where it begins then, in the job */
 };
 
 /* Makes the chunk; the path begins at (x_mm, y_mm). Returns its size. */

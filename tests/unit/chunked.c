@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements chunked.h (see there): a planar program cut into the chunks of a job, for tests. */
 #include "chunked.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * chunked: a planar program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
- * its joint, and behind them a tail: a quintic to rest at the end of a segment, inside the limits of the program.
+ * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program.
  */
 #ifndef TESTS_UNIT_CHUNKED_H
 #define TESTS_UNIT_CHUNKED_H

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements drive_bench.h (see there): one simulated drive on the bench. */
 #include "drive_bench.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements fake_drive.h (see there): an ideal CiA 402 drive for tests of the controller. */
 #include "fake_drive.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements fake_port.h (see there): port.h for tests: a bus, a clock and a store in memory. */
 #include "fake_port.h"
 
 #include <string.h>

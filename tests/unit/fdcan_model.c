@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements fdcan_model.h (see there): a register model of FDCAN1 of an STM32G4. */
 #include "fdcan_model.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements flash_model.h (see there): a register model of the flash of an STM32G474. */
 #include "flash_model.h"
 
 #include <string.h>

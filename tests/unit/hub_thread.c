@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements hub_thread.h (see there): a hub that runs in a thread of the test. */
 #define _GNU_SOURCE
 #include "hub_thread.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements override_program.h (see there): programs for the override's property test. */
 #include "override_program.h"
 
 #include <math.h>
@@ -316,4 +317,30 @@ void override_program_close(struct override_program *p)
 {
     free(p->image);
     p->image = NULL;
+}
+
+int override_trace_add(struct override_trace *trace, int64_t arc_q40_mm, double h,
+                       struct override_differences *out)
+{
+    double *arc = trace->arc_mm;
+    memmove(arc, arc + 1, 3 * sizeof *arc);
+    arc[3] = (double)arc_q40_mm / 1099511627776.0;
+    if (++trace->known < 4) {
+        return 0;
+    }
+    out->jerk = fabs(arc[3] - 3 * arc[2] + 3 * arc[1] - arc[0]) / (h * h * h);
+    out->acceleration = fabs(arc[3] - 2 * arc[2] + arc[1]) / (h * h);
+    out->back_mm = arc[2] - arc[3];
+    return 1;
+}
+
+double override_distance_q40(struct interpolator *exact, const struct interpolator_point *point)
+{
+    struct interpolator_point right;
+    while (interpolator_at_arc_length(exact, point->arc_length_q40_mm, &right) < 0) {
+        TEST_ASSERT_TRUE(exact->segment->to_q40_mm != INT64_MAX);
+        (void)interpolator_at_arc_length(exact, exact->segment->to_q40_mm, &right);
+    }
+    return hypot((double)(right.position_q40[0] - point->position_q40[0]),
+                 (double)(right.position_q40[1] - point->position_q40[1]));
 }

@@ -6,6 +6,7 @@
 #ifndef HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
 #define HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
 
+#include "core/interpolator.h"
 #include "core/program.h"
 
 #define OVERRIDE_PIECES 256
@@ -49,6 +50,25 @@ void override_program_codes(const struct override_limits *limit, uint8_t codes[6
 /* F', F'', F''' of piece i at a program time in s. */
 void override_program_feed(const struct override_program *p, uint32_t i, double time_s,
                            double derivative[4]);
+
+/* Arc lengths of the last four setpoints in mm, and how many have come. All zero: none. */
+struct override_trace {
+    double arc_mm[4];
+    uint32_t known;
+};
+
+struct override_differences {
+    double jerk, acceleration; /* magnitudes, mm/s^3 and mm/s^2 */
+    double back_mm; /* how far the last setpoint is before the one before it; below 0: it is not */
+};
+
+/* Adds the next setpoint; 1 when there are four, for the differences over a period of h seconds; else 0. */
+int override_trace_add(struct override_trace *trace, int64_t arc_q40_mm, double h,
+                       struct override_differences *out);
+
+/* Distance in 2^-40 mm of a planar point from the exact curve at its arc length. `exact` has the same program and stands at or
+ * before that place. */
+double override_distance_q40(struct interpolator *exact, const struct interpolator_point *point);
 
 /* Uniform in [low, high). */
 double override_random(uint64_t *random, double low, double high);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements sdo_talk.h (see there): a client made of raw frames, for tests of the SDO server. */
 #include "sdo_talk.h"
 
 #include <string.h>

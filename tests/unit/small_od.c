@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements small_od.h (see there): a small object dictionary with recording hooks, for the tests of od and SDO. */
 #include "small_od.h"
 
 #include <string.h>

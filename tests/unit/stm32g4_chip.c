@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements stm32g4_chip.h (see there): a register model of an STM32G474. */
 #include "stm32g4_chip.h"
 
 #include <stdio.h>

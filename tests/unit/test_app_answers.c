@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of app/machine/tpdo_monitor.h: missed and late answers of a drive. */
 #include "app/machine/tpdo_monitor.h"
 
 #include "unity.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of app/machine/axis.h: one drive as the tick uses it. */
 #include "app/machine/axis.h"
 
 #include "unity.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of app/machine/config.h: the configuration of the host as one value. */
 #include "app/machine/config.h"
 
 #include "od_controller.h"

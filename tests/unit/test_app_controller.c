@@ -440,8 +440,8 @@ static void test_a_drive_that_is_gone_while_off_is_looked_for_again(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* A stall of the mainline counts as no silence of the client: its transfer goes on. */
-static void test_a_busy_mainline_ends_no_transfer(void)
+/* A stall of the main loop counts as no silence of the client: its transfer goes on. */
+static void test_a_busy_main_loop_ends_no_transfer(void)
 {
     struct can_msg frame;
     app_bench_settle(&bench);
@@ -706,7 +706,7 @@ int main(void)
     RUN_TEST(test_a_lost_heartbeat_is_a_fault);
     RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
     RUN_TEST(test_a_drive_that_is_gone_while_off_is_looked_for_again);
-    RUN_TEST(test_a_busy_mainline_ends_no_transfer);
+    RUN_TEST(test_a_busy_main_loop_ends_no_transfer);
     RUN_TEST(test_a_check_tells_the_port_of_its_progress);
     RUN_TEST(test_simulated_drives_are_awaited_and_hurried_while_something_moves);
     RUN_TEST(test_real_drives_are_never_awaited);

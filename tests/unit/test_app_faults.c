@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the controller does when drives, bus or operator want something else than the program. Numbers of ticks are those
- * of docs/reference/architecture.md. */
+/* What the controller does when drives, bus or operator want something else than the program. Numbers of ticks are
+ * those of docs/reference/architecture.md. */
 #include <string.h>
 
 #include "app/commands.h"
@@ -652,7 +652,8 @@ static void test_a_frame_now_and_then_is_counted_only(void)
     TEST_ASSERT_EQUAL_INT(30, app_bench_read(&bench, 0x2008, 7));
 }
 
-/* Periods in which some frames are refused: no drive may get, from SYNC to SYNC, a step that the program does not have. */
+/* Periods in which some frames are refused: no drive may get, from SYNC to SYNC, a step that the program does not
+ * have. */
 static void refuse_some(uint16_t id, uint16_t mask, uint32_t times)
 {
     const struct can_match frames = {id, mask};
@@ -1076,9 +1077,9 @@ static void test_with_drives_off_the_host_may_go(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* --- The mainline --- */
+/* --- The main loop --- */
 
-static void test_a_mainline_that_stands_still_stops_the_axes_on_the_path(void)
+static void test_a_main_loop_that_stands_still_stops_the_axes_on_the_path(void)
 {
     run_some(100);
     TEST_ASSERT_EQUAL_UINT32(0, machine()->unattended_us);
@@ -1098,7 +1099,7 @@ static void test_a_mainline_that_stands_still_stops_the_axes_on_the_path(void)
     recover();
 }
 
-static void test_at_standstill_the_mainline_may_take_its_time(void)
+static void test_at_standstill_the_main_loop_may_take_its_time(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     switch_on();
@@ -1115,8 +1116,8 @@ int main(void)
     RUN_TEST(test_a_host_is_watched_from_its_first_heartbeat_on);
     RUN_TEST(test_without_an_entry_no_host_is_watched);
     RUN_TEST(test_with_drives_off_the_host_may_go);
-    RUN_TEST(test_a_mainline_that_stands_still_stops_the_axes_on_the_path);
-    RUN_TEST(test_at_standstill_the_mainline_may_take_its_time);
+    RUN_TEST(test_a_main_loop_that_stands_still_stops_the_axes_on_the_path);
+    RUN_TEST(test_at_standstill_the_main_loop_may_take_its_time);
     RUN_TEST(test_one_missed_answer_is_counted_by_axis_and_tolerated);
     RUN_TEST(test_more_than_that_is_a_fault_two_ticks_later);
     RUN_TEST(test_missed_max_is_configured);

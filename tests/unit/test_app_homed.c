@@ -355,7 +355,7 @@ static void test_a_controller_that_restarts_loses_it(void)
     expect_not_homed(COMMAND_START);
 }
 
-/* The mainline is busy, its queue full: the boot-up message finds no room. */
+/* The main loop is busy, its queue full: the boot-up message finds no room. */
 static void test_a_boot_up_message_that_finds_no_room_counts(void)
 {
     struct can_msg boot_up;

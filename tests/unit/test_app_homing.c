@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of app/drives/homing.h: command 10, which homes one axis after the other. */
 #include "app/drives/homing.h"
 
 #include "app/commands.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of app/machine/offsets.h: what feedforward adds to the setpoints of a motion, by axis of the path. */
 #include "app/machine/offsets.h"
 
 #include <string.h>

@@ -18,7 +18,7 @@
 #define JOB        7u
 #define UNIT       1000000 /* counts a mm */
 #define SMALL_RING (20u * 1024u)
-#define WHOLE      97u /* pieces of the job, behind which it ends: 0.5 s + 96 / 32 s + 0.5 s */
+#define WHOLE      97u /* pieces of the job, after which it ends: 0.5 s + 96 / 32 s + 0.5 s */
 
 static struct app_bench bench;
 static uint8_t bytes[CHUNK_IMAGE_SIZE_MAX];
@@ -825,6 +825,227 @@ static void test_the_motion_asks_for_records(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
+/* ---- Rests between chunks ---- */
+
+/* Two paths of 40 pieces, the second from the end of the first, with a rest before it. */
+#define ROUND     41u
+#define ROUND_MM  28                          /* 4 + 40 / 2 + 4 */
+#define ROUND_END (1000u + 40u * 1000u / 32u) /* its last tick */
+
+static const struct chunk_plan path_1 = {
+    .to = ROUND, .flags = CHUNK_FLAG_FIRST | CHUNK_FLAG_JOINED, .job = JOB, .whole_to = ROUND};
+
+static struct chunk_plan behind_rest(uint32_t rest_ms, uint32_t rest_flags)
+{
+    const struct chunk_plan plan = {.to = ROUND,
+                                    .flags = CHUNK_FLAG_REST | CHUNK_FLAG_LAST,
+                                    .job = JOB,
+                                    .sequence = 1,
+                                    .whole_to = ROUND,
+                                    .rest_ms = rest_ms,
+                                    .rest_flags = rest_flags,
+                                    .job_mm = ROUND_MM};
+    return plan;
+}
+
+static uint32_t send_at(const struct chunk_plan *plan, int32_t x_mm)
+{
+    return app_bench_chunk(&bench, bytes, chunk_image_make(bytes, plan, x_mm, Y_MM));
+}
+
+static void send_rounds(uint32_t rest_ms, uint32_t rest_flags)
+{
+    const struct chunk_plan second = behind_rest(rest_ms, rest_flags);
+    expect_sent(&path_1);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, send_at(&second, X_MM + ROUND_MM));
+}
+
+static void expect_both_paths(void)
+{
+    (void)app_bench_until(&bench, MACHINE_READY, 20000);
+    app_bench_period(&bench);
+    expect_state(STREAM_ENDED);
+    TEST_ASSERT_EQUAL_INT32((X_MM + 2 * ROUND_MM) * UNIT, bench.drives[0].position_counts);
+    TEST_ASSERT_EQUAL_INT(INT64_C(2) * ROUND_MM << 40, read(11));
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+}
+
+/* Ticks between the first setpoint at the end of the first path and the last one there. */
+static uint32_t ticks_at_rest(void)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < bench.recorded; ++i) {
+        count += bench.targets[0][i] == (X_MM + ROUND_MM) * UNIT ? 1u : 0u;
+    }
+    return count;
+}
+
+/* The second path is the first one, so many ticks after its end. */
+static void expect_rest(uint32_t ticks)
+{
+    const uint32_t begin = ROUND_END + 1u + ticks;
+    for (uint32_t k = 0; k <= ROUND_END; k += 50) {
+        TEST_ASSERT_EQUAL_INT32(bench.targets[0][k] + ROUND_MM * UNIT, bench.targets[0][begin + k]);
+    }
+}
+
+/* The end of the first path, the ticks of the rest, and the first setpoint of the second one. */
+static void test_a_dwell_takes_its_ticks(void)
+{
+    static const uint32_t rests_ms[] = {0, 3, CHUNK_REST_TICKS, 50, 333};
+    for (uint32_t k = 0; k < sizeof rests_ms / sizeof rests_ms[0]; ++k) {
+        const uint32_t rest_ms = rests_ms[k];
+        app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+        power_on();
+        send_rounds(rest_ms, 0);
+        const uint32_t rest = rest_ms > CHUNK_REST_TICKS ? rest_ms : CHUNK_REST_TICKS;
+        TEST_ASSERT_INT_WITHIN(1, 2 * ROUND_END + rest, read(8));
+        command(COMMAND_START);
+        expect_both_paths();
+        TEST_ASSERT_EQUAL_INT(0, read(13));
+        expect_rest(rest);
+    }
+}
+
+/* Comes in the dwell, or long after it: an underrun, and no second dwell. */
+static void test_a_chunk_behind_a_rest_may_be_late(void)
+{
+    const struct chunk_plan second = behind_rest(200, 0);
+    for (uint32_t late = 0; late < 500; late += 111) {
+        app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+        power_on();
+        expect_sent(&path_1);
+        command(COMMAND_START);
+        app_bench_periods(&bench, ROUND_END + 1u + late);
+        expect_state(STREAM_UNDERRUN);
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, send_at(&second, X_MM + ROUND_MM));
+        expect_both_paths();
+        TEST_ASSERT_TRUE(ticks_at_rest() >= 202u && ticks_at_rest() >= late);
+        TEST_ASSERT_TRUE(ticks_at_rest() <= (late > 200 ? late : 200u) + 60u);
+    }
+}
+
+static void until_program_stop(void)
+{
+    while (read(2) != STREAM_PROGRAM_STOP) {
+        app_bench_period(&bench);
+    }
+    app_bench_periods(&bench, 100);
+    expect_state(STREAM_PROGRAM_STOP);
+    TEST_ASSERT_EQUAL_INT(MACHINE_HELD, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_INT32((X_MM + ROUND_MM) * UNIT, bench.targets[0][bench.recorded - 1u]);
+}
+
+/* The dwell is that after the resume. Chunks are taken meanwhile. */
+static void test_a_program_stop_waits_for_resume(void)
+{
+    const struct chunk_plan second = behind_rest(100, CHUNK_REST_STOP);
+    expect_sent(&path_1);
+    command(COMMAND_START);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, send_at(&second, X_MM + ROUND_MM));
+    until_program_stop();
+    const uint32_t before = bench.recorded;
+    command(COMMAND_RESUME);
+    app_bench_periods(&bench, 50);
+    expect_state(STREAM_OPEN);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, bench.controller.machine.state);
+    expect_both_paths();
+    TEST_ASSERT_TRUE(ticks_at_rest() >= before - ROUND_END + 90u);
+}
+
+static void test_an_optional_stop_has_a_switch(void)
+{
+    TEST_ASSERT_EQUAL_INT(1, read(16));
+    send_rounds(0, CHUNK_REST_OPTIONAL);
+    command(COMMAND_START);
+    until_program_stop();
+    command(COMMAND_RESUME);
+    expect_both_paths();
+    app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+    power_on();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2060, 16, 0, 1));
+    send_rounds(0, CHUNK_REST_OPTIONAL);
+    command(COMMAND_START);
+    expect_both_paths();
+    expect_rest(CHUNK_REST_TICKS);
+}
+
+static void test_commands_in_a_dwell(void)
+{
+    send_rounds(400, 0);
+    command(COMMAND_START);
+    app_bench_periods(&bench, ROUND_END + 100u);
+    command(COMMAND_HOLD);
+    app_bench_periods(&bench, 500);
+    TEST_ASSERT_EQUAL_INT(MACHINE_HELD, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_INT(INT64_C(1) * ROUND_MM << 40, read(11));
+    command(COMMAND_RESUME);
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_INT32((X_MM + ROUND_MM) * UNIT, bench.targets[0][bench.recorded - 1u]);
+    expect_both_paths();
+    TEST_ASSERT_TRUE(ticks_at_rest() >= 902u);
+}
+
+static void test_a_stop_in_a_dwell_ends_the_job(void)
+{
+    for (uint32_t held = 0; held < 2u; ++held) {
+        app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
+        power_on();
+        send_rounds(400, held != 0u ? CHUNK_REST_STOP : 0u);
+        command(COMMAND_START);
+        app_bench_periods(&bench, ROUND_END + 100u);
+        command(COMMAND_STOP);
+        (void)app_bench_until(&bench, MACHINE_READY, 1000);
+        app_bench_period(&bench);
+        expect_state(STREAM_STOPPED);
+        TEST_ASSERT_EQUAL_INT32((X_MM + ROUND_MM) * UNIT, bench.drives[0].position_counts);
+        TEST_ASSERT_EQUAL_INT(INT64_C(1) * ROUND_MM << 40, read(11));
+    }
+}
+
+static void test_what_is_behind_a_rest_has_to_fit(void)
+{
+    struct chunk_plan second = behind_rest(0, 0);
+    const struct chunk_plan moving = {
+        .previous = 0, .from = 9, .joint = 33, .to = 57, .job = JOB, .sequence = 1};
+    expect_sent(&path_1);
+    expect_refused(&moving, PROGRAM_ERR_CHUNK_REST);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, send_at(&second, X_MM + ROUND_MM + 1));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_REST, read(5));
+    second.job_mm++;
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, send_at(&second, X_MM + ROUND_MM));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_REST, read(5));
+    second = behind_rest(5, 4);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_VALUE, send_at(&second, X_MM + ROUND_MM));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, read(5));
+    second = behind_rest(0, 0);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, send_at(&second, X_MM + ROUND_MM));
+}
+
+/* The end of a tail is an end too. */
+static void test_a_rest_behind_a_tail(void)
+{
+    struct chunk_plan first = path_1;
+    const struct chunk_plan second = behind_rest(20, 0);
+    first.flags = CHUNK_FLAG_FIRST;
+    expect_sent(&first);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, send_at(&second, X_MM + ROUND_MM));
+    command(COMMAND_START);
+    expect_both_paths();
+    expect_rest(20);
+}
+
+/* The override holds over the rest. */
+static void test_override_over_a_rest(void)
+{
+    send_rounds(30, 0);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2010, 1, 80, 2));
+    command(COMMAND_START);
+    expect_both_paths();
+    TEST_ASSERT_EQUAL_INT(80, app_bench_read(&bench, 0x2010, 1));
+    TEST_ASSERT_UINT32_WITHIN(4, 2u * ROUND_END * 5u / 4u + 30u, bench.recorded - 200u);
+}
+
 /* Room for two chunks, and no more: flow control. */
 static void test_a_small_ring(void)
 {
@@ -880,6 +1101,15 @@ int main(void)
     RUN_TEST(test_another_configuration_refuses_start_and_chunks);
     RUN_TEST(test_a_main_loop_that_makes_no_records);
     RUN_TEST(test_the_motion_asks_for_records);
+    RUN_TEST(test_a_dwell_takes_its_ticks);
+    RUN_TEST(test_a_chunk_behind_a_rest_may_be_late);
+    RUN_TEST(test_a_program_stop_waits_for_resume);
+    RUN_TEST(test_an_optional_stop_has_a_switch);
+    RUN_TEST(test_commands_in_a_dwell);
+    RUN_TEST(test_a_stop_in_a_dwell_ends_the_job);
+    RUN_TEST(test_what_is_behind_a_rest_has_to_fit);
+    RUN_TEST(test_a_rest_behind_a_tail);
+    RUN_TEST(test_override_over_a_rest);
     RUN_TEST(test_a_small_ring);
     return UNITY_END();
 }

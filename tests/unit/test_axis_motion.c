@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of node/axis_motion.h: the simulated axis of a drive node. */
 #include "node/axis_motion.h"
 
 #include <stdlib.h>

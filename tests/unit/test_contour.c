@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of offline/contour.h: contour error. */
 #include "offline/contour.h"
 
 #include <math.h>

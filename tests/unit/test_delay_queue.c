@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of injector/delay_queue.h: frames that go out later. */
 #include "injector/delay_queue.h"
 
 #include <string.h>

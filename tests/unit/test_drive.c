@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of plant/drive.h: one simulated servo axis in cyclic synchronous position mode. */
 #include "plant/drive.h"
 
 #include <math.h>

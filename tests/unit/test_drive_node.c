@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of node/drive_node.h: one simulated servo drive on the bus. */
 #include "node/drive_node.h"
 
 #include <string.h>

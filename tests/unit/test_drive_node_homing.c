@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of the homing mode of a simulated drive (sim/node/drive_homing.h). */
 #include <math.h>
 
 #include "canopen/cia402.h"

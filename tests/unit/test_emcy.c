@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/emcy.h: emergency messages, error register 0x1001 and history 0x1003. */
 #include "canopen/emcy.h"
 
 #include "canopen/cob.h"
@@ -111,7 +112,7 @@ static void test_a_flood_of_one_code_does_not_push_out_another(void)
     TEST_ASSERT_FALSE(emcy_producer_process(&producer, &out));
 }
 
-/* Also where that is the first of the queue, and another of its code is behind it. */
+/* Also where that is the first of the queue, and another of its code is after it. */
 static void test_of_a_repeated_code_the_oldest_goes(void)
 {
     const uint8_t raised[] = {2, 3, 2, 1, 2};

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of plant/encoder.h: encoder on the motor shaft. */
 #include "plant/encoder.h"
 
 #include "unity.h"

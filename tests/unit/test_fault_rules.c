@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of fault rules: their text, and when and how they act (sim/faults). */
 #define _POSIX_C_SOURCE 200809L /* mkstemp */
 
 #include <stdio.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/heartbeat.h: producer (0x1017) and consumer (0x1016). */
 #include "canopen/heartbeat.h"
 
 #include "canopen/cob.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of plant/influence.h: what acts on an axis beside its setpoints. */
 #include "plant/influence.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/interpolator.h: program time in, point on the path out. */
 #include "core/interpolator.h"
 
 #include "core/override_plan.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of plant/motor.h: motor and ball screw. */
 #include "plant/motor.h"
 
 #include <math.h>

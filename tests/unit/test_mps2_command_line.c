@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of port/mps2/command_line.h: the words that the emulator hands on, in place of a board's straps and
+ * switches. */
 #include "port/mps2/command_line.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* SLCAN on the UART of an emulated board: when the frames of a tick have left. The UART is a model; the core's registers are
- * stood in for here. */
+/* SLCAN on the UART of an emulated board: when the frames of a tick have left. The UART is a model; the core's
+ * registers are stood in for here. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -126,14 +126,14 @@ static void test_before_the_first_tick_nothing_waits(void)
     TEST_ASSERT_TRUE(link_slcan.delivered());
 }
 
-static void test_frames_of_the_mainline_are_not_waited_for(void)
+static void test_frames_of_the_main_loop_are_not_waited_for(void)
 {
     TEST_ASSERT_EQUAL_INT(0, send_frame(0x701, 1, false));
     TEST_ASSERT_GREATER_THAN_UINT32(0, waiting());
     TEST_ASSERT_TRUE(link_slcan.delivered());
 }
 
-/* SYNC and two setpoints, and behind them one of the mainline. */
+/* SYNC and two setpoints, and after them one of the main loop. */
 static void test_the_last_character_of_the_last_frame_of_a_tick_decides(void)
 {
     TEST_ASSERT_EQUAL_INT(0, send_frame(0x601, 8, false));
@@ -197,7 +197,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_before_the_first_tick_nothing_waits);
-    RUN_TEST(test_frames_of_the_mainline_are_not_waited_for);
+    RUN_TEST(test_frames_of_the_main_loop_are_not_waited_for);
     RUN_TEST(test_the_last_character_of_the_last_frame_of_a_tick_decides);
     RUN_TEST(test_the_next_tick_waits_anew);
     RUN_TEST(test_a_refused_frame_is_not_waited_for);

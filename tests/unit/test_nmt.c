@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/nmt.h: the NMT slave's state machine and the master's commands. */
 #include "canopen/nmt.h"
 
 #include "canopen/cob.h"
@@ -102,7 +103,7 @@ static void test_ignores_malformed_frames(void)
     TEST_ASSERT_EQUAL_HEX8(NMT_PRE_OPERATIONAL, slave.state);
 }
 
-static void test_resets_in_the_mainline_and_boots_again(void)
+static void test_resets_in_the_main_loop_and_boots_again(void)
 {
     boot();
     command(NMT_START, 0);
@@ -187,7 +188,7 @@ int main(void)
     RUN_TEST(test_boots_with_one_frame);
     RUN_TEST(test_obeys_its_own_and_common_commands);
     RUN_TEST(test_ignores_malformed_frames);
-    RUN_TEST(test_resets_in_the_mainline_and_boots_again);
+    RUN_TEST(test_resets_in_the_main_loop_and_boots_again);
     RUN_TEST(test_a_reset_is_not_overtaken);
     RUN_TEST(test_nothing_starts_before_the_boot_up);
     RUN_TEST(test_works_without_hooks);

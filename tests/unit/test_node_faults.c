@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of node/node_faults.h: faults injected into simulated drives. */
 #include "node/node_faults.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of node/node_options.h: the command line of hodograph-drive. */
 #include "node/node_options.h"
 
 #include <errno.h>

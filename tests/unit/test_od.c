@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/od.h: an object dictionary. */
 #include "canopen/od.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of offline/offline.h: the whole chain in one process, without a bus. */
 #include "offline/offline.h"
 
 #include <math.h>

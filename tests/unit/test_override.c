@@ -32,7 +32,7 @@ static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "alpha_exponential.hd
                                      "heart_minimax.hdgp", "line.hdgp", "star_minimax.hdgp"};
 #define GOLDENS (sizeof GOLDEN / sizeof *GOLDEN)
 
-enum wish { RUN, HOLD, STOP };
+enum wanted { RUN, HOLD, STOP };
 enum phase { PLAN, BRAKE, REST }; /* of feed_override.c */
 
 static struct override_program bank[4][LINES];
@@ -52,15 +52,14 @@ static struct {
     struct interpolator exact;
     struct interpolator_point point;
     double h;
-    enum wish wish;
+    enum wanted wanted;
     int fault;         /* a fault stop was asked for */
     unsigned asked;    /* tick of the last hold, stop or fault stop, */
     uint32_t bound_us; /* and its bound */
     uint32_t percent;
     int line;
     unsigned number;
-    unsigned known; /* setpoints in `arc` */
-    double arc[4];
+    struct override_trace trace;
     uint64_t time_q42;
     double time_s;
     uint32_t piece;
@@ -212,21 +211,19 @@ static void check_arc(double arc)
     at_most("arc length", fabs(arc - d[0]), 3e-10);
 }
 
-static void check_differences(double arc)
+static void check_differences(void)
 {
     const double more = now.fault ? 2 : 1; /* codes of a fault stop are 8 steps higher: twice */
-    memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
-    now.arc[3] = arc;
-    if (++now.known < 4) {
+    const struct override_limits *limit = &now.p->limit;
+    struct override_differences d;
+    if (!override_trace_add(&now.trace, now.point.arc_length_q40_mm, now.h, &d)) {
         return;
     }
-    const double jerk =
-        fabs(now.arc[3] - 3 * now.arc[2] + 3 * now.arc[1] - now.arc[0]) / (now.h * now.h * now.h);
-    const double a = fabs(now.arc[3] - 2 * now.arc[2] + now.arc[1]) / (now.h * now.h);
-    at_most("jerk by differences", jerk, more * now.p->limit.jerk * (1 + 1e-6) + 1.0);
-    at_most("acceleration by differences", a, more * now.p->limit.acceleration * (1 + 1e-6) + 1e-3);
-    at_most("never backwards", now.arc[2] - now.arc[3], 2e-10);
-    worst.difference = fmax(worst.difference, jerk / now.p->limit.jerk / more);
+    at_most("jerk by differences", d.jerk, more * limit->jerk * (1 + 1e-6) + 1.0);
+    at_most("acceleration by differences", d.acceleration,
+            more * limit->acceleration * (1 + 1e-6) + 1e-3);
+    at_most("never backwards", d.back_mm, 2e-10);
+    worst.difference = fmax(worst.difference, d.jerk / limit->jerk / more);
 }
 
 /* Setpoints lie on the curve. */
@@ -239,18 +236,10 @@ static void check_point(void)
                 fabs((double)(now.point.position_q40[0] - now.point.arc_length_q40_mm)), 400);
         at_most("on the line", fabs((double)now.point.position_q40[1]), 0);
     } else if (now.ticks % 16u == 0 || now.feed.state == FEED_ENDED) {
-        struct interpolator_point exact;
         interpolator_seek(&now.exact, now.time_q42 >> 10);
-        while (interpolator_at_arc_length(&now.exact, now.point.arc_length_q40_mm, &exact) < 0) {
-            TEST_ASSERT_TRUE(now.exact.segment->to_q40_mm != INT64_MAX);
-            (void)interpolator_at_arc_length(&now.exact, now.exact.segment->to_q40_mm, &exact);
-        }
-        at_most("on the curve",
-                hypot((double)(exact.position_q40[0] - now.point.position_q40[0]),
-                      (double)(exact.position_q40[1] - now.point.position_q40[1])),
-                1.1e6);
+        at_most("on the curve", override_distance_q40(&now.exact, &now.point), 1.1e6);
     }
-    check_differences(arc);
+    check_differences();
 }
 
 static enum feed_state expected_state(void)
@@ -259,13 +248,13 @@ static enum feed_state expected_state(void)
         TEST_ASSERT_TRUE(now.time_q42 == now.p->program.header.duration_q32_s << 10);
         return FEED_ENDED;
     }
-    if (now.wish == RUN) {
+    if (now.wanted == RUN) {
         return FEED_RUNNING;
     }
     if (now.feed.phase == REST) {
-        return now.wish == STOP ? FEED_STOPPED : FEED_HELD;
+        return now.wanted == STOP ? FEED_STOPPED : FEED_HELD;
     }
-    return now.wish == STOP ? FEED_STOPPING : FEED_HOLDING;
+    return now.wanted == STOP ? FEED_STOPPING : FEED_HOLDING;
 }
 
 static int over(void)
@@ -296,7 +285,7 @@ static void tick(void)
         TEST_FAIL_MESSAGE(where("late", now.bound_us, 0));
     }
     /* a program that ends before its brake would is judged by feed_override_late */
-    if (!rested && at_rest() && now.wish != RUN && now.bound_us != 0 &&
+    if (!rested && at_rest() && now.wanted != RUN && now.bound_us != 0 &&
         now.feed.state != FEED_ENDED) {
         at_most("bound", (double)(now.ticks + 1u - now.asked) * now.h * 1e6, now.bound_us);
         worst.of_bound =
@@ -321,7 +310,7 @@ static void ask(enum program_stop_kind kind)
 static void stop(uint64_t *random)
 {
     if (golden_random(random) % 2u == 0) {
-        if (now.wish == RUN) {
+        if (now.wanted == RUN) {
             ask(PROGRAM_STOP_HOLD);
         }
         feed_override_stop(&now.feed);
@@ -332,7 +321,7 @@ static void stop(uint64_t *random)
         now.fault = 1;
         feed_override_fault_stop(&now.feed);
     }
-    now.wish = STOP;
+    now.wanted = STOP;
 }
 
 static void command(uint64_t *random)
@@ -340,16 +329,16 @@ static void command(uint64_t *random)
     switch (golden_random(random) % 8u) {
     case 0:
     case 1:
-        if (now.wish == RUN) {
+        if (now.wanted == RUN) {
             ask(PROGRAM_STOP_HOLD);
         }
         feed_override_hold(&now.feed);
-        now.wish = now.wish == RUN ? HOLD : now.wish;
+        now.wanted = now.wanted == RUN ? HOLD : now.wanted;
         break;
     case 2:
     case 3:
         feed_override_resume(&now.feed);
-        now.wish = now.wish == HOLD ? RUN : now.wish;
+        now.wanted = now.wanted == HOLD ? RUN : now.wanted;
         break;
     case 4:
         if (golden_random(random) % 2u == 0) {
@@ -409,7 +398,7 @@ static void begin(uint64_t *random)
     }
 }
 
-/* Whatever the commands were, the wish is fulfilled in the time that the least bounds take. */
+/* Whatever the commands were, the command is executed in the time that the least bounds take. */
 static void finish(void)
 {
     struct ramp_ticks down;
@@ -425,7 +414,7 @@ static void finish(void)
     for (int64_t i = 0; i < ticks && !over(); i++) {
         int64_t rate = now.feed.plan.now.override_q57;
         int still = now.feed.plan.now.slope_q56 == 0 && now.feed.phase == PLAN;
-        if (now.wish == RUN
+        if (now.wanted == RUN
                 ? still && rate >= wanted - 100 &&
                       (now.percent * (OVERRIDE_ONE / 100) > now.feed.plan.guaranteed_q57 ||
                        rate <= wanted + 100)
@@ -442,7 +431,7 @@ static void finish(void)
 static void run_to_the_end(void)
 {
     feed_override_resume(&now.feed);
-    now.wish = now.wish == HOLD ? RUN : now.wish;
+    now.wanted = now.wanted == HOLD ? RUN : now.wanted;
     if (now.percent < 50) {
         feed_override_set(&now.feed, now.percent = 50);
     }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/override_plan.h: which override ramp comes next on the way to the commanded override, and a tick
+ * of it. */
 #include "core/override_plan.h"
 
 #include <string.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/override_ramp.h: ramps of the feed override from one constant value to another. */
 #include "core/override_ramp.h"
 
 #include <math.h>

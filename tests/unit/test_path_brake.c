@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/path_brake.h: a path stop: an S-curve of path speed, decided anew in each tick. */
 #include "core/path_brake.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of plant/pdff.h: PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time. */
 #include "plant/pdff.h"
 
 #include "unity.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/pdo.h: the fixed process data of the bus. */
 #include "canopen/pdo.h"
 
 #include "canopen/cob.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/pdo_map.h: one remappable PDO of a device. */
 #include "canopen/pdo_map.h"
 
 #include "canopen/cob.h"

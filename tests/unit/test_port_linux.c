@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The Linux port on SocketCAN: when the frames of a tick have been sent. The kernel, the clock and the interrupts are stood in
- * for here; every test is linked with fake_port, so the functions of port.h are compiled under other names. */
+/* The Linux port on SocketCAN: when the frames of a tick have been sent. The kernel, the clock and the interrupts are
+ * stood in for here; every test is linked with fake_port, so the functions of port.h are compiled under other names. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <stdbool.h>
@@ -132,7 +132,7 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
     return 0;
 }
 
-void interrupts_mainline_sleeps(void)
+void interrupts_main_loop_sleeps(void)
 {
 }
 
@@ -248,7 +248,7 @@ static void test_before_the_first_tick_nothing_waits(void)
     TEST_ASSERT_TRUE(linux_can_delivered());
 }
 
-static void test_frames_of_the_mainline_are_not_waited_for(void)
+static void test_frames_of_the_main_loop_are_not_waited_for(void)
 {
     TEST_ASSERT_EQUAL_INT(0, send_frame(0x601, false));
     TEST_ASSERT_TRUE(linux_can_delivered());
@@ -353,7 +353,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_before_the_first_tick_nothing_waits);
-    RUN_TEST(test_frames_of_the_mainline_are_not_waited_for);
+    RUN_TEST(test_frames_of_the_main_loop_are_not_waited_for);
     RUN_TEST(test_every_frame_of_a_tick_is_waited_for);
     RUN_TEST(test_a_frame_of_another_node_is_no_receipt);
     RUN_TEST(test_a_receipt_counts_once);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of port/linux/schedule.h: when the next tick is due. */
 #include "port/linux/schedule.h"
 
 #include "unity.h"
@@ -72,7 +73,7 @@ static void test_who_is_not_ready_in_time_makes_the_tick_late(void)
     TEST_ASSERT_EQUAL_UINT64(2u * MS, tick(2u * MS));
 }
 
-/* Two thirds of the time at most: the rest is for the mainline. */
+/* Two thirds of the time at most: the rest is for the main loop. */
 static void test_a_slow_machine_rests_half_of_what_it_worked(void)
 {
     const uint64_t start_ns = schedule.due_ns;
@@ -152,13 +153,13 @@ static void test_a_stall_counts_as_one_slice_of_20_ms(void)
     TEST_ASSERT_EQUAL_UINT64_MESSAGE(due_ns, schedule.due_ns, "nobody is waited for any more");
 }
 
-/* Whether the tick that is due is put off; the mainline has had `had_ns` of the processor. */
+/* Whether the tick that is due is put off; the main loop has had `had_ns` of the processor. */
 static bool put_off(uint64_t now_ns, uint32_t turns, uint64_t had_ns)
 {
     return schedule_overdue(&schedule, now_ns, turns) && schedule_yield(&schedule, now_ns, had_ns);
 }
 
-static void test_a_mainline_that_sleeps_now_and_then_delays_nothing(void)
+static void test_a_main_loop_that_sleeps_now_and_then_delays_nothing(void)
 {
     for (uint32_t k = 1; k < 1000u; ++k) {
         TEST_ASSERT_FALSE(put_off(schedule.due_ns, k / 10u, 0));
@@ -166,11 +167,11 @@ static void test_a_mainline_that_sleeps_now_and_then_delays_nothing(void)
     }
 }
 
-static void test_a_mainline_that_computes_delays_nothing(void)
+static void test_a_main_loop_that_computes_delays_nothing(void)
 {
     for (uint32_t k = 1; k < 1000u; ++k) {
         const uint64_t now_ns = schedule.due_ns;
-        TEST_ASSERT_FALSE(put_off(now_ns, 1, now_ns / SCHEDULE_MAINLINE_SHARE));
+        TEST_ASSERT_FALSE(put_off(now_ns, 1, now_ns / SCHEDULE_MAIN_LOOP_SHARE));
         (void)tick(0);
     }
 }
@@ -187,7 +188,7 @@ static void starve(void)
     TEST_ASSERT_TRUE(ticks > SCHEDULE_TURN_NS / MS);
 }
 
-static void test_a_starved_mainline_gets_10_ms_before_each_tick(void)
+static void test_a_starved_main_loop_gets_10_ms_before_each_tick(void)
 {
     starve();
     for (unsigned ms = 1; ms < 10u; ++ms) {
@@ -200,7 +201,7 @@ static void test_a_starved_mainline_gets_10_ms_before_each_tick(void)
     TEST_ASSERT_TRUE_MESSAGE(put_off(schedule.due_ns, 1, 0), "and before the next one");
 }
 
-static void test_after_its_turn_the_mainline_is_not_waited_for(void)
+static void test_after_its_turn_the_main_loop_is_not_waited_for(void)
 {
     starve();
     TEST_ASSERT_FALSE(put_off(schedule.due_ns, 2, 0));
@@ -209,7 +210,7 @@ static void test_after_its_turn_the_mainline_is_not_waited_for(void)
 }
 
 /* 5 s without any processor: of the 10 ms two are gone. */
-static void test_a_stall_is_no_time_for_the_mainline(void)
+static void test_a_stall_is_no_time_for_the_main_loop(void)
 {
     starve();
     const uint64_t now_ns = schedule.due_ns + 5000u * (uint64_t)MS;
@@ -230,7 +231,7 @@ static void test_no_tick_is_put_off_for_real_drives(void)
     TEST_ASSERT_FALSE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
 }
 
-static void test_a_mainline_that_is_stuck_is_left(void)
+static void test_a_main_loop_that_is_stuck_is_left(void)
 {
     unsigned yields = 0;
     starve();
@@ -291,12 +292,12 @@ int main(void)
     RUN_TEST(test_whoever_is_never_ready_is_left_after_the_guard);
     RUN_TEST(test_the_guard_is_counted_in_slices);
     RUN_TEST(test_a_stall_counts_as_one_slice_of_20_ms);
-    RUN_TEST(test_a_mainline_that_sleeps_now_and_then_delays_nothing);
-    RUN_TEST(test_a_mainline_that_computes_delays_nothing);
-    RUN_TEST(test_a_starved_mainline_gets_10_ms_before_each_tick);
-    RUN_TEST(test_after_its_turn_the_mainline_is_not_waited_for);
-    RUN_TEST(test_a_stall_is_no_time_for_the_mainline);
-    RUN_TEST(test_a_mainline_that_is_stuck_is_left);
+    RUN_TEST(test_a_main_loop_that_sleeps_now_and_then_delays_nothing);
+    RUN_TEST(test_a_main_loop_that_computes_delays_nothing);
+    RUN_TEST(test_a_starved_main_loop_gets_10_ms_before_each_tick);
+    RUN_TEST(test_after_its_turn_the_main_loop_is_not_waited_for);
+    RUN_TEST(test_a_stall_is_no_time_for_the_main_loop);
+    RUN_TEST(test_a_main_loop_that_is_stuck_is_left);
     RUN_TEST(test_no_tick_is_put_off_for_real_drives);
     RUN_TEST(test_lock_step_in_a_hurry_is_due_when_all_are_ready);
     RUN_TEST(test_lock_step_without_hurry_goes_by_the_clock);

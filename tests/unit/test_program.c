@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/program.h: reading header, segments, feed pieces and stops of a program image. */
 #include "core/program.h"
 
 #include "core/counts.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of core/program_time.h: the program time at which a program comes to an arc length. */
 #include "core/program_time.h"
 
 #include "core/interpolator.h"

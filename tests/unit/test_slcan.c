@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of can/slcan.h: CAN frames as lines of text, as LAWICEL's adapters and their many descendants have them. */
 #include "can/slcan.h"
 
 #include <string.h>

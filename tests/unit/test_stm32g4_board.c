@@ -199,7 +199,7 @@ static void expect_on_the_bus(uint32_t id)
     irq_can();
 }
 
-static void test_the_mainline_stays_back_before_a_tick(void)
+static void test_the_main_loop_stays_back_before_a_tick(void)
 {
     const struct can_msg answer = {.id = 0x581, .len = 8};
     const struct can_msg sync = {.id = 0x080, .len = 1};
@@ -225,7 +225,7 @@ static void test_the_mainline_stays_back_before_a_tick(void)
 }
 
 /* A frame takes longer than a period there. */
-static void test_on_the_slowest_bus_the_mainline_has_its_turn(void)
+static void test_on_the_slowest_bus_the_main_loop_has_its_turn(void)
 {
     const struct can_msg answer = {.id = 0x581, .len = 8};
     tick_timer_begin(170);
@@ -330,8 +330,8 @@ int main(void)
     RUN_TEST(test_the_counter_may_wrap);
     RUN_TEST(test_a_new_period_counts_from_the_next_tick);
     RUN_TEST(test_the_tick_is_above_the_receiver_and_kept_out_of_the_application);
-    RUN_TEST(test_the_mainline_stays_back_before_a_tick);
-    RUN_TEST(test_on_the_slowest_bus_the_mainline_has_its_turn);
+    RUN_TEST(test_the_main_loop_stays_back_before_a_tick);
+    RUN_TEST(test_on_the_slowest_bus_the_main_loop_has_its_turn);
     RUN_TEST(test_the_watchdog_is_fed_while_ticks_go_on);
     RUN_TEST(test_a_bite_is_told_once_and_forgotten);
     RUN_TEST(test_the_clock_tree);

@@ -250,8 +250,8 @@ static void test_a_full_queue_refuses_and_keeps_its_order(void)
     TEST_ASSERT_FALSE(fdcan_model_transmit(&frame));
 }
 
-/* However much the mainline wants to send, a tick's frames come after one of them at most. */
-static void test_the_mainline_holds_up_the_tick_by_one_frame(void)
+/* However much the main loop wants to send, a tick's frames come after one of them at most. */
+static void test_the_main_loop_holds_up_the_tick_by_one_frame(void)
 {
     start();
     for (uint32_t i = 0; i < FDCAN_QUEUE_SIZE; ++i) {
@@ -307,7 +307,7 @@ static void test_frames_of_the_interrupts_are_delivered_when_they_are_on_the_bus
     TEST_ASSERT_TRUE(fdcan_delivered(&can));
 }
 
-static void test_frames_of_the_mainline_are_not_waited_for(void)
+static void test_frames_of_the_main_loop_are_not_waited_for(void)
 {
     start();
     TEST_ASSERT_TRUE(send(10, FDCAN_ORDINARY));
@@ -379,10 +379,10 @@ int main(void)
     RUN_TEST(test_a_length_above_eight_means_eight);
     RUN_TEST(test_frames_go_in_order);
     RUN_TEST(test_a_full_queue_refuses_and_keeps_its_order);
-    RUN_TEST(test_the_mainline_holds_up_the_tick_by_one_frame);
+    RUN_TEST(test_the_main_loop_holds_up_the_tick_by_one_frame);
     RUN_TEST(test_nothing_is_taken_off_the_bus);
     RUN_TEST(test_frames_of_the_interrupts_are_delivered_when_they_are_on_the_bus);
-    RUN_TEST(test_frames_of_the_mainline_are_not_waited_for);
+    RUN_TEST(test_frames_of_the_main_loop_are_not_waited_for);
     RUN_TEST(test_after_bus_off_it_comes_back_with_nothing_old);
     RUN_TEST(test_errors_are_told);
     return UNITY_END();

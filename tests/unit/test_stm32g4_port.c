@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The functions of port.h as the board has them, on a model of the chip: every test is linked with fake_port, so they are
- * compiled here under other names. */
+/* The functions of port.h as the board has them, on a model of the chip: every test is linked with fake_port, so they
+ * are compiled here under other names. */
 #define port_begin          board_begin
 #define port_end            board_end
 #define port_stop_requested board_stop_requested
@@ -170,7 +170,7 @@ static void test_the_context_decides_whose_turn_it_is(void)
     for (unsigned i = 0; i < 3u; ++i) {
         TEST_ASSERT_EQUAL_INT(0, port_can_send(&message));
     }
-    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, fdcan_model_waiting(), "the mainline's go one at a time");
+    TEST_ASSERT_EQUAL_UINT_MESSAGE(1, fdcan_model_waiting(), "the main loop's go one at a time");
     TEST_ASSERT_TRUE(port_can_delivered());
     chip_in_handler(true);
     for (unsigned i = 0; i < 2u; ++i) {
@@ -202,7 +202,7 @@ static void test_the_lock_holds_off_both(void)
     TEST_ASSERT_EQUAL_UINT32(5, ticks);
 }
 
-static void test_the_watchdog_lives_on_ticks_and_mainline(void)
+static void test_the_watchdog_lives_on_ticks_and_main_loop(void)
 {
     start();
     port_wait(2000);
@@ -312,7 +312,7 @@ int main(void)
     RUN_TEST(test_waiting_ends_with_its_time_or_a_wake);
     RUN_TEST(test_the_context_decides_whose_turn_it_is);
     RUN_TEST(test_the_lock_holds_off_both);
-    RUN_TEST(test_the_watchdog_lives_on_ticks_and_mainline);
+    RUN_TEST(test_the_watchdog_lives_on_ticks_and_main_loop);
     RUN_TEST(test_the_watchdog_lives_through_long_work);
     RUN_TEST(test_spoiled_words_are_taken_before_the_start_only);
     RUN_TEST(test_a_spoiled_word_of_the_code_is_the_end_at_any_time);

@@ -28,6 +28,9 @@
 #define CACHE_MOST 65536u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
 
+/* Found among 10^6: a hold while the override rises is late by the bound of the piece where it was commanded. */
+#define HOLD_IN_A_RISE 525090u
+
 static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp", "line.hdgp",
                                      "alpha_exponential.hdgp"};
 
@@ -62,8 +65,7 @@ static struct {
     struct interpolator path;
     struct interpolator_point point;
     double h;
-    double arc[4];
-    uint32_t known; /* setpoints in `arc` */
+    struct override_trace trace;
     uint32_t which;
     uint32_t held;      /* 1: a hold was commanded */
     uint32_t fault;     /* 1: a fault stop */
@@ -192,36 +194,24 @@ static void make_whole(uint32_t w, uint64_t *random)
 static void check_differences(void)
 {
     const double more = now.fault != 0u ? 2 : 1; /* its codes are twice those of a hold */
-    memmove(now.arc, now.arc + 1, 3 * sizeof *now.arc);
-    now.arc[3] = (double)now.point.arc_length_q40_mm / 1099511627776.0;
-    if (++now.known < 4) {
+    const struct override_limits *limit = &now.p->limit;
+    struct override_differences d;
+    if (!override_trace_add(&now.trace, now.point.arc_length_q40_mm, now.h, &d)) {
         return;
     }
-    const double jerk =
-        fabs(now.arc[3] - 3 * now.arc[2] + 3 * now.arc[1] - now.arc[0]) / (now.h * now.h * now.h);
-    const double a = fabs(now.arc[3] - 2 * now.arc[2] + now.arc[1]) / (now.h * now.h);
-    at_most("jerk", jerk, more * now.p->limit.jerk * (1 + 1e-6) + 1.0);
-    at_most("acceleration", a, more * now.p->limit.acceleration * (1 + 1e-6) + 1e-3);
-    at_most("never backwards", now.arc[2] - now.arc[3], 2e-10);
-    seen.jerk = fmax(seen.jerk, jerk / now.p->limit.jerk / more);
+    at_most("jerk", d.jerk, more * limit->jerk * (1 + 1e-6) + 1.0);
+    at_most("acceleration", d.acceleration, more * limit->acceleration * (1 + 1e-6) + 1e-3);
+    at_most("never backwards", d.back_mm, 2e-10);
+    seen.jerk = fmax(seen.jerk, d.jerk / limit->jerk / more);
 }
 
 /* Setpoints lie on the path of the whole program: each eighth, and all at rest. */
 static void check_path(void)
 {
-    struct interpolator_point exact;
-    const int64_t arc = now.point.arc_length_q40_mm;
     if (now.m.tick % 8u != 0 && feed_override_feed_q32(&now.m.feed) != 0) {
         return;
     }
-    while (interpolator_at_arc_length(&now.path, arc, &exact) < 0) {
-        TEST_ASSERT_TRUE(now.path.segment->to_q40_mm != INT64_MAX);
-        (void)interpolator_at_arc_length(&now.path, now.path.segment->to_q40_mm, &exact);
-    }
-    at_most("on the path",
-            hypot((double)(exact.position_q40[0] - now.point.position_q40[0]),
-                  (double)(exact.position_q40[1] - now.point.position_q40[1])),
-            1.2e6);
+    at_most("on the path", override_distance_q40(&now.path, &now.point), 1.2e6);
 }
 
 /* In time and without commands: what the whole program has. */
@@ -488,6 +478,8 @@ static void test_cuts_at_any_instant(void)
         now.number = i;
         run_case(seed * 0x100000001u + i);
     }
+    now.number = HOLD_IN_A_RISE;
+    run_case(seed * 0x100000001u + HOLD_IN_A_RISE);
     printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
            "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
            "the whole; %u windows of records; jerk %.4f of the limit\n",

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of canopen/sync.h: SYNC with counter, producer and consumer. */
 #include "canopen/sync.h"
 
 #include "canopen/cob.h"

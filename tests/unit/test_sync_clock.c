@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Tests of node/sync_clock.h: the time base of a simulated drive. */
 #include "node/sync_clock.h"
 
 #include <string.h>

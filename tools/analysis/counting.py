@@ -70,7 +70,7 @@ class Counter:
         times: Path | None = None,
         setpoints: Path | None = None,
     ) -> Counts:
-        """Instructions of each tick of one or more images one behind the other, (ticks, len(names)).
+        """Instructions of each tick of one or more images one after the other, (ticks, len(names)).
 
         `times` gets what the image's own clock says, `setpoints` its setpoints.
         """

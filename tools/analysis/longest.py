@@ -154,7 +154,7 @@ class Longest:
 
 
 def _knots(follow: dict[int, list[int]], start: int) -> Iterable[list[int]]:
-    """Strongly connected parts of what can be reached, each behind all that can follow it (Tarjan's algorithm)."""
+    """Strongly connected parts of what can be reached, each after all that can follow it (Tarjan's algorithm)."""
     number: dict[int, int] = {}
     low: dict[int, int] = {}
     stack: list[int] = []

@@ -79,7 +79,7 @@ def disassemble(cross: str, image: Path) -> list[Instruction]:
 
 
 def returns_to(code: list[Instruction], function: str) -> list[int]:
-    """Addresses behind the calls of a function."""
+    """Addresses after the calls of a function."""
     return [
         behind.address
         for call, behind in itertools.pairwise(code)
@@ -159,7 +159,7 @@ def interrupt_lines(code: list[Instruction], handler: str) -> Iterator[str]:
 
 
 def _ends(code: list[Instruction], entry: str) -> Iterator[str]:
-    """Where a call is over: behind what calls it; of a handler in the table of vectors where it returns."""
+    """Where a call is over: after what calls it; of a handler in the table of vectors where it returns."""
     after = returns_to(code, entry)
     yield from (f"end {a:x}" for a in after)
     if not after:

@@ -59,7 +59,7 @@ def frame(image: Image, function: Function) -> Frame:
     calls: set[Call] = set()
     todo, jumped = [(0, 0)], -1
     while todo or jumped >= 0:
-        if not todo:  # behind a jump by a table: whatever no other way leads to
+        if not todo:  # after a jump by a table: whatever no other way leads to
             left = [i for i in index.values() if i not in taken]
             if not left:
                 break
@@ -122,7 +122,7 @@ class Stack:
 
     @cached_property
     def parts(self) -> dict[str, Need]:
-        """The mainline, then each level of interrupts with its exception frame."""
+        """The main loop, then each level of interrupts with its exception frame."""
         symbols = self.image.symbols
         found = {"main": self.worst(self.image.function_at(symbols["startup_reset"] & ~1))}
         for handler in self._handlers():
@@ -136,7 +136,7 @@ class Stack:
 
     @property
     def bytes(self) -> int:
-        """The bound: the mainline and all levels one upon the other."""
+        """The bound: the main loop and all levels one upon the other."""
         return sum(need.bytes for need in self.parts.values())
 
     def _handlers(self) -> list[Function]:

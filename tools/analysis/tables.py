@@ -278,10 +278,10 @@ def worst_of(rows: Iterable[Figures]) -> int:
 
 _KINDS = {
     "steady": "steady, or found to be",
-    "moves": "the rate moves",
+    "moves": "the override changes",
     "chooses": "chooses",
-    "looks": "looks at a window",
-    "begins": "begins a move",
+    "looks": "evaluates a window",
+    "begins": "begins a ramp",
 }
 
 

@@ -31,12 +31,8 @@ from dist.runtime import PYTHON, SITE, pip_install
 PARTS = ROOT / "packaging/debian"
 HOME = Path("usr/lib/hodograph")
 LAUNCHER = f"""\
-#!/{HOME}/bin/python3
-import sys
-
-from hodograph.cli.main import main
-
-sys.exit(main())
+#!/bin/sh
+exec /{HOME}/bin/python3 -P -m hodograph "$@"
 """
 COPYRIGHT = """\
 Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
@@ -103,11 +99,21 @@ def stage_python(build: Path, stage: Path, work: Path) -> None:
     (share / "zsh/site-functions").rename(share / "zsh/vendor-completions")
     shutil.copytree(share, stage / "usr/share", dirs_exist_ok=True)
     shutil.rmtree(share)
-    for told in site.glob("hodograph-*.dist-info/direct_url.json"):
-        told.unlink()  # where the wheel lay on this computer
+    (information,) = site.glob("hodograph-*.dist-info")
+    forget_origin(information)
     command = stage / "usr/bin/hodograph"
     command.write_text(LAUNCHER, encoding="utf-8")
     command.chmod(0o755)
+
+
+def forget_origin(information: Path) -> None:
+    """Takes where the wheel lay on this computer out of the information that pip leaves about it."""
+    name = "direct_url.json"
+    (information / name).unlink()
+    record = information / "RECORD"
+    lines = record.read_bytes().splitlines(keepends=True)
+    told = f"{information.name}/{name},".encode()
+    record.write_bytes(b"".join(line for line in lines if not line.startswith(told)))
 
 
 def set_times(folder: Path, time_s: int) -> None:

@@ -4,9 +4,9 @@
 
     install.py install|uninstall --build BUILD --prefix PREFIX [--destdir DIR] [--libdir DIR]
 
-Programs, library, headers, EDS files, examples and, where they are there, manual pages. With --destdir everything lies
-below that folder, and the files still name PREFIX; so packages are made. `uninstall` removes what `install` with the same
-options would write, and the folders that are empty then. Standard library only.
+Programs with their man pages, library, headers, EDS files and examples. With --destdir everything lies below that
+folder, and the files still name PREFIX; so packages are made. `uninstall` removes what `install` with the same options
+would write, and the folders that are empty then. Standard library only.
 """
 
 from __future__ import annotations
@@ -21,9 +21,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from dist.library import PARTS, ROOT, Abi, filled, version
-
-MANUAL_PAGES = ("docs/man", "build/man")
-"""Where manual pages may lie."""
+from dist.program_page import program_page
 
 
 @dataclass(frozen=True)
@@ -98,21 +96,19 @@ def library_items(library: Path, places: Places) -> list[Item]:
 
 
 def other_items(build: Path, library: Path, places: Places) -> list[Item]:
-    """Programs, EDS files, examples, manual pages, licence."""
-    items = [
-        Item(places.prefix / "bin" / program.name, program.read_bytes(), 0o755)
-        for program in sorted((build / "bin").glob("hodograph-*"))
-    ]
+    """Programs, man pages, EDS files, examples, licence."""
+    items = []
+    for program in sorted((build / "bin").glob("hodograph-*")):
+        items.append(Item(places.prefix / "bin" / program.name, program.read_bytes(), 0o755))
+        page = program_page(program, version())
+        if page is not None:
+            items.append(Item(places.prefix / f"share/man/man1/{program.name}.1", page))
     for eds in (ROOT / "firmware/app/controller.eds", ROOT / "sim/node/drive.eds"):
         items.append(Item(places.data / "eds" / eds.name, eds.read_bytes()))
     examples = library / "tree/examples"
     for file in sorted(path for path in examples.rglob("*") if path.is_file()):
         target = places.data / "examples/embed" / file.relative_to(examples)
         items.append(Item(target, file.read_bytes()))
-    for folder in MANUAL_PAGES:
-        for page in sorted((ROOT / folder).glob("*.[1-8]")):
-            section = f"share/man/man{page.suffix[1:]}"
-            items.append(Item(places.prefix / section / page.name, page.read_bytes()))
     for name in ("LICENSE", "CHANGELOG.md"):
         items.append(Item(places.prefix / "share/doc/hodograph" / name, (ROOT / name).read_bytes()))
     return items

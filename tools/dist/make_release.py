@@ -20,6 +20,7 @@ import sys
 import sysconfig
 import tarfile
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -35,14 +36,20 @@ def epoch_s() -> int:
     return int(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def backend(what: str, tree: Path, out: Path, time_s: int) -> None:
-    """Calls build_sdist or build_wheel of the build backend in a tree; raises CalledProcessError."""
-    environment = os.environ | {
-        "SOURCE_DATE_EPOCH": str(time_s),
-        "HODOGRAPH_BUILT_BY_MAKE": "",
+def build_environment(time_s: int, given: Mapping[str, str]) -> dict[str, str]:
+    """Of the build backend. $LDSHARED stays as it is given: it links for another platform."""
+    return {
         # Python's own link command may name folders of this computer, which the module would then search.
         "LDSHARED": f"{sysconfig.get_config_var('CC') or 'cc'} -shared",
+        **given,
+        "SOURCE_DATE_EPOCH": str(time_s),
+        "HODOGRAPH_BUILT_BY_MAKE": "",
     }
+
+
+def backend(what: str, tree: Path, out: Path, time_s: int) -> None:
+    """Calls build_sdist or build_wheel of the build backend in a tree; raises CalledProcessError."""
+    environment = build_environment(time_s, os.environ)
     command = [sys.executable, "-c", _BUILD.format(what=what, out=str(out))]
     subprocess.run(command, check=True, cwd=tree, env=environment, stdout=subprocess.DEVNULL)
 

@@ -23,6 +23,12 @@ PROGRAMS = {
 }
 """Name and main file of each."""
 
+
+def programs_for(platform: str) -> dict[str, str]:
+    """Those that a platform, as sys.platform names it, can have: they need Linux. The native module does not."""
+    return PROGRAMS if platform == "linux" else {}
+
+
 FOLDERS = (
     "firmware/app",
     "firmware/app/*",
@@ -69,7 +75,13 @@ def generate_object_dictionaries(root: Path, work: Path) -> list[Path]:
 
 
 def build_programs(root: Path, work: Path, out: Path) -> list[Path]:
-    """Compiles and links all programs into `out`; raises CalledProcessError with the compiler's own message before."""
+    """Compiles and links all programs of this platform into `out`; elsewhere nothing.
+
+    Raises CalledProcessError, with the compiler's own message before.
+    """
+    programs = programs_for(sys.platform)
+    if not programs:
+        return []
     out.mkdir(parents=True, exist_ok=True)
     generated = generate_object_dictionaries(root, work / "generated")
     include = [f"-I{root / folder}" for folder in ("firmware", "sim")]
@@ -86,12 +98,12 @@ def build_programs(root: Path, work: Path, out: Path) -> list[Path]:
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         parts = list(pool.map(compiled, [*library_sources(root), *generated]))
-        mains = list(pool.map(compiled, [root / main for main in PROGRAMS.values()]))
+        mains = list(pool.map(compiled, [root / main for main in programs.values()]))
     archive = work / "libhodograph.a"
     archive.unlink(missing_ok=True)
     subprocess.run([*archiver(), "rcsD", str(archive), *map(str, parts)], check=True)
     made = []
-    for name, main in zip(PROGRAMS, mains, strict=True):
+    for name, main in zip(programs, mains, strict=True):
         target = out / name
         subprocess.run(
             [*compiler(), "-s", "-o", str(target), str(main), str(archive), *LIBRARIES], check=True

@@ -336,7 +336,7 @@ def _changed_frames(frames: Any, random: Random) -> Any:
             changed = changed[: at + 1]
         if changed.size == 0:
             return frames
-    for i in range(changed.size):  # bytes behind the length are in no file
+    for i in range(changed.size):  # bytes after the length are in no file
         changed["data"][i, changed["length"][i] :] = 0
     return changed
 

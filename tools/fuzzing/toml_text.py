@@ -227,7 +227,7 @@ class _Writer:
         if not math.isfinite(value):
             return repr(value)
         if self._chance(0.3):
-            return f"{value:.17e}"  # 17 digits behind the point: the same double
+            return f"{value:.17e}"  # 17 digits after the point: the same double
         text = repr(value)
         return text if any(mark in text for mark in ".e") else text + ".0"
 

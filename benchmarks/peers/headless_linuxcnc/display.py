@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The DISPLAY of a headless LinuxCNC: switches the machine on, homes it, runs program.ngc and records samples.txt.
 
-LinuxCNC starts it with Debian's own Python, which has the module `linuxcnc`; PEER_FOLDER has the files.
+memory.txt gets the peak resident size of the processes that read and plan, in KiB. LinuxCNC starts it with Debian's own
+Python, which has the module `linuxcnc`; PEER_FOLDER has the files.
 """
 
 import os
@@ -50,6 +51,16 @@ def switch_on():
     command.wait_complete()
 
 
+def peak_memory_kib():
+    """Of milltask and rtapi_app together."""
+    total = 0
+    for told in Path("/proc").glob("[0-9]*/status"):
+        lines = dict(line.split(":", 1) for line in told.read_text().splitlines() if ":" in line)
+        if lines["Name"].strip().startswith(("milltask", "rtapi_app")):
+            total += int(lines["VmHWM"].split()[0])
+    return total
+
+
 def main():
     """Runs the program; what LinuxCNC complained about goes to stdout."""
     switch_on()
@@ -63,6 +74,7 @@ def main():
         time.sleep(0.5)
         sampler.terminate()
         sampler.wait()
+    (FOLDER / "memory.txt").write_text(str(peak_memory_kib()))
     while message := errors.poll():
         print(message)
 

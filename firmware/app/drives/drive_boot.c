@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_boot.h (see there): finds the drives, configures them by SDO (drive_configuration)
+ * and starts them (NMT), one after the other, and begins again from the first when one does not answer or refuses. */
 #include "app/drives/drive_boot.h"
 
 #include <string.h>
@@ -6,7 +8,8 @@
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
-#define AXIS_NODE 0x2005u
+#define AXIS_NODE   0x2005u
+#define MODULE_NODE 0x2035u
 
 /* The next attempt begins after a pause. */
 static void pause_for(struct drive_boot *boot, uint32_t pause_us)
@@ -19,7 +22,7 @@ static void pause_for(struct drive_boot *boot, uint32_t pause_us)
 /* Node of the axis that is being configured. */
 static uint8_t present_node(const struct drive_boot *boot)
 {
-    return boot->config.node[boot->axis];
+    return drive_configuration_node(&boot->config, boot->axis);
 }
 
 /* This attempt has failed at the present object: noted as trouble. */
@@ -130,9 +133,10 @@ static void begin_drive(struct drive_boot *boot)
 /* The drive is configured: to the next one, or on to starting them all. */
 static void finish_drive(struct drive_boot *boot)
 {
-    boot->simulated = boot->simulated && drive_is_simulated(&boot->facts[boot->axis]);
+    const bool module = boot->axis >= boot->config.axis_count;
+    boot->simulated = boot->simulated && (module || drive_is_simulated(&boot->facts[boot->axis]));
     boot->axis++;
-    if (boot->axis == boot->config.axis_count) {
+    if (boot->axis == drive_configuration_nodes(&boot->config)) {
         boot->axis = 0;
         boot->phase = DRIVE_BOOT_START;
     } else {
@@ -186,30 +190,32 @@ static bool start_next(struct drive_boot *boot, struct can_msg *out)
 {
     nmt_master_command(NMT_START, present_node(boot), out);
     boot->axis++;
-    if (boot->axis == boot->config.axis_count) {
+    if (boot->axis == drive_configuration_nodes(&boot->config)) {
         boot->phase = DRIVE_BOOT_DONE;
         memset(&boot->trouble, 0, sizeof boot->trouble);
     }
     return true;
 }
 
-/* Two axes at one node, or one at the controller's own: nothing may be sent there. */
+/* Two axes, or an axis and the I/O module, at one node, or one at the controller's own: nothing may be sent there. */
 static bool node_is_taken(const struct config *config, uint8_t axis)
 {
-    bool taken = config->node[axis] == config->own_node;
+    const uint8_t node = drive_configuration_node(config, axis);
+    bool taken = node == config->own_node;
     for (uint8_t i = 0; i < axis; ++i) {
-        taken = taken || config->node[i] == config->node[axis];
+        taken = taken || config->node[i] == node;
     }
     return taken;
 }
 
 static bool nodes_clash(struct drive_boot *boot)
 {
-    for (uint8_t i = 0; i < boot->config.axis_count; ++i) {
+    for (uint8_t i = 0; i < drive_configuration_nodes(&boot->config); ++i) {
         if (node_is_taken(&boot->config, i)) {
+            const bool module = i >= boot->config.axis_count;
             boot->axis = i;
-            boot->op.index = AXIS_NODE;
-            boot->op.sub = (uint8_t)(i + 1u);
+            boot->op.index = module ? MODULE_NODE : AXIS_NODE;
+            boot->op.sub = module ? 1u : (uint8_t)(i + 1u);
             give_up(boot, SDO_ABORT_INCOMPATIBLE, present_node(boot));
             return true;
         }

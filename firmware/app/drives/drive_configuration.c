@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_configuration.h (see there): the configuration of one drive as a list of operations
+ * on its dictionary, in order. */
 #include "app/drives/drive_configuration.h"
 
 #include <stddef.h>
@@ -17,7 +19,7 @@ enum drive_when {
     WHEN_SIMULATED, /* the project's own drive */
     WHEN_REAL,
     WHEN_INPUTS,      /* the drive has 0x60FD */
-    WHEN_NOT_MAPPED,  /* and TPDO3 does not tell it */
+    WHEN_NOT_MAPPED,  /* and TPDO3 does not report it */
     WHEN_TORQUE,      /* torque feedforward is on */
     WHEN_NO_TORQUE,   /* it is not, or the drive does not map it */
     WHEN_VELOCITY,    /* velocity feedforward is on */
@@ -30,6 +32,11 @@ enum drive_when {
     WHEN_ENCODER, /* the encoder's increments, gear, feed constant are set */
     WHEN_GEAR,
     WHEN_FEED,
+    WHEN_MODULE_VENDOR, /* the same of the I/O module */
+    WHEN_MODULE_PRODUCT,
+    WHEN_DIGITAL, /* outputs 0 ... 7 of it are mapped, 8 ... 15, analogue ones */
+    WHEN_DIGITAL_HIGH,
+    WHEN_ANALOGUE,
 };
 
 enum drive_row_kind {
@@ -43,6 +50,7 @@ enum drive_row_kind {
     ROW_PDO,             /* drive_pdos[argument] */
     ROW_PDO_MAY,         /* the same; left off (and its fact unknown) when refused */
     ROW_PDO_OFFSET,      /* the same; only when an object is missing or cannot be mapped */
+    ROW_PDO_OUTPUTS,     /* RPDO1 of the I/O module */
 };
 
 enum drive_source {
@@ -53,6 +61,8 @@ enum drive_source {
     FROM_TRAVEL_MIN,
     FROM_TRAVEL_MAX,
     FROM_SETPOINT_TIMEOUT,
+    FROM_MODULE_VENDOR,
+    FROM_MODULE_PRODUCT,
     FROM_OWN_NODE, /* 0x1016: this controller, silent for `argument` ms */
 };
 
@@ -67,7 +77,7 @@ struct drive_row {
 };
 
 /* One PDO of a drive as the controller wants it. */
-#define PDO_ENTRIES 3u
+#define PDO_ENTRIES 5u
 #define PDO_INVALID UINT32_C(0x80000000) /* bit 31 of the COB-ID */
 #define PDO_NO_RTR  UINT32_C(0x40000000) /* bit 30, of TPDOs */
 
@@ -83,6 +93,7 @@ struct drive_pdo {
 };
 
 #define PROFILE_DRIVE 402u /* low half of 0x1000 */
+#define PROFILE_IO    401u
 #define SYNC_COUNTER  240u
 #define SYNCHRONOUS   1u /* transmission types */
 #define ON_CHANGE     255u
@@ -105,40 +116,60 @@ enum pdo_number {
     TPDO3_OFF,
     TPDO3_INPUTS,
     TPDO4_OFF,
+    MODULE_TPDO1_OFF,
 };
 
 /* docs/reference/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
 static const struct drive_pdo drive_pdos[] = {
-    [RPDO1] =
-        {0x1400, COB_RPDO1, SYNCHRONOUS, 2, 0, true, {0x60400010, 0x607A0020, 0}, DRIVE_NO_FACT},
+    [RPDO1] = {0x1400,
+               COB_RPDO1,
+               SYNCHRONOUS,
+               2,
+               0,
+               true,
+               {0x60400010, 0x607A0020, 0, 0, 0},
+               DRIVE_NO_FACT},
     [RPDO1_TORQUE] = {0x1400,
                       COB_RPDO1,
                       SYNCHRONOUS,
                       3,
                       0,
                       true,
-                      {0x60400010, 0x607A0020, 0x60B20010},
+                      {0x60400010, 0x607A0020, 0x60B20010, 0, 0},
                       DRIVE_TORQUE_MAPPED},
-    [RPDO2_VELOCITY] =
-        {0x1401, COB_RPDO2, SYNCHRONOUS, 1, 0, false, {0x60B10020, 0, 0}, DRIVE_VELOCITY_MAPPED},
-    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
-    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
-    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
-    [TPDO1] =
-        {0x1800, COB_TPDO1, SYNCHRONOUS, 2, 0, false, {0x60410010, 0x60640020, 0}, DRIVE_NO_FACT},
+    [RPDO2_VELOCITY] = {0x1401,
+                        COB_RPDO2,
+                        SYNCHRONOUS,
+                        1,
+                        0,
+                        false,
+                        {0x60B10020, 0, 0, 0, 0},
+                        DRIVE_VELOCITY_MAPPED},
+    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO1] = {0x1800,
+               COB_TPDO1,
+               SYNCHRONOUS,
+               2,
+               0,
+               false,
+               {0x60410010, 0x60640020, 0, 0, 0},
+               DRIVE_NO_FACT},
     [TPDO2_VOLTS] =
-        {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0}, DRIVE_NO_FACT},
-    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
-    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+        {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
     [TPDO3_INPUTS] = {0x1802,
                       COB_TPDO3,
                       ON_CHANGE,
                       1,
                       INHIBIT_MS,
                       false,
-                      {0x60FD0020, 0, 0},
+                      {0x60FD0020, 0, 0, 0, 0},
                       DRIVE_INPUTS_MAPPED},
-    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [MODULE_TPDO1_OFF] = {0x1800, COB_TPDO1, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
 };
 
 #define FIELD(name) offsetof(struct config_axis, name)
@@ -172,7 +203,7 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
-    /* it stays operational, so that its TPDOs tell what it does */
+    /* it stays operational, so that its TPDOs show what it does */
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */
@@ -218,6 +249,43 @@ static const struct drive_row drive_rows[] = {
 };
 
 #define ROWS (sizeof drive_rows / sizeof drive_rows[0])
+
+/* The same of the I/O module, CiA 401. Without heartbeats of the controller it switches its outputs off: 0x1029 leaves it
+ * operational, so that its error values hold (0x6206, 0x6207; 0x6443, 0x6444). */
+static const struct drive_row module_rows[] = {
+    {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
+    {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_IO},
+    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
+    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
+    {WHEN_MODULE_VENDOR, ROW_EXPECT, 0x1018, 1, 4, FROM_MODULE_VENDOR, 0},
+    {WHEN_MODULE_PRODUCT, ROW_EXPECT, 0x1018, 2, 4, FROM_MODULE_PRODUCT, 0},
+    {WHEN_ALWAYS, ROW_MAY, 0x1005, 0, 4, FROM_ROW, COB_SYNC},
+    {WHEN_ALWAYS, ROW_MAY, 0x1006, 0, 4, FROM_PERIOD_US, 0},
+    {WHEN_ALWAYS, ROW_MAY, 0x100C, 0, 2, FROM_ROW, 0},
+    {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
+    {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
+    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
+    {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
+    {WHEN_DIGITAL, ROW_MAY, 0x6206, 1, 1, FROM_ROW, 0xFF},
+    {WHEN_DIGITAL, ROW_MAY, 0x6207, 1, 1, FROM_ROW, 0},
+    {WHEN_DIGITAL, ROW_MUST, 0x6200, 1, 1, FROM_ROW, 0},
+    {WHEN_DIGITAL_HIGH, ROW_MAY, 0x6206, 2, 1, FROM_ROW, 0xFF},
+    {WHEN_DIGITAL_HIGH, ROW_MAY, 0x6207, 2, 1, FROM_ROW, 0},
+    {WHEN_DIGITAL_HIGH, ROW_MUST, 0x6200, 2, 1, FROM_ROW, 0},
+    {WHEN_ANALOGUE, ROW_MAY, 0x6443, 1, 1, FROM_ROW, 1},
+    {WHEN_ANALOGUE, ROW_MAY, 0x6444, 1, 4, FROM_ROW, 0},
+    {WHEN_ANALOGUE, ROW_MUST, 0x6411, 1, 2, FROM_ROW, 0},
+    {WHEN_ALWAYS, ROW_PDO_OUTPUTS, 0, 0, 0, FROM_ROW, 0},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO4_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, MODULE_TPDO1_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO2_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO3_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO4_OFF},
+};
+
+#define MODULE_ROWS (sizeof module_rows / sizeof module_rows[0])
 
 /* ---- Writes of a PDO ---- */
 
@@ -333,7 +401,12 @@ static bool pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_
 
 static uint8_t node_of(const struct drive_configuration *configuration)
 {
-    return configuration->config->node[configuration->axis];
+    return drive_configuration_node(configuration->config, configuration->axis);
+}
+
+static bool is_module(const struct drive_configuration *configuration)
+{
+    return configuration->axis >= configuration->config->axis_count;
 }
 
 static const struct config_axis *axis_of(const struct drive_configuration *configuration)
@@ -369,8 +442,29 @@ static bool configured(const struct drive_configuration *configuration, enum dri
     }
 }
 
+static bool concerns_module(const struct config_outputs *outputs, enum drive_when when)
+{
+    switch (when) {
+    case WHEN_MODULE_VENDOR:
+        return outputs->vendor != 0u;
+    case WHEN_MODULE_PRODUCT:
+        return outputs->product != 0u;
+    case WHEN_DIGITAL:
+        return outputs->digital_count > 0u;
+    case WHEN_DIGITAL_HIGH:
+        return outputs->digital_count > 8u;
+    case WHEN_ANALOGUE:
+        return outputs->analogue_count > 0u;
+    default:
+        return when == WHEN_ALWAYS;
+    }
+}
+
 static bool concerns(const struct drive_configuration *configuration, enum drive_when when)
 {
+    if (is_module(configuration)) {
+        return concerns_module(&configuration->config->outputs, when);
+    }
     switch (when) {
     case WHEN_ALWAYS:
         return true;
@@ -417,6 +511,10 @@ static uint32_t value_of(const struct drive_configuration *configuration,
         return ((uint32_t)config->own_node << 16) | row->argument;
     case FROM_SETPOINT_TIMEOUT:
         return config->setpoint_timeout_ms;
+    case FROM_MODULE_VENDOR:
+        return config->outputs.vendor;
+    case FROM_MODULE_PRODUCT:
+        return config->outputs.product;
     case FROM_ROW:
     default:
         return row->argument;
@@ -461,7 +559,22 @@ static void plain_op(const struct drive_configuration *configuration, const stru
 
 static bool is_pdo(const struct drive_row *row)
 {
-    return row->kind == ROW_PDO || row->kind == ROW_PDO_MAY || row->kind == ROW_PDO_OFFSET;
+    return row->kind == ROW_PDO || row->kind == ROW_PDO_MAY || row->kind == ROW_PDO_OFFSET ||
+           row->kind == ROW_PDO_OUTPUTS;
+}
+
+/* RPDO1 of the I/O module: digital outputs by bytes, then the analogue ones. */
+static struct drive_pdo outputs_pdo(const struct config_outputs *outputs)
+{
+    struct drive_pdo pdo = {
+        .communication = 0x1400, .cob = COB_RPDO1, .type = SYNCHRONOUS, .fact = DRIVE_NO_FACT};
+    for (uint32_t i = 0; i < outputs->digital_count / 8u; ++i) {
+        pdo.entries[pdo.count++] = UINT32_C(0x62000008) + ((i + 1u) << 8);
+    }
+    for (uint32_t i = 0; i < outputs->analogue_count; ++i) {
+        pdo.entries[pdo.count++] = UINT32_C(0x64110010) + ((i + 1u) << 8);
+    }
+    return pdo;
 }
 
 /* The row's present operation; false: it has no more. */
@@ -475,8 +588,17 @@ static bool row_op(const struct drive_configuration *configuration, const struct
         plain_op(configuration, row, op);
         return configuration->item == 0u;
     }
-    return pdo_op(&drive_pdos[row->argument], node_of(configuration),
-                  configuration->config->setpoint_timeout_ms, configuration->item, op);
+    const struct config *config = configuration->config;
+    const struct drive_pdo pdo =
+        row->kind == ROW_PDO_OUTPUTS ? outputs_pdo(&config->outputs) : drive_pdos[row->argument];
+    return pdo_op(&pdo, node_of(configuration), config->setpoint_timeout_ms, configuration->item,
+                  op);
+}
+
+static const struct drive_row *present_row(const struct drive_configuration *configuration)
+{
+    return is_module(configuration) ? &module_rows[configuration->row]
+                                    : &drive_rows[configuration->row];
 }
 
 static void next_row(struct drive_configuration *configuration)
@@ -498,12 +620,13 @@ void drive_configuration_begin(struct drive_configuration *configuration,
 
 bool drive_configuration_op(struct drive_configuration *configuration, struct drive_op *op)
 {
-    while (configuration->row < ROWS) {
-        const struct drive_row *row = &drive_rows[configuration->row];
+    const uint32_t count = is_module(configuration) ? MODULE_ROWS : ROWS;
+    while (configuration->row < count) {
+        const struct drive_row *row = present_row(configuration);
         if (row_op(configuration, row, op)) {
             return true;
         }
-        if (is_pdo(row) && concerns(configuration, row->when)) {
+        if (is_pdo(row) && row->kind != ROW_PDO_OUTPUTS && concerns(configuration, row->when)) {
             drive_properties_read(configuration->facts, drive_pdos[row->argument].fact, 1);
         }
         next_row(configuration);
@@ -525,7 +648,7 @@ static bool can_do_without(enum drive_row_kind kind, uint32_t abort_code)
 
 bool drive_configuration_refused(struct drive_configuration *configuration, uint32_t abort_code)
 {
-    if (!can_do_without(drive_rows[configuration->row].kind, abort_code)) {
+    if (!can_do_without(present_row(configuration)->kind, abort_code)) {
         return false;
     }
     next_row(configuration);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_configuration: the configuration of one drive as a list of operations on its dictionary, in order:
+ * drive_configuration: the configuration of one drive, or of the I/O module, as a list of operations on its dictionary, in order:
  * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object,
  * or PDO.
  *
  *     drive_configuration_begin(&configuration, &config, axis, &facts);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
  *
- * What the drive says of itself on the way (facts) decides what follows. Mainline.
+ * What the drive reports meanwhile (facts) decides what follows. Main loop.
  */
 #ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
 #define APP_DRIVES_DRIVE_CONFIGURATION_H
@@ -19,16 +19,30 @@
 #include "app/machine/config.h"
 
 /* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
- * long program can keep the mainline from it for a second). */
+ * long program can keep the main loop from it for a second). */
 #define DRIVE_HEARTBEAT_MS         100u
 #define DRIVE_CONTROLLER_SILENT_MS 2000u
+
+/* Drives, and the I/O module, where there is one. Pure. */
+static inline uint8_t drive_configuration_nodes(const struct config *config)
+{
+    return (uint8_t)(config->axis_count + (config->outputs.node != 0u ? 1u : 0u));
+}
+
+/* Of drive `i`; of the I/O module, which comes after them. Pure. */
+static inline uint8_t drive_configuration_node(const struct config *config, uint8_t i)
+{
+    return i < config->axis_count ? config->node[i] : config->outputs.node;
+}
+
+#define DRIVE_NODES (AXES_MAX + 1u)
 
 /* Kinds of operation on a drive's dictionary. */
 enum drive_op_kind {
     DRIVE_OP_NMT_PRE_OPERATIONAL, /* process data off while parameters change */
     DRIVE_OP_READ,                /* `masked` bits must be those of `value`; learns `fact` */
     DRIVE_OP_WRITE,               /* refused: fine when it reads back so already */
-    DRIVE_OP_PREPARE,             /* a write that may be refused: a later one tells */
+    DRIVE_OP_PREPARE, /* a write that may be refused: a later one shows whether that matters */
 };
 
 struct drive_op {
@@ -50,7 +64,7 @@ struct drive_configuration {
     uint8_t item; /* of the row, when it is a PDO */
 };
 
-/* `config` and `facts` must stay; the facts are forgotten. */
+/* `config` and `facts` must stay; the facts are forgotten. `axis` = axis_count of the configuration: the I/O module. */
 void drive_configuration_begin(struct drive_configuration *configuration,
                                const struct config *config, uint8_t axis,
                                struct drive_properties *facts);
@@ -61,7 +75,8 @@ bool drive_configuration_op(struct drive_configuration *configuration, struct dr
 /* The present operation is done; a read has brought `value`. */
 void drive_configuration_advance(struct drive_configuration *configuration);
 
-/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has gone on. */
+/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has
+ * gone on. */
 bool drive_configuration_refused(struct drive_configuration *configuration, uint32_t abort_code);
 
 #endif

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_monitor.h (see there): heartbeats and emergency messages of the drives, and what
+ * they mean for the zero of a homed axis. */
 #include "app/drives/drive_monitor.h"
 
 #include <stddef.h>
@@ -22,8 +24,8 @@ static uint32_t time_of(uint8_t node, const uint32_t entries[AXES_MAX])
 
 static bool is_drive(const struct config *config, uint8_t node)
 {
-    for (uint8_t i = 0; i < config->axis_count; ++i) {
-        if (config->node[i] == node) {
+    for (uint8_t i = 0; i < drive_configuration_nodes(config); ++i) {
+        if (drive_configuration_node(config, i) == node) {
             return true;
         }
     }
@@ -46,9 +48,9 @@ static void begin_others(struct drive_monitor *watch, const struct config *confi
 void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
                          const uint32_t entries[AXES_MAX])
 {
-    watch->count = config->axis_count;
+    watch->count = drive_configuration_nodes(config);
     for (uint8_t i = 0; i < watch->count; ++i) {
-        const uint8_t node = config->node[i];
+        const uint8_t node = drive_configuration_node(config, i);
         heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
     }
     begin_others(watch, config, entries);

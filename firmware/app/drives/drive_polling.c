@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/drive_polling.h (see there): reads a few times a second what no PDO carries. */
 #include "app/drives/drive_polling.h"
 
 #include <string.h>
@@ -39,7 +40,7 @@ static bool inputs_polled(const struct drive_properties *facts)
     return facts->known[DRIVE_INPUTS] && !facts->known[DRIVE_INPUTS_MAPPED];
 }
 
-/* The configuration belongs to the mainline, so it is read without the lock. */
+/* The configuration belongs to the main loop, so it is read without the lock. */
 static bool ask_next(struct drive_polling *polling, const struct machine *machine,
                      const struct drive_properties *facts, struct can_msg *out)
 {

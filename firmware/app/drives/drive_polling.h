@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_polling: reads a few times a second what no PDO carries: following error (0x60F4) and, where a drive has no TPDO3 for
- * them, digital inputs (0x60FD). Axis after axis by SDO, each about DRIVE_POLLING_US apart.
+ * drive_polling: reads a few times a second what no PDO carries: following error (0x60F4) and, where a drive has no
+ * TPDO3 for them, digital inputs (0x60FD). Axis after axis by SDO, each about DRIVE_POLLING_US apart.
  *
- * Mainline; takes the port's lock where it touches the machine.
+ * Main loop; takes the port's lock where it touches the machine.
  */
 #ifndef APP_DRIVES_DRIVE_POLLING_H
 #define APP_DRIVES_DRIVE_POLLING_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_properties: what a drive said about itself while it was configured. Mainline. */
+/* drive_properties: what a drive said about itself while it was configured. Main loop. */
 #ifndef APP_DRIVES_DRIVE_PROPERTIES_H
 #define APP_DRIVES_DRIVE_PROPERTIES_H
 
@@ -16,7 +16,7 @@ enum drive_fact {
     DRIVE_MODES,           /* 0x6502 */
     DRIVE_POSITION,        /* 0x6064 before anything was written; known where homing is asked for */
     DRIVE_INPUTS,          /* 0x60FD exists; its value then */
-    DRIVE_INPUTS_MAPPED,   /* and TPDO3 tells its changes */
+    DRIVE_INPUTS_MAPPED,   /* and TPDO3 reports its changes */
     DRIVE_TORQUE_MAPPED,   /* RPDO1 takes 0x60B2 */
     DRIVE_VELOCITY_MAPPED, /* RPDO2 takes 0x60B1 */
     DRIVE_NO_FACT,         /* of a step that learns nothing */

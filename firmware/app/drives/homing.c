@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/homing.h (see there): command 10, which homes one axis after the other. */
 #include "app/drives/homing.h"
 
 #include <string.h>

@@ -5,11 +5,11 @@
  *
  *     off -> mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
  *
- * Methods, speeds and offset have been written when the drive was found (CiA 402-2, homing mode). The machine is in HOMING
- * meanwhile; when it leaves that state by itself (stop, quick stop, a fault) homing is over: before the drives are enabled
- * again they are configured anew, which brings mode 8 back.
+ * Methods, speeds and offset have been written when the drive was found (CiA 402-2, homing mode). The machine is in
+ * HOMING meanwhile; when it leaves that state by itself (stop, quick stop, a fault) homing is over: before the drives
+ * are enabled again they are configured anew, which brings mode 8 back.
  *
- * Mainline; takes the port's lock where it touches the machine. Times are counted in ticks, so they mean the same on a
+ * Main loop; takes the port's lock where it touches the machine. Times are counted in ticks, so they mean the same on a
  * host that is too slow.
  */
 #ifndef APP_DRIVES_HOMING_H
@@ -28,13 +28,13 @@
 #define HOMING_SPARE_S   10u      /* beside the way there and back */
 #define HOMING_MAX_S     600u
 
-/* A controlword this long on its way is in the next statusword: sent, latched, answered takes 4, the others are for frames
- * that are lost. Until then "attained" may be that of an earlier homing. */
+/* A controlword this long on its way is in the next statusword: sent, latched, answered takes 4, the others are for
+ * frames that are lost. Until then "attained" may be that of an earlier homing. */
 #define HOMING_SYNCS_BEFORE_ANSWER 10u
 
 enum homing_phase {
     HOMING_IDLE,
-    HOMING_OFF,    /* until the drive is off: it may just have been told */
+    HOMING_OFF,    /* until the drive is off: it may have got that command just before */
     HOMING_MODE,   /* 0x6060 = 6, until 0x6061 says so */
     HOMING_ENABLE, /* to Operation enabled */
     HOMING_MOVE,   /* the drive seeks its zero */

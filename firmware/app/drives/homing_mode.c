@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/drives/homing_mode.h (see there): brings a drive into a mode of operation by SDO. */
 #include "app/drives/homing_mode.h"
 
 #include <string.h>

@@ -7,7 +7,7 @@
  *     each frame: sdo_client_receive(&mode.client, ...)
  *     until result is not HOMING_MODE_PENDING
  *
- * Mainline.
+ * Main loop.
  */
 #ifndef APP_DRIVES_HOMING_MODE_H
 #define APP_DRIVES_HOMING_MODE_H

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/axis.h (see there): one drive as the tick uses it. */
 #include "app/machine/axis.h"
 
 #include <string.h>
@@ -171,7 +172,7 @@ bool axis_dropped_out(const struct axis *axis)
     return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
 }
 
-bool axis_obeys(const struct axis *axis)
+bool axis_follows(const struct axis *axis)
 {
     return axis_enabled(axis) && !axis->answers.lost && statusword_monitor_follows(&axis->watch);
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * axis: one drive as the tick sees it: what it last said, where it is wanted, what it is sent.
+ * axis: one drive as the tick uses it: what it reported last, its goal and target, what it is sent.
  *
- * Guarded by the port's lock: written by the receive and timer interrupts, read by the mainline in
- * a critical section. Positions in counts.
+ * Guarded by the port's lock: written by the receive and timer interrupts, read by the main loop in a critical section.
+ * Positions in counts.
  */
 #ifndef APP_MACHINE_AXIS_H
 #define APP_MACHINE_AXIS_H
@@ -27,35 +27,34 @@
 
 struct axis {
     uint8_t node;
-    enum cia402_state state; /* that the statusword tells */
-    bool fit; /* as of the last answer: Operation enabled, and the statusword tells no trouble */
+    enum cia402_state state; /* as the statusword has it */
+    bool fit; /* as of the last answer: Operation enabled, and no wrong bit in the statusword */
     struct tpdo_monitor answers;
     struct statusword_monitor watch;
     uint16_t statusword;
     uint16_t statusword_before; /* the one before it */
     uint16_t controlword;       /* sent last */
-    uint16_t
-        control_extra;   /* more controlword bits while the drive is told to be enabled: homing */
-    uint16_t error_code; /* of the drive's last EMCY; 0: none */
+    uint16_t control_extra;     /* more controlword bits while the goal is to be enabled: homing */
+    uint16_t error_code;        /* of the drive's last EMCY; 0: none */
     int32_t position_counts;
     int32_t target_counts;      /* to be sent in this tick */
     int32_t target_sent_counts; /* sent in the last one */
     int32_t latched_counts;     /* target that the last SYNC made the drive take over */
     int32_t expected_counts;    /* where the drive should have been at the last SYNC */
-    uint32_t away_syncs; /* answers in a row that told a position outside the window around that */
+    uint32_t away_syncs; /* answers in a row with a position outside the window around that */
     bool away;           /* for longer than the configuration permits */
     struct can_msg
         setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
     enum cia402_goal goal;
     bool
-        engaged; /* seen in Operation enabled since it was told to go there: its target is its own */
+        engaged; /* seen in Operation enabled since that became the goal: its target no longer follows the position */
     bool by_itself; /* it homes: moves by its own motion, its target follows its position */
     int32_t velocity_offset_counts_s; /* put into its RPDO2 last */
     int16_t torque_offset_permille;   /* put into its RPDO1 last */
     bool torque_mapped;               /* its RPDO1 takes a torque offset */
     bool velocity_mapped;             /* its RPDO2 takes a velocity offset */
     uint32_t digital_inputs;          /* 0x60FD */
-    int32_t following_error_counts;   /* 0x60F4, looked at a few times a second */
+    int32_t following_error_counts;   /* 0x60F4, read a few times a second */
     bool homed;                       /* its drive has the zero that homing gave it */
     int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
     uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
@@ -67,7 +66,7 @@ struct axis {
 void axis_init(struct axis *axis, uint8_t node);
 
 /* Forgets the drive, which is to be found and configured anew. Whether it is homed stays, when the node is the same:
- * that ends only by what ends it (axis_found, boot-up, silence). Under the lock. */
+ * that ends only by axis_found, a boot-up message, or missing heartbeats. Under the lock. */
 void axis_forget(struct axis *axis, uint8_t node);
 
 /* The drive has been found again and says where it is: one that is more than `tolerance_counts` from where it was seen
@@ -83,9 +82,9 @@ void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t n
 /* The drive has restarted: what it said last is no longer true, it is not even ready to switch on. Under the lock. */
 void axis_restarted(struct axis *axis);
 
-/* Makes the setpoint frame of this tick, `setpoint`. Until the drive has been seen in Operation enabled its target follows its
- * position, so that switching on moves nothing; from then on it stays where it is put, in a quick stop too. Once the
- * drive is off it follows again. Timer. */
+/* Makes the setpoint frame of this tick, `setpoint`. Until the drive has been seen in Operation enabled its target
+ * follows its position, so that switching on moves nothing; from then on it stays where it is put, in a quick stop too.
+ * Once the drive is off it follows again. Timer. */
 void axis_setpoint(struct axis *axis, uint32_t tolerance_counts);
 
 /* The port has taken that frame. Timer. */
@@ -101,8 +100,8 @@ static inline void axis_synced(struct axis *axis)
     axis->latched_counts = axis->target_sent_counts;
 }
 
-/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. Away: more
- * than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
+/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. Away:
+ * more than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
 
 /* All pure, under the lock. */
@@ -113,15 +112,15 @@ static inline bool axis_enabled(const struct axis *axis) /* Operation enabled */
 {
     return axis->state == CIA402_OPERATION_ENABLED;
 }
-/* Enabled, answers, is where it should be, its statusword tells no trouble. */
+/* Enabled, answers, is where it should be, no wrong bit in its statusword. */
 static inline bool axis_well(const struct axis *axis)
 {
     return axis->fit && !axis->answers.lost && !axis->away;
 }
-bool axis_obeys(const struct axis *axis); /* enabled, answers, follows its target */
+bool axis_follows(const struct axis *axis); /* enabled, answers, follows its target */
 
-/* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and has
- * been in one place for AXIS_STANDSTILL_SYNCS. */
+/* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and
+ * has been in one place for AXIS_STANDSTILL_SYNCS. */
 bool axis_left(const struct axis *axis);
 bool axis_moves(const struct axis *axis);   /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */

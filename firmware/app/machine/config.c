@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/config.h (see there): the configuration of the host as one value. */
 #include "app/machine/config.h"
 
 #include <stddef.h>
@@ -17,6 +18,7 @@ enum {
     TRAVEL_MIN = 0x2006,
     TRAVEL_MAX = 0x2007,
     COUNTS_PER_UNIT = 0x2033,
+    OUTPUTS = 0x2035,
 };
 
 /* Sub-indices of CONFIGURATION. */
@@ -33,6 +35,17 @@ enum {
     SUB_SETPOINT_TIMEOUT = 10,
     SUB_FEEDFORWARD = 11,
     SUB_STOP_TIME = 12,
+};
+
+/* Sub-indices of OUTPUTS. */
+enum {
+    SUB_OUTPUT_NODE = 1,
+    SUB_DIGITAL_COUNT = 2,
+    SUB_ANALOGUE_COUNT = 3,
+    SUB_BEHAVIOUR = 4,
+    SUB_DELAY = 5,
+    SUB_OUTPUT_VENDOR = 6,
+    SUB_OUTPUT_PRODUCT = 7,
 };
 
 struct axis_field {
@@ -161,6 +174,17 @@ static void read_window(struct config *config, uint8_t axis)
     config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
 }
 
+static void read_outputs(struct config_outputs *outputs, const struct od *od)
+{
+    outputs->node = (uint8_t)number(od, OUTPUTS, SUB_OUTPUT_NODE);
+    outputs->digital_count = (uint8_t)number(od, OUTPUTS, SUB_DIGITAL_COUNT);
+    outputs->analogue_count = (uint8_t)number(od, OUTPUTS, SUB_ANALOGUE_COUNT);
+    outputs->behaviour = (uint8_t)number(od, OUTPUTS, SUB_BEHAVIOUR);
+    outputs->delay_ticks = (uint8_t)number(od, OUTPUTS, SUB_DELAY);
+    outputs->vendor = (uint32_t)number(od, OUTPUTS, SUB_OUTPUT_VENDOR);
+    outputs->product = (uint32_t)number(od, OUTPUTS, SUB_OUTPUT_PRODUCT);
+}
+
 void config_read(struct config *config, const struct od *od)
 {
     config->period_us = (uint32_t)number(od, PERIOD, 0);
@@ -186,6 +210,7 @@ void config_read(struct config *config, const struct od *od)
         read_window(config, i);
         config->turn_tolerance_counts[i] = turn_tolerance_counts(config, i);
     }
+    read_outputs(&config->outputs, od);
     config->crc32 = crc_of(od, config->axis_count);
 }
 
@@ -200,6 +225,9 @@ bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value)
     if (index == CONFIGURATION && sub == SUB_COUNTS_PER_MM) {
         return value >= 1u && value <= CONFIG_COUNTS_PER_MM_MAX;
     }
+    if (index == OUTPUTS && sub == SUB_DIGITAL_COUNT) {
+        return value % 8u == 0u && value <= PROGRAM_DIGITALS;
+    }
     if (index == COUNTS_PER_UNIT) {
         return value <= CONFIG_COUNTS_PER_MM_MAX;
     }
@@ -211,6 +239,9 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
     if (index == CONFIGURATION) {
         return sub == SUB_AXIS_COUNT || sub == SUB_SETPOINT_TIMEOUT || sub == SUB_FEEDFORWARD;
     }
+    if (index == OUTPUTS) {
+        return sub != SUB_BEHAVIOUR && sub != SUB_DELAY;
+    }
     const bool is_feedforward = index >= 0x2018 && index <= 0x201A;
     const bool is_limit = index >= 0x2030 && index <= 0x2032;
     return !is_feedforward && !is_limit;
@@ -218,7 +249,7 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
 
 bool config_contains(uint16_t index)
 {
-    return index == PERIOD || index == CONFIGURATION || is_by_axis(index);
+    return index == PERIOD || index == CONFIGURATION || index == OUTPUTS || is_by_axis(index);
 }
 
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis)

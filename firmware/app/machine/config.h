@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2051 ... 0x2053), as
+/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2035, 0x2051 ... 0x2053), as
  * one value. */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
@@ -20,10 +20,10 @@
 #define CONFIG_TORQUE_FEEDFORWARD   1u
 #define CONFIG_VELOCITY_FEEDFORWARD 2u
 
-/* A position loop without feedforward lags behind by the way of so long a time, at the most (a gain of 50 / s). */
+/* The largest lag of a position loop without feedforward, as a time (a gain of 50 / s). */
 #define CONFIG_LAG_MS 20u
 
-/* So many SYNCs more than the drive's own time, so that a drive that notices tells of it first. */
+/* SYNCs beyond the drive's own time, so that a drive that detects the deviation reports it first. */
 #define CONFIG_APART_SYNCS 5u
 
 /* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
@@ -54,6 +54,25 @@ struct config_axis {
         counts_per_unit; /* of an axis that is not measured in mm but in degrees; 0: counts_per_mm */
 };
 
+/* Bits of struct config_outputs.behaviour: what becomes of the outputs of the path. */
+#define CONFIG_OUTPUTS_KEEP_AT_STOP  1u
+#define CONFIG_OUTPUTS_KEEP_AT_FAULT 2u /* and at a quick stop, and with the drives off */
+#define CONFIG_OUTPUTS_OFF_AT_END    4u
+#define CONFIG_OUTPUTS_OFF_IN_HOLD   8u
+
+#define CONFIG_OUTPUTS_DELAY_MAX 8u
+
+/* The I/O module that takes the outputs of the path (object 0x2035). */
+struct config_outputs {
+    uint32_t vendor; /* 0x1018 subs 1, 2 of the module; 0: any */
+    uint32_t product;
+    uint8_t node;           /* 0: there is none */
+    uint8_t digital_count;  /* mapped: 0, 8 or 16 */
+    uint8_t analogue_count; /* 0 ... PROGRAM_ANALOGUES */
+    uint8_t behaviour;      /* CONFIG_OUTPUTS_... */
+    uint8_t delay_ticks;    /* 0 ... CONFIG_OUTPUTS_DELAY_MAX */
+};
+
 struct config {
     uint32_t period_us; /* 1000, 2000, 4000 or 8000 */
     uint32_t feed_limit_um_s;
@@ -73,17 +92,18 @@ struct config {
     uint8_t kernel;      /* enum kernel_number */
     uint8_t missed_max;  /* so many answers in a row may be missed */
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
-    uint32_t crc32;      /* of the objects; docs/reference/protocol.md section 3.4 */
+    struct config_outputs outputs;
+    uint32_t crc32; /* of the objects; docs/reference/protocol.md section 3.4 */
     uint32_t turn_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
-    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following window
-     * and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at its own
-     * velocity limit (without one: UINT32_MAX). */
+    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
+     * window and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at
+     * its own velocity limit (without one: UINT32_MAX). */
     uint32_t apart_counts[AXES_MAX];
     uint32_t apart_syncs[AXES_MAX];
 };
 
-/* Copies the present values out of the dictionary. Mainline. */
+/* Copies the present values out of the dictionary. Main loop. */
 void config_read(struct config *config, const struct od *od);
 
 /* Whether a value for the object is one that the dictionary's own ranges would let pass but that
@@ -116,7 +136,7 @@ static inline uint32_t config_tolerance_counts(const struct config *config, uint
  * other. Pure. */
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
-/* The limits in the form that program_check takes; travel is rounded inwards. Mainline. */
+/* The limits in the form that program_check takes; travel is rounded inwards. Main loop. */
 void config_limits(const struct config *config, struct program_limits *limits);
 
 #endif

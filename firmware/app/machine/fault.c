@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/fault.h (see there): what stopped the machine (object 0x2003 subs 1 to 3). */
 #include "app/machine/fault.h"
 
 const char *fault_text(uint16_t code)

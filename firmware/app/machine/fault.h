@@ -21,7 +21,7 @@
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
 #define FAULT_STOP_LATE                                                                            \
     (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */
-#define FAULT_UNATTENDED (EMCY_MANUFACTURER | 0x0Bu) /* the mainline stands still; us */
+#define FAULT_UNATTENDED (EMCY_MANUFACTURER | 0x0Bu) /* the main loop stands still; us */
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */
@@ -37,7 +37,8 @@ struct fault {
 /* One English phrase for a fault code, never NULL. Pure. */
 const char *fault_text(uint16_t code);
 
-/* Whether a drive's own emergency code says more than this one: a state seen in its statusword. Pure. */
+/* Whether a drive's own emergency code is more exact than this one, which only has a state seen in its statusword.
+ * Pure. */
 bool fault_is_vague(uint16_t code);
 
 #endif

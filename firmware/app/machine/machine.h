@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * machine: the axes as one machine: its state (object 0x2002), what it is told to do, what it does
- * each tick.
+ * machine: the axes as one machine: its state (object 0x2002), its commands, and what it does in each tick.
  *
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
  *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
- * The state changes in two places only: in the requests (mainline, under the lock; machine_requests.c) and in the
- * timer's functions (machine_tick.c, machine_supervise.c, machine_fault.c), and where a fault is raised (machine_fault.c).
- * The whole struct is guarded by the port's lock. Who uses whom: tick, supervise and requests -> fault -> drives -> machine.
+ * Three places change the state: the requests (main loop, under the lock; machine_requests.c), the timer's functions
+ * (machine_tick.c, machine_supervise.c, machine_fault.c), and the raising of a fault (machine_fault.c). The whole struct is guarded by the port's lock. Who uses whom: tick, supervise and requests ->
+ * fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H
@@ -35,14 +34,14 @@ enum machine_state {
     MACHINE_FAULT = 6,
     MACHINE_HOLDING = 7,     /* a feed hold brings the path to rest, or the program ended first */
     MACHINE_HELD = 8,        /* at rest on the path until resumed or stopped */
-    MACHINE_HOMING = 9,      /* drives home by their own motion; the mainline leads them */
+    MACHINE_HOMING = 9,      /* drives home by their own motion; the main loop leads them */
     MACHINE_QUICK_STOP = 10, /* all drives brake by their own ramps; then OFF */
 };
 
 /* What goes on inside FAULT. */
 enum machine_fault_phase {
     MACHINE_FAULT_BRAKING,   /* every drive follows: stop along the path, settle */
-    MACHINE_FAULT_QUICK,     /* else: quick stop of all that still hear; targets stay */
+    MACHINE_FAULT_QUICK,     /* else: quick stop of all drives that still receive; targets stay */
     MACHINE_FAULT_OFF,       /* drives are switched off; waits for the reset */
     MACHINE_FAULT_RESETTING, /* drives are being reset; then BOOT, or OFF when the cause persists */
 };
@@ -77,8 +76,8 @@ enum machine_refusal {
 #define MACHINE_UNSENT_MAX                                                                         \
     3u /* ticks in a row in which the port may refuse frames, or still have those of the tick before */
 
-/* With the mainline at a standstill nobody takes a stop, and heartbeats stay away: before the drives stop by these, or a
- * watchdog restarts the processor, the axes are stopped on the path. */
+/* While the main loop stalls, no command is executed and no heartbeat is sent. The axes are stopped on the path before
+ * the drives stop for missing heartbeats, or a watchdog restarts the processor. */
 #define MACHINE_UNATTENDED_US 1000000u
 
 #define MACHINE_ARRIVE_TICKS 2000u /* time for the axes to reach their targets after settling */
@@ -104,7 +103,7 @@ struct machine {
     enum machine_fault_phase fault_phase; /* in FAULT */
     uint32_t ticks_left;       /* settling, enabling, quick stop, resetting, first answers */
     uint32_t override_percent; /* wanted, object 0x2010 sub 1; for every program */
-    uint32_t unattended_us;    /* since the last round of the mainline, by ticks */
+    uint32_t unattended_us;    /* since the last round of the main loop, by ticks */
     uint32_t sync_us;          /* time of the last SYNC */
     uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
     uint32_t sync_left_us;     /* time of the last SYNC that has left */
@@ -119,7 +118,7 @@ struct machine {
     bool simulated;      /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured;     /* drives are configured; BOOT then waits for their first answers */
     uint8_t silent_node; /* BOOT again because this one was started and did not answer; 0: none */
-    bool boot_due;       /* the mainline shall find and configure the drives (anew) */
+    bool boot_due;       /* the main loop shall find and configure the drives (anew) */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
     bool unhomed_allowed; /* the next start is accepted though axes are not homed */
@@ -129,7 +128,7 @@ struct machine {
 
 void machine_init(struct machine *machine, const struct config *config);
 
-/* --- Requests, mainline under the lock; MACHINE_ACCEPTED or why not, then nothing has changed ---
+/* --- Requests, main loop under the lock; MACHINE_ACCEPTED or why not, then nothing has changed ---
  */
 
 enum machine_refusal machine_enable(struct machine *machine);
@@ -142,8 +141,8 @@ enum machine_refusal machine_quick_stop(struct machine *machine);
 /* Feed hold and its end; accepted as well when there is nothing to change. */
 enum machine_refusal machine_hold(struct machine *machine);
 enum machine_refusal machine_resume(struct machine *machine);
-/* Out of FAULT by way of BOOT; refused while something still brakes. From OFF to BOOT too: the drives are found and configured
- * anew. Else without effect. */
+/* Out of FAULT by way of BOOT; refused while something still brakes. From OFF to BOOT too: the drives are found and
+ * configured anew. Else without effect. */
 enum machine_refusal machine_reset(struct machine *machine);
 /* Axes with a homing method (0x2012) that are not homed: bit i for axis i + 1. Pure. */
 uint8_t machine_unhomed(const struct machine *machine);
@@ -157,7 +156,7 @@ enum machine_refusal machine_start(struct machine *machine, const struct motion 
 bool machine_take_over(struct machine *machine, const struct chunk *next,
                        const struct coefficients_window *window);
 
-/* Homing, from OFF to OFF. In between the mainline sets each axis's `goal` and `control_extra`
+/* Homing, from OFF to OFF. In between the main loop sets each axis's `goal` and `control_extra`
  * (under the lock); the targets follow the positions. It has failed when the state has left HOMING
  * before machine_end_homing, which then changes nothing. */
 enum machine_refusal machine_begin_homing(struct machine *machine);
@@ -179,22 +178,22 @@ bool machine_waits_for_chunk(const struct machine *machine);
 
 /* New configuration, where machine_configurable. When it concerns the drives: to BOOT. */
 void machine_configure(struct machine *machine, const struct config *config, bool drives);
-/* Forgets the drives, but not which of them are homed; the mainline has to find and configure them. Under the lock. */
+/* Forgets the drives, but not which of them are homed; the main loop has to find and configure them. Under the lock. */
 void machine_enter_boot(struct machine *machine);
-/* The mainline has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
+/* The main loop has found and configured all drives and started them (NMT): BOOT -> OFF as soon as
  * each has answered a SYNC; when one does not, they are configured and started anew. */
 void machine_drives_configured(struct machine *machine, bool simulated);
 
-/* Something is wrong: FAULT. With a program running and every drive following it stops along the path, else by quick stop.
- * Only the first fault counts, but a further one turns the stop along the path into a quick stop when a drive no longer
- * obeys. Any context, under the lock. */
+/* Something is wrong: FAULT. With a program running and every drive following it stops along the path, else by quick
+ * stop. Only the first fault counts, but a further one turns the stop along the path into a quick stop when a drive no
+ * longer follows. Any context, under the lock. */
 void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
 
 /* The drive's own emergency code has come: kept, and it takes the place of a vaguer code of the present fault. */
 void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code);
 
-/* In FAULT: gives every stop up and switches the drives off; those that do not answer are told to stop quickly until the
- * reset. Any context, under the lock. */
+/* In FAULT: gives every stop up and switches the drives off; those that do not answer get the command to stop quickly
+ * until the reset. Any context, under the lock. */
 void machine_switch_off(struct machine *machine);
 
 /* --- Timer --- */
@@ -219,8 +218,8 @@ struct machine_sent {
 };
 /* Last in a tick. More than MACHINE_UNSENT_MAX ticks in a row with a refused frame are a fault when drives are on. */
 void machine_note_sent(struct machine *machine, struct machine_sent sent);
-/* The same of a tick that sends nothing. It counts as one with a refused frame; with simulated drives, for which ticks may wait, only
- * where there has been no SYNC for twice the time that answers may be late. */
+/* The same of a tick that sends nothing. It counts as one with a refused frame; with simulated drives, for which ticks
+ * may wait, only where there has been no SYNC for twice the time that answers may be late. */
 void machine_note_waiting(struct machine *machine, uint32_t now_us);
 /* Moves on by one tick: states, goals and targets of the axes. */
 void machine_step(struct machine *machine);
@@ -235,8 +234,8 @@ static inline bool machine_drives_operational(const struct machine *machine)
 {
     return machine->state != MACHINE_BOOT;
 }
-/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost; and, where frames wait for the bus,
- * some have not answered yet. */
+/* Whether the next tick should wait for the drives' answers: they are simulated and not all lost; and, where frames
+ * wait for the bus, some have not answered yet. */
 bool machine_awaits_drives(const struct machine *machine);
 /* Whether at lock step the next tick should come as soon as the drives have answered: something
  * moves, switches or has to be waited for. */
@@ -244,11 +243,11 @@ bool machine_busy(const struct machine *machine);
 
 /* --- Receive --- */
 
-/* Takes what the TPDO1 of a node says; true when all drives have now answered the present SYNC. */
+/* Takes the TPDO1 of a node; true when all drives have now answered the present SYNC. */
 bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_actual *actual,
                      uint32_t now_us);
 
-/* A round of the mainline has begun. Under the lock. */
+/* A round of the main loop has begun. Under the lock. */
 static inline void machine_attend(struct machine *machine)
 {
     machine->unattended_us = 0;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/machine_drives.h (see there): all drives of a machine at once. */
 #include "app/machine/machine_drives.h"
 
 void machine_command(struct machine *machine, enum cia402_goal goal)
@@ -11,7 +12,7 @@ void machine_command(struct machine *machine, enum cia402_goal goal)
 bool machine_followed(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_obeys(&machine->axes[i])) {
+        if (!axis_follows(&machine->axes[i])) {
             return false;
         }
     }

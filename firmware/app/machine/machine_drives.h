@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* machine_drives: all drives of a machine at once: what they are told, how they are. Under the lock, any context. */
+/* machine_drives: all drives of a machine at once: their goals, and questions about their states. Under the lock, any
+ * context. */
 #ifndef APP_MACHINE_MACHINE_DRIVES_H
 #define APP_MACHINE_MACHINE_DRIVES_H
 

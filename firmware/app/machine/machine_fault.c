@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/machine_fault.h (see there): how the machine enters a fault, goes through its phases and
+ * leaves it. */
 #include "app/machine/machine_fault.h"
 
 #include "app/machine/machine_drives.h"
@@ -51,10 +53,20 @@ void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_
     }
 }
 
+/* An output that is short or open, an error of the module itself. With the drives off nothing depends on it. */
+static void note_module_error(struct machine *machine, uint8_t node, uint16_t code)
+{
+    const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
+    if (node == machine->config.outputs.node && code != EMCY_NO_ERROR && on) {
+        machine_raise(machine, code, node, 0);
+    }
+}
+
 void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code)
 {
     struct axis *axis = machine_axis(machine, node);
     if (axis == NULL) {
+        note_module_error(machine, node, code);
         return;
     }
     axis->error_code = code;
@@ -67,7 +79,8 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
     }
 }
 
-/* A drive that does not answer may still hear, and brake; one that moves yet would coast: power is not taken from them. */
+/* A drive that does not answer may still receive, and brake. One that still moves would coast without power. So their
+ * power stays on. */
 void machine_switch_off(struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
@@ -82,7 +95,7 @@ void machine_switch_off(struct machine *machine)
 
 enum machine_refusal machine_reset(struct machine *machine)
 {
-    if (machine->state == MACHINE_OFF) { /* nobody knows what somebody else has told the drives */
+    if (machine->state == MACHINE_OFF) { /* another node may have changed the drives */
         machine_enter_boot(machine);
     }
     if (machine->state != MACHINE_FAULT || machine->fault_phase == MACHINE_FAULT_RESETTING) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* machine_fault: the way of the machine into a fault, through its phases and out of it, beside what machine.h has of it
+/* machine_fault: how the machine enters a fault, goes through its phases and leaves it; machine.h declares the rest
  * (machine_raise, machine_note_emergency, machine_switch_off, machine_reset). Under the lock. */
 #ifndef APP_MACHINE_MACHINE_FAULT_H
 #define APP_MACHINE_MACHINE_FAULT_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the mainline asks of the machine. docs/reference/architecture.md has the table of requests by state. */
+/* What the main loop asks of the machine. docs/reference/architecture.md has the table of requests by state. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"

@@ -81,7 +81,7 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
 }
 
 /* Only while axes move by setpoints or by themselves: at standstill a check of a large program may take long. */
-static void supervise_mainline(struct machine *machine)
+static void supervise_main_loop(struct machine *machine)
 {
     if (machine->unattended_us <= MACHINE_UNATTENDED_US) {
         machine->unattended_us += machine->config.period_us;
@@ -92,7 +92,7 @@ static void supervise_mainline(struct machine *machine)
 
 void machine_supervise(struct machine *machine, uint32_t now_us)
 {
-    supervise_mainline(machine);
+    supervise_main_loop(machine);
     const bool well = machine->sync_waits ? drives_well(machine) : close_sync(machine, now_us);
     if (well) {
         return;

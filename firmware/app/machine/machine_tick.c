@@ -63,6 +63,10 @@ static void step_enabling(struct machine *machine)
 static void next_targets(struct machine *machine)
 {
     int32_t target_counts[AXES_MAX];
+    if (motion_rests(&machine->motion)) {
+        machine->statistics.program_tick = machine->motion.setpoints - 1u;
+        return;
+    }
     const int result = motion_step(&machine->motion, target_counts);
     if (result < 0) {
         machine_raise_quick(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
@@ -167,7 +171,7 @@ void machine_step(struct machine *machine)
         break;
     case MACHINE_OFF:
     case MACHINE_READY:
-    case MACHINE_HOMING: /* led by the mainline */
+    case MACHINE_HOMING: /* led by the main loop */
     default:
         break;
     }

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/motion.h (see there): the point on the path and the targets of the axes, in each tick of
+ * a program. */
 #include "app/machine/motion.h"
 
 #include <string.h>
@@ -14,6 +16,7 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     const int result = interpolator_begin(&motion->interp, program);
     if (result == 0) {
         feed_override_begin(&motion->feed, program, config->period_us, 0);
+        path_outputs_begin(&motion->outputs, program, -1);
     }
     return result;
 }
@@ -25,6 +28,7 @@ void motion_begin_job(struct motion *motion, const struct chunk *first,
     path_counts_init(&motion->scale, &first->program, config);
     interpolator_begin_window(&motion->interp, &first->program, window);
     feed_override_begin_job(&motion->feed, first, window, config->period_us);
+    path_outputs_begin(&motion->outputs, &first->program, -1);
 }
 
 bool motion_take_over(struct motion *motion, const struct chunk *next,
@@ -33,7 +37,17 @@ bool motion_take_over(struct motion *motion, const struct chunk *next,
     if (feed_override_take_over(&motion->feed, &motion->interp, next, window) == 0) {
         return false;
     }
-    motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+    if (chunk_begins_at_rest(next)) {
+        const uint32_t ticks = chunk_rest_ticks(next);
+        motion->rest_ticks = ticks > motion->rested_ticks ? ticks - motion->rested_ticks : 0u;
+        motion->rested_ticks = 0;
+        motion->point.arc_length_q40_mm = 0;
+        motion->precedes = true;
+        path_outputs_carry(&motion->outputs, &next->program, -1);
+    } else {
+        motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
+        path_outputs_carry(&motion->outputs, &next->program, motion->point.arc_length_q40_mm);
+    }
     return true;
 }
 
@@ -49,8 +63,25 @@ int motion_begin_at(struct motion *motion, const struct program *program,
     feed_override_begin(&motion->feed, program, config->period_us, time_q42_s);
     (void)interpolator_seek(&motion->interp, time_q42_s >> 10);
     (void)interpolator_at_q42(&motion->interp, time_q42_s, &motion->point);
+    path_outputs_begin(&motion->outputs, program, arc_length_q40_mm);
     path_counts_of(&motion->scale, &motion->point, start_counts);
     return 0;
+}
+
+bool motion_rests(struct motion *motion)
+{
+    const bool runs = feed_override_state(&motion->feed) == FEED_RUNNING;
+    if (!motion_waits(motion)) {
+        motion->rested_ticks = 0;
+    } else if (runs && motion->rested_ticks < UINT32_MAX) {
+        motion->rested_ticks++;
+    }
+    if (motion->rest_ticks == 0u || !runs) {
+        return false;
+    }
+    motion->rest_ticks--;
+    motion->setpoints++;
+    return true;
 }
 
 int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
@@ -60,6 +91,7 @@ int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX])
         return result;
     }
     motion->setpoints++;
+    motion->precedes = false;
     path_counts_of(&motion->scale, &motion->point, target_counts);
     return 0;
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * motion: a program on its way: what its plan and the commands make of a tick, point on the path and targets of the
- * axes that follow it.
+ * motion: a program that runs: from its feed plan and the commands, in each tick, the point on the path and the targets
+ * of the axes that follow it.
  *
- * Prepared by the mainline, then owned by the tick (under the port's lock).
+ * Prepared by the main loop, then owned by the tick (under the port's lock).
  */
 #ifndef APP_MACHINE_MOTION_H
 #define APP_MACHINE_MOTION_H
@@ -16,21 +16,27 @@
 #include "core/chunk.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
+#include "core/path_outputs.h"
 
 struct motion {
     struct interpolator interp;
     struct feed_override feed;
     struct interpolator_point point; /* of the last setpoint */
     uint32_t setpoints;              /* given so far */
+    uint32_t rested_ticks;           /* at the end of the program, running, until the next chunk */
+    uint32_t rest_ticks;             /* left before the program starts */
+    bool precedes; /* that setpoint is still the end of the chunk before: a rest is under way */
     struct path_counts scale;
+    struct path_outputs
+        outputs; /* at the last setpoint; stepped by `outputs`, where there is an I/O module */
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the
- * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Mainline; linear in the number of pieces. */
+ * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Main loop; linear in the number of pieces. */
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
 
 /* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
- * Mainline. */
+ * Main loop. */
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX]);
@@ -40,7 +46,9 @@ void motion_begin_job(struct motion *motion, const struct chunk *first,
                       const struct coefficients_window *window, const struct config *config);
 
 /* Goes on with the next chunk of the job, of which these records are there, where the motion is in the part that it shares with
- * the program under way, or rests: then true, and that program is not needed any more. Under the lock. */
+ * the program under way, or rests: then true, and that program is not needed any more. A chunk that begins at rest starts so many
+ * ticks after its predecessor has ended as it says (chunk_rest_ticks), at once when it comes later; ticks of a hold do not count.
+ * Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next,
                       const struct coefficients_window *window);
 
@@ -59,6 +67,10 @@ static inline uint32_t motion_axis_count(const struct motion *motion)
 {
     return motion->scale.axis_count;
 }
+
+/* Before motion_step in each tick: counts the ticks of a rest between two chunks. True: this tick repeats the last setpoint, and
+ * there is no motion_step. Timer. */
+bool motion_rests(struct motion *motion);
 
 /* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */
 void motion_stop(struct motion *motion);

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/offsets.h (see there): what feedforward adds to the setpoints of a motion, by axis of the
+ * path. */
 #include "app/machine/offsets.h"
 
 #include <stddef.h>

@@ -12,7 +12,7 @@
 
 struct offsets {
     struct feedforward axes[AXES_MAX];
-    uint32_t setpoints; /* of the motion, when last looked at; 0: none */
+    uint32_t setpoints; /* of the motion, at the last call; 0: none */
 };
 
 void offsets_init(struct offsets *offsets);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/path_counts.h (see there): the point of a program in counts of its path axes. */
 #include "app/machine/path_counts.h"
 
 #include <stddef.h>

@@ -18,11 +18,12 @@ struct path_counts {
 void path_counts_init(struct path_counts *scale, const struct program *program,
                       const struct config *config);
 
-/* First and last setpoint of a program with the configured kernel; unchanged where this image does not have it. Main loop. */
+/* First and last setpoint of a program with the configured kernel; unchanged where this image does not have it. Main
+ * loop. */
 void path_counts_ends(const struct program *program, const struct config *config,
                       int32_t start_counts[AXES_MAX], int32_t end_counts[AXES_MAX]);
 
-/* Those behind y, for the next function. */
+/* Those after y, for the next function. */
 void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,
                       int32_t counts[AXES_MAX]);
 

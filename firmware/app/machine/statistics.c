@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/statistics.h (see there): how the ticks went (object 0x2008). */
 #include "app/machine/statistics.h"
 
 void statistics_restart(struct statistics *statistics)

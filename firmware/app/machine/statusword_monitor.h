@@ -3,8 +3,8 @@
  * statusword_monitor: bits of a drive's statusword beside those of the state, while it is in Operation enabled.
  *
  * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the
- * command value" (12). Following error (13, in CSP) must not come. A wrong bit is a trouble when it is wrong in more than
- * STATUSWORD_MONITOR_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
+ * command value" (12). Following error (13, in CSP) must not come. A wrong bit is a trouble when it is wrong in more
+ * than STATUSWORD_MONITOR_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
  */
 #ifndef APP_MACHINE_STATUSWORD_MONITOR_H
 #define APP_MACHINE_STATUSWORD_MONITOR_H
@@ -28,8 +28,8 @@ void statusword_monitor_take(struct statusword_monitor *watch, uint16_t statuswo
 /* What is wrong, as an error code of app/machine/fault.h or canopen/emcy.h; 0: nothing. Pure. */
 uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch);
 
-/* Whether the drive, as far as the bits tell, obeys its controlword and follows its target: a following error alone
- * does not keep it from that. Pure. */
+/* Whether the drive, by these bits, follows its controlword and its target. A following error alone does not count.
+ * Pure. */
 bool statusword_monitor_follows(const struct statusword_monitor *watch);
 
 #endif

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/tpdo_monitor.h (see there): which SYNCs a drive has answered with its TPDO1, and which it
+ * has left unanswered. */
 #include "app/machine/tpdo_monitor.h"
 
 #include <string.h>

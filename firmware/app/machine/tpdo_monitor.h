@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * answers: which SYNCs a drive has answered with its TPDO1, and which it has left unanswered.
+ * tpdo_monitor: which SYNCs a drive has answered with its TPDO1, and which it has left unanswered.
  *
  * A TPDO1 does not say which SYNC it answers. One that is absent at the next SYNC is only late when two of them come
  * during a later SYNC, at most `wait_us` after the SYNC it belongs to; else it is missed. Only missed ones are counted,
- * late ones are not; of a drive that is lost all are. (A drive that stays one SYNC behind for good has missed one, as far as can be seen.)
+ * late ones are not; of a drive that is lost all are. (A drive that is late by one SYNC from some time on appears as
+ * one missed answer.)
  *
  * Guarded by the port's lock; times are port_time_us(), which wraps.
  */
@@ -38,8 +39,8 @@ void tpdo_monitor_take(struct tpdo_monitor *answers, uint32_t now_us);
 /* Counts anew from here on; a drive that is present stays so. Under the lock. */
 void tpdo_monitor_restart(struct tpdo_monitor *answers);
 
-/* The usual end of a SYNC: true when it was answered and none is unsettled; then nothing is missed. False, and nothing has
- * changed: tpdo_monitor_close_sync has to look. Timer. */
+/* The usual end of a SYNC: true when it was answered and none is unsettled; then nothing is missed. False, with nothing
+ * changed: tpdo_monitor_close_sync has to be called. Timer. */
 static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *answers)
 {
     if (answers->count == 0u || answers->unsettled != 0u) {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/common/ram_store.h (see there): the store of port.h in memory. */
 #include "port/common/ram_store.h"
 
 #include <string.h>

@@ -23,7 +23,7 @@
     ((PORT_STORE_BANKS_ALL - PORT_STORE_BANKS) * PORT_STORE_PARAMETER_BYTES)
 
 struct ram_store {
-    uint8_t *memory;     /* PORT_STORE_BANKS banks, one behind the other, aligned to 8 */
+    uint8_t *memory;     /* PORT_STORE_BANKS banks, one after the other, aligned to 8 */
     uint32_t bank_bytes; /* of each of these */
     uint8_t *parameters; /* RAM_STORE_PARAMETER_BYTES, aligned to 8 */
 };

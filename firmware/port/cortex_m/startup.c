@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/cortex_m/startup.h (see there): what every Cortex-M does between reset and main(). */
 #include "port/cortex_m/startup.h"
 
 #include <stddef.h>

@@ -9,16 +9,17 @@
  * the board's file in the order of its interrupt numbers, as far as the last one that it enables. NULL stands for one
  * that is never enabled. The table is aligned for 240 of them (port/cortex_m/sections.ld).
  *
- * Stack: only the main one, for mainline and interrupts. It is the lowest thing in RAM, so that where nothing lies
- * below, an overflow is a fault and not a changed variable; a Cortex-M33 has the limit in MSPLIM besides. That it
- * does not come to that is proven for each image when it is linked (tools/analysis/stack.py).
+ * Stack: only the main one, for main loop and interrupts. It is the lowest thing in RAM, so that where nothing lies
+ * below, an overflow is a fault and not a changed variable; a Cortex-M33 has the limit in MSPLIM besides. That it does
+ * not come to that is proven for each image when it is linked (tools/analysis/stack.py).
  *
- * FPU: on for all modes, and lazy stacking as after reset (FPCCR: ASPEN and LSPEN are 1). So interrupts may compute with
- * floats while the mainline does: entry leaves room for s0 to s15 and FPSCR on the stack (72 bytes more), which are
- * saved only when the handler first touches the FPU, by hardware. A handler without floats costs no more than without
- * an FPU; the tick with the float kernel pays for 17 words when it has interrupted a mainline that has used floats since
- * it began. s16 to s31 are saved by the functions that use them. Rounding is to nearest and subnormals are kept (FPSCR and FPDSCR are 0
- * after reset and nobody writes them): that is what makes the float kernel's bits those of the host.
+ * FPU: on for all modes, and lazy stacking as after reset (FPCCR: ASPEN and LSPEN are 1). So interrupts may compute
+ * with floats while the main loop does: entry leaves room for s0 to s15 and FPSCR on the stack (72 bytes more), which
+ * are saved only when the handler first touches the FPU, by hardware. A handler without floats costs no more than
+ * without an FPU; the tick with the float kernel pays for 17 words when it has interrupted a main loop that has used
+ * floats since it began. s16 to s31 are saved by the functions that use them. Rounding is to nearest and subnormals are
+ * kept (FPSCR and FPDSCR are 0 after reset and nobody writes them): that is what makes the float kernel's bits those of
+ * the host.
  */
 #ifndef PORT_CORTEX_M_STARTUP_H
 #define PORT_CORTEX_M_STARTUP_H

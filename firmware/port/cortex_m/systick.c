@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/cortex_m/systick.h (see there): sysTick as the tick's timer and as the clock of a port. */
 #include "port/cortex_m/systick.h"
 
 #include "port/cortex_m/core.h"

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * systick: SysTick as the tick's timer and as the clock of a port: what port.h wants to know of time on a Cortex-M that has no better
- * timer. Stands still at 0 before systick_begin().
+ * systick: SysTick as the tick's timer and as the clock of a port: what port.h wants to know of time on a Cortex-M that
+ * has no better timer. Stands still at 0 before systick_begin().
  *
- * SysTick counts down to 0, where its interrupt (startup_systick) becomes pending and the next period begins; so ticks never
- * drift, and none is closer to the next than a period less its own lateness. The core's clock must be a whole number of MHz, and a
- * period at most 2^24 of its counts (98 ms at 170 MHz).
+ * SysTick counts down to 0, where its interrupt (startup_systick) becomes pending and the next period begins; so ticks
+ * never drift, and none is closer to the next than a period less its own lateness. The core's clock must be a whole
+ * number of MHz, and a period at most 2^24 of its counts (98 ms at 170 MHz).
  */
 #ifndef PORT_CORTEX_M_SYSTICK_H
 #define PORT_CORTEX_M_SYSTICK_H
 
 #include <stdint.h>
 
-/* The first interrupt comes one period later. priority: 0 the highest, in the upper bits (core_enable). Mainline, interrupts masked. */
+/* The first interrupt comes one period later. priority: 0 the highest, in the upper bits (core_enable). Main loop,
+ * interrupts masked. */
 void systick_begin(uint32_t period_us, uint32_t core_mhz, uint8_t priority);
 void systick_end(void);
 
@@ -23,7 +24,7 @@ uint32_t systick_period_us(void);
 /* First of all in the interrupt: a period is over. */
 void systick_tick(void);
 
-/* Since then, as far as the core's clock tells. In that interrupt. */
+/* Since then, by the core's clock. In that interrupt. */
 uint32_t systick_late_ns(void);
 
 /* Any context, interrupts masked or not (for less than a period). Both wrap. */

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a
+ * local bus without any CAN of the kernel. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without any CAN of the kernel. Used by
- * the Linux port and by the simulated drives.
+ * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without any CAN of the kernel.
+ * Used by the Linux port and by the simulated drives.
  *
- * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that
- * this socket sends are not received by it; other sockets of the same machine see them.
+ * The socket never blocks. Remote, extended and error frames are dropped on the way in. Frames that this socket sends
+ * are not received by it; other sockets of the same machine see them.
  *
- * Tracking tells whether frames have been sent on the bus, not only queued: SocketCAN gives them back when the controller has
- * sent them (drivers without that, and vcan, when they are queued), a local bus in virtual time at their last bit. On a local bus in
- * real time, which has no bit times, nothing ever waits.
+ * Tracking shows whether frames have been sent on the bus, not only queued: SocketCAN gives them back when the
+ * controller has sent them (drivers without that, and vcan, when they are queued), a local bus in virtual time at their
+ * last bit. On a local bus in real time, which has no bit times, nothing ever waits.
  */
 #ifndef PORT_LINUX_CAN_SOCKET_H
 #define PORT_LINUX_CAN_SOCKET_H
@@ -74,7 +74,7 @@ int can_socket_send_many(struct can_socket *socket, const struct can_msg *messag
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
                        int *more);
 
-/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not tell. */
+/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not report them. */
 uint32_t can_socket_waiting_bytes(const struct can_socket *socket);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Opening an interface, and what to tell a user where that cannot be. */
+/* Opening an interface, and the message for the user where that fails. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 

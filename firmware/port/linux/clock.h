@@ -35,8 +35,8 @@ uint32_t clock_participant(void);
 /* A member of this process has sent something: the hub looks for it when the process waits. */
 void clock_note_sent(void);
 
-/* A signal has come outside of clock_poll(): the next one ends at once, and the hub tells those who watch. For signal
- * handlers. */
+/* A signal has come outside of clock_poll(): the next one ends at once, and the hub reports it to those who watch. For
+ * signal handlers. */
 void clock_note_signal(void);
 
 /* Monotonic. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/end_signals.h (see there): SIGTERM and SIGINT as something to wait for. */
 #define _GNU_SOURCE
 #include "port/linux/end_signals.h"
 

@@ -12,7 +12,7 @@
 #include "port/linux/interrupts_thread.h"
 #include "port/linux/schedule.h"
 
-#define LONGEST_SLEEP_NS 100000000u /* how late a wish to end may be noticed */
+#define LONGEST_SLEEP_NS 100000000u /* how late a request to end may be noticed */
 #define BATCHES_MAX      8u
 
 static struct {
@@ -28,8 +28,8 @@ static struct {
     uint64_t now_ns; /* of the present interrupt */
     bool lock_step;
     bool real_time; /* ticks come in time, as far as the machine permits */
-    clockid_t mainline_clock;
-    uint32_t mainline_turns; /* atomic too */
+    clockid_t main_loop_clock;
+    uint32_t main_loop_turns; /* atomic too */
 } self;
 
 static __thread bool in_tick;
@@ -97,8 +97,8 @@ static void hand_over(const struct can_msg *messages, int count)
     port_unlock();
 }
 
-/* All that has come is taken before a due tick, so that no answer counts as missing that lies in the socket. But a flood
- * of frames must not keep the tick waiting for ever. */
+/* All that has come is taken before a due tick, so that no answer counts as missing that lies in the socket. But a
+ * flood of frames must not keep the tick waiting for ever. */
 static void receive_waiting(void)
 {
     struct can_msg messages[CAN_SOCKET_BATCH];
@@ -123,25 +123,25 @@ static uint64_t time_to_sleep_ns(void)
     return wait_ns < longest_ns ? wait_ns : longest_ns;
 }
 
-void interrupts_mainline_sleeps(void)
+void interrupts_main_loop_sleeps(void)
 {
-    (void)__atomic_add_fetch(&self.mainline_turns, 1u, __ATOMIC_RELAXED);
+    (void)__atomic_add_fetch(&self.main_loop_turns, 1u, __ATOMIC_RELAXED);
 }
 
-static uint64_t mainline_had_ns(void)
+static uint64_t main_loop_had_ns(void)
 {
     struct timespec had = {0, 0};
-    (void)clock_gettime(self.mainline_clock, &had);
+    (void)clock_gettime(self.main_loop_clock, &had);
     return (uint64_t)had.tv_sec * CLOCK_NS_PER_S + (uint64_t)had.tv_nsec;
 }
 
 /* At lock step no thread here is a real-time one, and the scheduler is fair. */
 static bool gives_way(void)
 {
-    const uint32_t turns = __atomic_load_n(&self.mainline_turns, __ATOMIC_RELAXED);
+    const uint32_t turns = __atomic_load_n(&self.main_loop_turns, __ATOMIC_RELAXED);
     return !self.lock_step && !clock_is_virtual() &&
            schedule_overdue(&self.schedule, self.now_ns, turns) &&
-           schedule_yield(&self.schedule, self.now_ns, mainline_had_ns());
+           schedule_yield(&self.schedule, self.now_ns, main_loop_had_ns());
 }
 
 /* Sleeps until frames come or a tick is due, `longest_ns` at most, and does what they ask for. */
@@ -210,7 +210,7 @@ int interrupts_start(const struct port_handlers *handlers, uint32_t period_us)
 {
     self.handlers = *handlers;
     self.now_ns = clock_ns();
-    if (pthread_getcpuclockid(pthread_self(), &self.mainline_clock) != 0) {
+    if (pthread_getcpuclockid(pthread_self(), &self.main_loop_clock) != 0) {
         return PORT_ERR_SYSTEM;
     }
     schedule_begin(&self.schedule, self.now_ns, (uint64_t)period_us * 1000u, self.lock_step);

@@ -1,16 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * interrupts: one thread that stands for the CAN receive interrupt and the timer interrupt of a
- * microcontroller.
+ * interrupts: one thread that stands for the CAN receive interrupt and the timer interrupt of a microcontroller.
  *
- * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the
- * tick. Both handlers run with the lock of port_lock() held. At real-time pace it asks for
- * SCHED_FIFO and locked memory; where that is not permitted it says so once and runs as an ordinary
- * thread. Ticks give way to a mainline that gets no turn (schedule.h). At fast pace it is a batch thread: it shall not take the processor from the simulated
- * drives it waits for.
+ * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the tick. Both handlers run
+ * with the lock of port_lock() held. At real-time pace it asks for SCHED_FIFO and locked memory; where that is not
+ * permitted it says so once and runs as an ordinary thread. Ticks are delayed for a main loop that gets no processor
+ * time (schedule.h). At fast pace it is a batch thread: it shall not take the processor from the simulated drives it
+ * waits for.
  *
- * In virtual time (clock.h) there is no thread: the mainline runs the interrupts while it sleeps, so that what
- * the controller does is one sequence.
+ * In virtual time (clock.h) there is no thread: the main loop runs the interrupts while it sleeps, so that what the
+ * controller does is one sequence.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
 #define PORT_LINUX_INTERRUPTS_H
@@ -24,14 +23,14 @@
 /* Prepares the lock. 0 or PORT_ERR_SYSTEM. */
 int interrupts_begin(struct can_socket *socket, bool lock_step);
 
-/* Starts the thread; the caller is the mainline. 0 or PORT_ERR_SYSTEM. */
+/* Starts the thread; the caller is the main loop. 0 or PORT_ERR_SYSTEM. */
 int interrupts_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* The mainline goes to sleep, for INTERRUPTS_SLEEP_MAX_US at most: it has had its turn. */
+/* The main loop goes to sleep, for INTERRUPTS_SLEEP_MAX_US at most: it has had its turn. */
 #define INTERRUPTS_SLEEP_MAX_US 10000u
-void interrupts_mainline_sleeps(void);
+void interrupts_main_loop_sleeps(void);
 
-/* Virtual time: sleeps until an interrupt comes, for `longest_ns` at most, and runs it. Mainline. */
+/* Virtual time: sleeps until an interrupt comes, for `longest_ns` at most, and runs it. Main loop. */
 void interrupts_run(uint64_t longest_ns);
 
 /* Whether the caller is a tick. */

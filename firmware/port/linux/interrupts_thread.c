@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/interrupts_thread.h (see there): how the thread of the interrupts is made. */
 #define _GNU_SOURCE
 #include "port/linux/interrupts_thread.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* interrupts_thread: how the thread of the interrupts is made: as one that others wait for, or as one that waits for
- * others. Mainline. */
+ * others. Main loop. */
 #ifndef PORT_LINUX_INTERRUPTS_THREAD_H
 #define PORT_LINUX_INTERRUPTS_THREAD_H
 
@@ -11,8 +11,8 @@
  * ordinary thread. 0 or an errno. */
 int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused), bool *permitted);
 
-/* Starts `run` under SCHED_BATCH: it does not interrupt the simulated drives when the first of them has answered, but is
- * woken once for all answers. 0 or an errno. */
+/* Starts `run` under SCHED_BATCH: it does not interrupt the simulated drives when the first of them has answered, but
+ * is woken once for all answers. 0 or an errno. */
 int interrupts_thread_batch(pthread_t *thread, void *(*run)(void *unused));
 
 #endif

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/local_connection.h (see there): opening a connection to the hub of a local bus
+ * (local_bus.h). */
 #define _GNU_SOURCE
 #include "port/linux/local_connection.h"
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/options.h (see there): the command line of hodograph-controller. */
 #include "port/linux/options.h"
 
 #include <stdio.h>

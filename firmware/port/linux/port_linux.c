@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The Linux port: SocketCAN, a thread for the interrupts, main() for the mainline. */
+/* The Linux port: SocketCAN, a thread for the interrupts, main() for the main loop. */
 #define _GNU_SOURCE
 #include "port/port.h"
 
@@ -28,7 +28,7 @@ static struct {
     bool waits; /* frames of ticks, for the bus */
     uint64_t waits_since_ns;
     volatile sig_atomic_t stop;  /* signals so far, 2 at most */
-    volatile sig_atomic_t woken; /* virtual time: the mainline has something to do */
+    volatile sig_atomic_t woken; /* virtual time: the main loop has something to do */
 } self;
 
 static void on_signal(int number)
@@ -147,7 +147,8 @@ int port_can_send(const struct can_msg *message)
     return error == 0 ? 0 : PORT_ERR_FULL;
 }
 
-/* An interface that goes bus-off drops what it was to send, and nothing tells. On a local bus nothing is lost. */
+/* An interface that goes bus-off drops the frames that it was to send, without a report. On a local bus nothing is
+ * lost. */
 bool port_can_delivered(void)
 {
     if (can_socket_waiting(&self.socket) == 0u) {
@@ -205,7 +206,7 @@ static void wait_really(uint32_t timeout_us)
 void port_wait(uint32_t timeout_us)
 {
     timeout_us = timeout_us < INTERRUPTS_SLEEP_MAX_US ? timeout_us : INTERRUPTS_SLEEP_MAX_US;
-    interrupts_mainline_sleeps();
+    interrupts_main_loop_sleeps();
     if (clock_is_virtual()) {
         wait_virtually(timeout_us);
     } else {

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/linux/schedule.h (see there): when the next tick is due. */
 #include "port/linux/schedule.h"
 
 #include <string.h>
@@ -26,10 +27,10 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
     schedule->hurry = false;
     schedule->lock_step = lock_step;
     schedule->urgent = false;
-    memset(&schedule->mainline, 0, sizeof schedule->mainline);
-    schedule->mainline.turn_ns = now_ns;
-    schedule->mainline.tick_ns = SCHEDULE_YIELD_NS;
-    schedule->mainline.left_ns = SCHEDULE_YIELDS_NS;
+    memset(&schedule->main_loop, 0, sizeof schedule->main_loop);
+    schedule->main_loop.turn_ns = now_ns;
+    schedule->main_loop.tick_ns = SCHEDULE_YIELD_NS;
+    schedule->main_loop.left_ns = SCHEDULE_YIELDS_NS;
 }
 
 void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry)
@@ -81,51 +82,52 @@ uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns)
     schedule->started_ns = now_ns;
     schedule->awaiting = false;
     schedule->hurry = false;
-    schedule->mainline.tick_ns = SCHEDULE_YIELD_NS;
-    schedule->mainline.slept_ns = 0;
+    schedule->main_loop.tick_ns = SCHEDULE_YIELD_NS;
+    schedule->main_loop.slept_ns = 0;
     return schedule->lock_step ? 0u : lateness_ns(schedule, now_ns);
 }
 
 bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns)
 {
-    struct schedule_mainline *mainline = &schedule->mainline;
-    if (turns != mainline->turns) {
-        mainline->turns = turns;
-        mainline->turn_ns = now_ns;
-        mainline->judged_ns = 0;
-        mainline->left_ns = SCHEDULE_YIELDS_NS;
+    struct schedule_main_loop *main_loop = &schedule->main_loop;
+    if (turns != main_loop->turns) {
+        main_loop->turns = turns;
+        main_loop->turn_ns = now_ns;
+        main_loop->judged_ns = 0;
+        main_loop->left_ns = SCHEDULE_YIELDS_NS;
     }
-    return !schedule->urgent && now_ns - mainline->turn_ns > SCHEDULE_TURN_NS;
+    return !schedule->urgent && now_ns - main_loop->turn_ns > SCHEDULE_TURN_NS;
 }
 
-static bool has_its_share(struct schedule_mainline *mainline, uint64_t now_ns, uint64_t had_ns)
+static bool has_its_share(struct schedule_main_loop *main_loop, uint64_t now_ns, uint64_t had_ns)
 {
-    if (mainline->judged_ns == 0u) {
-        mainline->judged_ns = now_ns;
-        mainline->had_ns = had_ns;
+    if (main_loop->judged_ns == 0u) {
+        main_loop->judged_ns = now_ns;
+        main_loop->had_ns = had_ns;
     }
-    return (had_ns - mainline->had_ns) * SCHEDULE_MAINLINE_SHARE >= now_ns - mainline->judged_ns;
+    return (had_ns - main_loop->had_ns) * SCHEDULE_MAIN_LOOP_SHARE >= now_ns - main_loop->judged_ns;
 }
 
-/* Slices as for the guard: a stall of the whole machine gave the mainline nothing. */
-static void count_yield(struct schedule_mainline *mainline, uint64_t now_ns)
+/* Slices as for the guard: a stall of the whole machine gave the main loop nothing. */
+static void count_yield(struct schedule_main_loop *main_loop, uint64_t now_ns)
 {
-    if (mainline->slept_ns != 0u) {
-        const uint64_t slice_ns = sooner(now_ns - mainline->slept_ns, 2u * SCHEDULE_YIELD_SLICE_NS);
-        mainline->tick_ns -= sooner(slice_ns, mainline->tick_ns);
-        mainline->left_ns -= sooner(slice_ns, mainline->left_ns);
+    if (main_loop->slept_ns != 0u) {
+        const uint64_t slice_ns =
+            sooner(now_ns - main_loop->slept_ns, 2u * SCHEDULE_YIELD_SLICE_NS);
+        main_loop->tick_ns -= sooner(slice_ns, main_loop->tick_ns);
+        main_loop->left_ns -= sooner(slice_ns, main_loop->left_ns);
     }
-    mainline->slept_ns = now_ns;
+    main_loop->slept_ns = now_ns;
 }
 
 bool schedule_yield(struct schedule *schedule, uint64_t now_ns, uint64_t had_ns)
 {
-    struct schedule_mainline *mainline = &schedule->mainline;
-    if (has_its_share(mainline, now_ns, had_ns)) {
+    struct schedule_main_loop *main_loop = &schedule->main_loop;
+    if (has_its_share(main_loop, now_ns, had_ns)) {
         return false;
     }
-    count_yield(mainline, now_ns);
-    if (mainline->tick_ns == 0u || mainline->left_ns == 0u) {
+    count_yield(main_loop, now_ns);
+    if (main_loop->tick_ns == 0u || main_loop->left_ns == 0u) {
         return false;
     }
     schedule->due_ns = now_ns + SCHEDULE_YIELD_SLICE_NS;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/mps2/interrupts.h (see there): the tick, and what both links do with a frame that came. */
 #include "port/mps2/interrupts.h"
 
 #include <string.h>
@@ -11,7 +12,7 @@
 static struct {
     const struct link *link;
     struct port_handlers handlers;
-    struct link_wish wish;
+    struct link_request request;
     uint32_t late_ns;        /* of the next tick */
     volatile uint32_t ticks; /* so far; wraps */
     volatile bool woken;
@@ -50,7 +51,7 @@ void port_tick_period(uint32_t period_us)
 
 void port_tick_await(uint32_t guard_us, bool hurry)
 {
-    self.wish = (struct link_wish){.guard_us = guard_us, .awaiting = true, .hurry = hurry};
+    self.request = (struct link_request){.guard_us = guard_us, .awaiting = true, .hurry = hurry};
 }
 
 void port_tick_urgent(bool urgent)
@@ -65,7 +66,7 @@ enum port_timing port_timing(void)
 
 void port_tick_ready(void)
 {
-    self.wish.awaiting = false;
+    self.request.awaiting = false;
 }
 
 void interrupts_receive(const struct can_msg *message)
@@ -87,11 +88,11 @@ void startup_systick(void)
 {
     systick_tick();
     self.ticks++;
-    self.wish = (struct link_wish){.awaiting = false};
+    self.request = (struct link_request){.awaiting = false};
     self.in_tick = true;
     run_tick();
     self.in_tick = false;
-    self.late_ns = self.link->after_tick(&self.wish);
+    self.late_ns = self.link->after_tick(&self.request);
 }
 
 /* The mask does not nest with itself here: port.h has it so. */

@@ -2,9 +2,9 @@
 /*
  * interrupts: the tick, and what both links do with a frame that came.
  *
- * Priorities: SysTick 0, the UART below it. So a tick interrupts the taking of characters, never the receive handler, which runs with all
- * interrupts masked. The FPU keeps its state lazily, as after reset: an interrupt reserves room on the stack, and the registers are saved only
- * when it computes with floats while the mainline was doing so.
+ * Priorities: SysTick 0, the UART below it. So a tick interrupts the taking of characters, never the receive handler,
+ * which runs with all interrupts masked. The FPU keeps its state lazily, as after reset: an interrupt reserves room on
+ * the stack, and the registers are saved only when it computes with floats while the main loop was doing so.
  */
 #ifndef PORT_MPS2_INTERRUPTS_H
 #define PORT_MPS2_INTERRUPTS_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line (docs/guides/target.md):
+ * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line
+ * (docs/guides/target.md):
  *
  *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
  *   link_slcan  text on a UART, received by interrupt in real time
@@ -15,19 +16,19 @@
 #include "port/mps2/command_line.h"
 #include "port/port.h"
 
-/* What the tick wishes of the next one: port_tick_await(). */
-struct link_wish {
+/* What a tick requests for the next one: port_tick_await(). */
+struct link_request {
     uint32_t guard_us;
     bool awaiting; /* until port_tick_ready() */
     bool hurry;
 };
 
 struct link {
-    /* Whether the mainline sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that only costs the emulator
-     * changes of its threads, so it spins there. */
+    /* Whether the main loop sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that
+     * only costs the emulator changes of its threads, so it spins there. */
     bool sleeps;
 
-    /* Mainline, in this order. 0 or PORT_ERR_SYSTEM. */
+    /* Main loop, in this order. 0 or PORT_ERR_SYSTEM. */
     int (*begin)(const struct command_line *line);
     int (*accept)(const struct can_match *filters, size_t count);
 
@@ -37,14 +38,14 @@ struct link {
     /* port_can_delivered(): in a tick. */
     bool (*delivered)(void);
 
-    /* In the tick's interrupt, after the tick. `wish` changes when a frame that was received ends the waiting. Returns how late the next tick
-     * will be, in ns. */
-    uint32_t (*after_tick)(const struct link_wish *wish);
+    /* In the tick's interrupt, after the tick. `request` changes when a frame that was received ends the waiting. Returns
+     * how late the next tick will be, in ns. */
+    uint32_t (*after_tick)(const struct link_request *request);
 
-    /* What was sent last leaves. Mainline, with the tick ended. */
+    /* What was sent last leaves. Main loop, with the tick ended. */
     void (*end)(void);
 
-    bool (*stop_requested)(void); /* when it becomes true the link wakes the mainline */
+    bool (*stop_requested)(void); /* when it becomes true the link wakes the main loop */
     bool (*failed)(void);         /* the other end is gone */
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right behind the tick. */
+/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right after the tick. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"
@@ -103,20 +103,20 @@ static bool delivered(void)
     return (self.in.header.flags & EXCHANGE_WAITING) == 0u;
 }
 
-static uint16_t tick_flags(const struct link_wish *wish)
+static uint16_t tick_flags(const struct link_request *request)
 {
-    const unsigned await = wish->awaiting ? EXCHANGE_AWAIT : 0u;
-    const unsigned hurry = wish->awaiting && wish->hurry && self.fast ? EXCHANGE_HURRY : 0u;
+    const unsigned await = request->awaiting ? EXCHANGE_AWAIT : 0u;
+    const unsigned hurry = request->awaiting && request->hurry && self.fast ? EXCHANGE_HURRY : 0u;
     return (uint16_t)(EXCHANGE_TICK | await | hurry);
 }
 
 /* Until the next tick is due; at lock step that is when all have answered, which need not be said, and no tick is late. */
-static uint32_t after_tick(const struct link_wish *wish)
+static uint32_t after_tick(const struct link_request *request)
 {
-    const uint16_t flags = tick_flags(wish);
-    exchange(flags, wish->guard_us);
+    const uint16_t flags = tick_flags(request);
+    exchange(flags, request->guard_us);
     while ((self.in.header.flags & EXCHANGE_DUE) == 0u) {
-        if (wish->awaiting) {
+        if (request->awaiting) {
             exchange(EXCHANGE_AWAIT, 0);
         } else if ((flags & EXCHANGE_HURRY) != 0u) {
             return 0;

@@ -10,7 +10,7 @@ static struct {
     struct slcan_decoder decoder;
     struct can_match filters[PORT_FILTERS];
     size_t filter_count;
-    uint32_t mark; /* behind the last frame of a tick */
+    uint32_t mark; /* after the last frame of a tick */
     volatile bool stop;
 } self;
 
@@ -58,16 +58,16 @@ static int send(const struct can_msg *message)
     return sent ? 0 : PORT_ERR_FULL;
 }
 
-/* Up to the adapter: what waits there nobody tells. */
+/* Up to the adapter: what waits there is not known. */
 static bool delivered(void)
 {
     return uart_passed(self.mark);
 }
 
 /* The clock alone says when the next tick is due. */
-static uint32_t after_tick(const struct link_wish *wish)
+static uint32_t after_tick(const struct link_request *request)
 {
-    (void)wish;
+    (void)request;
     return 0;
 }
 
@@ -84,7 +84,7 @@ static bool stop_requested(void)
     return self.stop;
 }
 
-/* A line does not tell that nobody is at its other end. */
+/* A line does not show whether anybody is at its other end. */
 static bool failed(void)
 {
     return false;

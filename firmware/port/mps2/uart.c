@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both ways by interrupt. */
 #include "port/mps2/uart.h"
 
 #include "port/cortex_m/core.h"

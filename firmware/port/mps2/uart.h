@@ -17,7 +17,7 @@ void uart_begin(void (*receive)(char character));
 /* All of it or nothing: false when the ring has no room. Any context. */
 bool uart_send(const char *text, uint32_t length);
 
-/* A mark behind what has been sent so far, and whether all before it has left. Any context. */
+/* A mark after what has been sent so far, and whether all before it has left. Any context. */
 uint32_t uart_mark(void);
 bool uart_passed(uint32_t mark);
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/rv32/startup.h (see there): what a RISC-V hart does between reset and main(). */
 #include "port/rv32/startup.h"
 
 #include <stddef.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/semihost/semihost.h (see there): semihosting: files, console and exit of an emulated board. */
 #include "port/semihost/semihost.h"
 
 #include <string.h>

@@ -29,7 +29,8 @@ int semihost_read_some(int handle, void *data, size_t size);
 /* Closes it. 0, or -1 when the host could not write what was left. */
 int semihost_close(int handle);
 
-/* The words that the emulator was told to hand on, joined by blanks. 0, or -1 when there are none or they do not fit. */
+/* The words that the emulator was given to hand on, joined by blanks. 0, or -1 when there are none or they do not
+ * fit. */
 int semihost_command_line(char *line, size_t size);
 
 /* Text for the host's console. */

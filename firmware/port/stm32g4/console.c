@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/console.h (see there): LPUART1 on PA2, which the board's ST-LINK shows as a serial port. */
 #include "port/stm32g4/console.h"
 
 #include "port/stm32g4/pins.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/faults.h (see there): hard faults and uncorrectable words of the flash. */
 #include "port/stm32g4/faults.h"
 
 #include <stdbool.h>

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/fdcan.h (see there): FDCAN1 for classic frames with 11-bit identifiers. */
 #include "port/stm32g4/fdcan.h"
 
 #include <string.h>
@@ -17,7 +18,7 @@
 
 #define ALL_BUFFERS   ((1u << FDCAN_FIFO_ELEMENTS) - 1u)
 #define ALL_FLAGS     0xFFFFFFFFu
-#define FRAME_BITS    135u /* the longest: 8 bytes, all stuff bits, and the gap behind it */
+#define FRAME_BITS    135u /* the longest: 8 bytes, all stuff bits, and the gap after it */
 #define SPARE_BITS    25u
 #define COUNTS_PER_S  10000000u
 #define GUARD_MAX     2500u
@@ -84,7 +85,7 @@ static void reject_unless(size_t filters)
                          reg_field(FDCAN_RXGFC_LSS, (uint32_t)filters));
 }
 
-/* A quarter of the shortest period at most: on a slow bus SYNC has to wait rather than the mainline for ever. */
+/* A quarter of the shortest period at most: on a slow bus SYNC has to wait rather than the main loop for ever. */
 static uint32_t guard(uint32_t bits_s)
 {
     const uint32_t frame = (FRAME_BITS + SPARE_BITS) * (COUNTS_PER_S / bits_s);
@@ -186,8 +187,8 @@ static void transmit(uint32_t status, const struct can_msg *message)
     put(FDCAN_TXBAR, 1u << index);
 }
 
-/* The queue whose turn it is, with `room` free elements in the chip. What stays back before a tick has its turn when the
- * tick's own frames have gone. */
+/* The queue whose turn it is, with `room` free elements in the chip. What stays back before a tick has its turn when
+ * the tick's own frames have gone. */
 static struct fdcan_queue *next_queue(struct fdcan *can, uint32_t room)
 {
     if (queue_front(&can->urgent) != NULL) {
@@ -209,7 +210,7 @@ static void feed(struct fdcan *can)
             return;
         }
         transmit(status, message);
-        can->mainline_last = queue == &can->ordinary;
+        can->main_loop_last = queue == &can->ordinary;
         queue_drop(queue);
     }
 }
@@ -226,13 +227,13 @@ bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sen
     return taken;
 }
 
-/* The chip sends in the order of the requests, and takes a frame of the mainline only when it is empty: where that is the youngest
- * there, those of the interrupts have gone. */
+/* The chip sends in the order of the requests, and takes a frame of the main loop only when it is empty: where that is
+ * the youngest there, those of the interrupts have gone. */
 bool fdcan_delivered(const struct fdcan *can)
 {
     const uint8_t before = cpu_hold(CPU_PRIORITY_TICK);
     const uint32_t room = reg_get(get(FDCAN_TXFQS), FDCAN_TXFQS_TFFL);
-    const bool in_chip = room < FDCAN_FIFO_ELEMENTS && !can->mainline_last;
+    const bool in_chip = room < FDCAN_FIFO_ELEMENTS && !can->main_loop_last;
     const bool waits = queue_front(&can->urgent) != NULL || in_chip;
     (void)cpu_hold(before);
     return can->off || !waits;

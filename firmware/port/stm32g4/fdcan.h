@@ -2,31 +2,32 @@
 /*
  * fdcan: FDCAN1 for classic frames with 11-bit identifiers.
  *
- * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the mainline (SDO, heartbeats), each in order. The
- * chip's own FIFO of three takes all that the interrupts send; from the mainline it gets one frame at a time, when it is
- * empty and the next tick is further off than the longest frame takes. So SYNC does not queue behind what the mainline has
- * to say: it waits, as on any bus, for the one frame that is on the wire.
+ * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the main loop (SDO, heartbeats), each in
+ * order. The chip's own FIFO of three takes all that the interrupts send; from the main loop it gets one frame at a
+ * time, when it is empty and the next tick is further off than the longest frame takes. So SYNC does not queue behind
+ * what the main loop has to say: it waits, as on any bus, for the one frame that is on the wire.
  *
- * Receiving. The chip's FIFO of three, 141 us of the shortest frames at 1 Mbit/s: the receive interrupt must not be held
- * off longer. What matches no filter is rejected by the chip, as are remote and extended frames.
+ * Receiving. The chip's FIFO of three, 141 us of the shortest frames at 1 Mbit/s: the receive interrupt must not be
+ * held off longer. What matches no filter is rejected by the chip, as are remote and extended frames.
  *
  * Bus-off. The chip leaves the bus by itself. All frames that wait are dropped, as they are old when the bus is back,
- * sending is refused, and the chip is told to come back, which it does after 129 times 11 recessive bits (1.4 ms at 1 Mbit/s): without
- * limit and without help, as CiA 301 leaves it to the node. The application sees a port that refuses its frames.
+ * sending is refused, and the chip gets the command to come back, which it does after 129 times 11 recessive bits (1.4
+ * ms at 1 Mbit/s): without limit and without help, as CiA 301 leaves it to the node. The application sees a port that
+ * refuses its frames.
  *
- * Bit rates. FDCAN1 is clocked by the board's 24 MHz crystal (HSE) itself, not by the PLL. A sample point at 87.5 % = 7/8
- * is exact where the time quanta of a bit are a multiple of 8:
+ * Bit rates. FDCAN1 is clocked by the board's 24 MHz crystal (HSE) itself, not by the PLL. A sample point at 87.5 % =
+ * 7/8 is exact where the time quanta of a bit are a multiple of 8:
  *
  *     crystal   24 MHz / 1 Mbit/s = 24 quanta: 1 + 20 before the sample, 3 after it; 21/24 = 87.5 %
  *     PLL       its 340 MHz give 170, 85, 56.7 or 42.5 MHz here: 170 or 85 quanta, no multiple of 8
  *     PCLK1     170 MHz, the same
  *
- * The crystal serves 500, 250 and 125 kbit/s with the same 24 quanta and prescalers 2, 4, 8, and has no jitter of a PLL. At 1 Mbit/s
- * the bits of two nodes may differ by 0.48 % (3 quanta after the sample, jump width 3); a crystal is good for 0.01 %,
- * the chip's own RC oscillator (1 %) is not good enough.
+ * The crystal serves 500, 250 and 125 kbit/s with the same 24 quanta and prescalers 2, 4, 8, and has no jitter of a
+ * PLL. At 1 Mbit/s the bits of two nodes may differ by 0.48 % (3 quanta after the sample, jump width 3); a crystal is
+ * good for 0.01 %, the chip's own RC oscillator (1 %) is not good enough.
  *
- * Pins, clock and interrupt lines are the caller's business. "Any context": interrupts of priority CPU_PRIORITY_TICK and
- * lower, and the mainline; the functions hold these off where they must.
+ * Pins, clock and interrupt lines are the caller's business. "Any context": interrupts of priority CPU_PRIORITY_TICK
+ * and lower, and the main loop; the functions hold these off where they must.
  */
 #ifndef PORT_STM32G4_FDCAN_H
 #define PORT_STM32G4_FDCAN_H
@@ -58,22 +59,23 @@ struct fdcan_events {
 
 struct fdcan {
     struct fdcan_queue urgent;   /* of the interrupts */
-    struct fdcan_queue ordinary; /* of the mainline */
+    struct fdcan_queue ordinary; /* of the main loop */
     struct fdcan_events events;
-    bool mainline_last;   /* the youngest frame in the chip is the mainline's */
-    uint32_t guard_100ns; /* before a tick, in which the mainline's frames stay back */
+    bool main_loop_last;  /* the youngest frame in the chip is the main loop's */
+    uint32_t guard_100ns; /* before a tick, in which the main loop's frames stay back */
     bool off;             /* not on the bus: not started, or bus-off */
 };
 
 enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
 
-/* Configures the chip and stays off the bus. False: not one of 1000000, 500000, 250000 and 125000 bit/s, or the chip does not answer (no clock). Mainline. */
+/* Configures the chip and stays off the bus. False: not one of 1000000, 500000, 250000 and 125000 bit/s, or the chip
+ * does not answer (no clock). Main loop. */
 bool fdcan_begin(struct fdcan *can, uint32_t bits_s);
 
 /* Between begin and start. False: more filters than the chip has (28). No filter: nothing passes. */
 bool fdcan_accept(const struct can_match *filters, size_t count);
 
-/* Enters the bus (after 11 recessive bits), leaves it. Mainline. */
+/* Enters the bus (after 11 recessive bits), leaves it. Main loop. */
 void fdcan_start(struct fdcan *can);
 void fdcan_stop(struct fdcan *can);
 
@@ -88,7 +90,7 @@ uint32_t fdcan_acknowledge(void);
 bool fdcan_fetch(struct can_msg *message);
 void fdcan_attend(struct fdcan *can, uint32_t acknowledged);
 
-/* Mainline. */
+/* Main loop. */
 struct fdcan_events fdcan_take_events(struct fdcan *can);
 
 /* Error counters of the chip: transmit, receive (0 to 255, 0 to 127). Any context. */

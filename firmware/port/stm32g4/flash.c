@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/flash.h (see there): erasing and programming pages of the second flash bank, while the
+ * program runs from the first. */
 #include "port/stm32g4/flash.h"
 
 #include <string.h>

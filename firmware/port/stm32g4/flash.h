@@ -3,10 +3,10 @@
  * flash: erasing and programming pages of the second flash bank, while the program runs from the first.
  *
  * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts go on: they run
- * from bank 1, which can be read meanwhile; whoever reads bank 2 meanwhile is stopped until it is over. Mainline.
+ * from bank 1, which can be read meanwhile; whoever reads bank 2 meanwhile is stopped until it is over. Main loop.
  *
- * The data cache is off meanwhile and empty afterwards: of other dual-bank chips of the family it is known that it may keep wrong
- * data of a read while a write is under way, and after an erase it would keep the old contents.
+ * The data cache is off meanwhile and empty afterwards: of other dual-bank chips of the family it is known that it may
+ * keep wrong data of a read while a write is under way, and after an erase it would keep the old contents.
  */
 #ifndef PORT_STM32G4_FLASH_H
 #define PORT_STM32G4_FLASH_H

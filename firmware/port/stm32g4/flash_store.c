@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/flash_store.h (see there): the banks of port.h's store in the chip's second flash bank. */
 #include "port/stm32g4/flash_store.h"
 
 #include <string.h>

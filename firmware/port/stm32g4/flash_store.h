@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KB each for two programs, then a page (2 KB)
- * each for two sets of parameters.
+ * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KB each for two programs, then a page
+ * (2 KB) each for two sets of parameters.
  *
- * All lie there because the firmware runs from the first: erasing a page of the bank one runs from stops
- * the core for 22 ms, which is 22 ticks.
+ * All lie there because the firmware runs from the first: erasing a page of the bank one runs from stops the core for
+ * 22 ms, which is 22 ticks.
  *
- * Erasing a bank erases its last page only, which holds what makes the rest count (app/bank_record.h); every other page is
- * erased when the first write reaches it. So no call takes longer than a page and what is written takes. A bank that is
- * broken off anywhere needs no repair: the next erase begins anew.
+ * Erasing a bank erases its last page only, which holds what makes the rest count (app/bank_record.h); every other page
+ * is erased when the first write reaches it. So no call takes longer than a page and what is written takes. A bank that
+ * is broken off anywhere needs no repair: the next erase begins anew.
  *
- * Writes collect eight bytes, which is what the flash programs and protects by its error correction at once; each double word is
- * programmed once. Mainline.
+ * Writes collect eight bytes, which is what the flash programs and protects by its error correction at once; each
+ * double word is programmed once. Main loop.
  */
 #ifndef PORT_STM32G4_FLASH_STORE_H
 #define PORT_STM32G4_FLASH_STORE_H
@@ -23,8 +23,8 @@
 #define FLASH_STORE_BYTES           0x1F800u /* a bank for a program */
 #define FLASH_STORE_PARAMETER_BYTES 0x800u   /* a bank for parameters */
 
-/* Like the functions of port.h; false: outside the bank, out of order, or the memory did not take it. The one bank that was
- * erased last can be written. */
+/* Like the functions of port.h; false: outside the bank, out of order, or the memory did not take it. The one bank that
+ * was erased last can be written. */
 uint32_t flash_store_size(unsigned bank); /* 0: there is no such bank */
 bool flash_store_erase(unsigned bank);
 bool flash_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/irq.h (see there): the two interrupts of the controller, and the port's lock. */
 #include "port/stm32g4/irq.h"
 
 #include "port/stm32g4/cpu.h"

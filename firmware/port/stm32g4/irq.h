@@ -6,7 +6,7 @@
  *     FDCAN1 IT0  priority 2: frames that came, the next ones to send, bus-off
  *
  * The tick may begin while frames are fetched, but not while the application has one: `receive` is called with the tick
- * held off, a frame at a time. The mainline's critical section holds off both. So the application sees what
+ * held off, a frame at a time. The main loop's critical section holds off both. So the application sees what
  * port.h promises, and a tick waits for one call of `receive` at most, a few microseconds.
  */
 #ifndef PORT_STM32G4_IRQ_H
@@ -17,14 +17,14 @@
 #include "port/port.h"
 #include "port/stm32g4/fdcan.h"
 
-/* Both on; the first tick comes one period later. Mainline. */
+/* Both on; the first tick comes one period later. Main loop. */
 void irq_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us);
 void irq_stop(void);
 
-/* From the next tick on. Mainline, or the tick. */
+/* From the next tick on. Main loop, or the tick. */
 void irq_period(uint32_t period_us);
 
-/* Ticks so far. Mainline. */
+/* Ticks so far. Main loop. */
 uint32_t irq_ticks(void);
 
 /* The handlers themselves, for the vectors. */

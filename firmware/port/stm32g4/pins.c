@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/pins.h (see there): the pins that the port uses. */
 #include "port/stm32g4/pins.h"
 
 #include "port/stm32g4/reg_clock.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/tick_timer.h (see there): the clocks of the port, and when the next tick is due. */
 #include "port/stm32g4/tick_timer.h"
 
 #include "port/stm32g4/reg_io.h"

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/stm32g4/watchdog.h (see there): the independent watchdog. */
 #include "port/stm32g4/watchdog.h"
 
 #include "port/stm32g4/reg_clock.h"

@@ -132,7 +132,7 @@ class Job:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, one line each: what was left out, which words the machine does not obey."""
+        """What the user should know, one line each: what was left out, which words the machine does not execute."""
         return self._job.notes
 
     @property

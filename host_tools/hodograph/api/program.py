@@ -77,7 +77,7 @@ class Run:
 
     @property
     def orientation_error(self) -> Real:
-        """Of the axes behind x, y, z (n, A - 3): how far they are from where the exact path has them beside the point
+        """Of the axes after x, y, z (n, A - 3): how far they are from where the exact path has them beside the point
         nearest to the tool; degrees, or mm of axes that do not turn."""
         return self._motion.orientation_error[: self._motion.ticks]
 

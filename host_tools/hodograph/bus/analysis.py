@@ -13,7 +13,7 @@ from ..config import Machine
 from ..errors import RunError
 from ..native import NativeProgram
 from ..simulate import Motion, analyse, settling_ticks
-from .capture.decode import RPDO1, SYNC_ID, Ticks, decode_ticks, unhomed_starts
+from .capture.decode import RPDO1, SYNC_ID, Ticks, decode_outputs, decode_ticks, unhomed_starts
 from .capture.frames import Frames
 from .capture.setpoint_check import require_no_jump, step_limits
 
@@ -65,7 +65,8 @@ def analyse_recording(
     _, setpoints = program.setpoints(kernel, machine.path_counts)
     require_no_jump(frames, machine.nodes, step_limits(machine, setpoints))
     ticks = decode_ticks(frames, machine.nodes)
-    motion = _motion(image, program, ticks, setpoints, machine, kernel)
+    outputs = None if machine.outputs is None else decode_outputs(frames, machine.outputs)
+    motion = _motion(image, program, ticks, setpoints, machine, kernel, outputs)
     return motion, recorded_load(frames, machine_bus_time(machine))
 
 
@@ -153,6 +154,7 @@ def _motion(
     setpoints: NDArray[np.int32],
     machine: Machine,
     kernel: str,
+    outputs: NDArray[np.void] | None,
 ) -> Motion:
     if ticks.volts_mv is None:
         volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
@@ -163,6 +165,7 @@ def _motion(
     first = first_tick(ticks.targets[path], setpoints) if found is None else found
     count = program.ticks + settling_ticks(machine.period_us)
     reached = slice(first + REACHED_AFTER, first + REACHED_AFTER + count)
+    latched = None if outputs is None else outputs[reached]
     motion = analyse(
         image,
         ticks.targets[path][first : first + count],
@@ -172,6 +175,8 @@ def _motion(
         counts_per_mm=machine.path_counts,
         names=machine.path_names,
         units=machine.path_units,
+        outputs=machine.outputs,
+        latched=latched,
     )
     return motion if ticks.volts_mv is not None else replace(motion, max_volts=None)
 

@@ -31,9 +31,9 @@ SHORTEST_MOVE_MM = 0.002
 """Shorter moves (the format ends near 1 um) go by way of a point DETOUR_MM away."""
 DETOUR_MM = 0.1
 DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
-"""The same where axes behind x, y, z move and these do not: mm for each degree, or mm, of the longest of those ways."""
+"""The same where axes after x, y, z move and these do not: mm for each degree, or mm, of the longest of those ways."""
 FOLLOWING_SHARE = 0.5
-"""Of the axis limits, for moves of axes behind x, y, z: at their full speed they could not stop within stop_time_ms."""
+"""Of the axis limits, for moves of axes after x, y, z: at their full speed they could not stop within stop_time_ms."""
 
 Place = tuple[float, ...]
 """Of path axes, mm or degrees: the two or three that draw a path, or these and the axes that follow them."""
@@ -75,7 +75,7 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
 
 
 def _along(machine: Machine, start_mm: Place, end_mm: Place) -> Machine:
-    """The machine with limits along the straight way at which the axes behind x, y, z keep theirs.
+    """The machine with limits along the straight way at which the axes after x, y, z keep theirs.
 
     Stops are looked for down to a share of the limits along the way, which such axes may be far below.
     """
@@ -102,7 +102,7 @@ def _line(start_mm: Place, end_mm: Place) -> PHSpline | SpatialPHSpline:
 def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, Place]]:
     """The straight moves that lead from one point to another: none, one, or two for a tiny way of x, y, z.
 
-    Axes behind x, y, z move on the first of two.
+    Axes after x, y, z move on the first of two.
     """
     if start_mm == end_mm:
         return []
@@ -127,7 +127,7 @@ def goto(
     unhomed: bool = False,
 ) -> float:
     """Moves from the present setpoint to a point in counts of the path's axes, in the order of the path; returns the
-    way in mm, at standstill. Axes that it does not name hold their position. Where axes behind x, y, z move and these
+    way in mm, at standstill. Axes that it does not name hold their position. Where axes after x, y, z move and these
     do not, x makes a small way and comes back: a program has no motion without a way.
 
     The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes

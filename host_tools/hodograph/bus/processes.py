@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import shlex
 import shutil
 import signal
@@ -37,6 +38,10 @@ def find_program(name: str) -> Path:
         if os.access(folder / name, os.X_OK):
             return folder / name
     found = shutil.which(name)
+    if found is None and platform.system() != "Linux":
+        raise BusError(
+            f"{name} runs on Linux only: use the container or a Linux computer (docs/guides/windows-macos.md)"
+        )
     if found is None:
         raise BusError(
             f"{name} is not there (looked for {_REPOSITORY / 'build' / 'bin' / name} and in PATH): "
@@ -74,10 +79,12 @@ def controller_command(
 
 
 def drive_command(machine: Machine, address: BusAddress) -> list[str]:
-    """Command line of the one process that simulates all drives."""
+    """Command line of the one process that simulates all drives, and the I/O module."""
     command = [str(find_program(DRIVE)), "--bus", address.channel]
     for axis, drive in zip(machine.axes, machine.models(machine.axes), strict=True):
         command += ["--axis", _axis_text(axis, drive)]
+    if machine.outputs is not None:
+        command += ["--module", str(machine.outputs.node)]
     return command
 
 

@@ -41,14 +41,21 @@ def status_rows(
     return rows
 
 
-_STREAM_STATES = ("none", "open", "waits for its next part", "ended", "stopped before its end")
+_STREAM_STATES = (
+    "none",
+    "open",
+    "waits for its next part",
+    "ended",
+    "stopped before its end",
+    "waits at a program stop: hodograph resume goes on",
+)
 
 
 def stream_words(stream: StreamStatus) -> str:
     """A job in chunks: line, motion ahead, time left."""
     left = "time left not known"
     if stream.remaining_s is not None:
-        left = f"{stream.committed_s + stream.remaining_s:.0f} s left"
+        left = f"{stream.remaining_s:.0f} s left"
     return (
         f"{_STREAM_STATES[stream.state]}, line {stream.line}, {stream.way_mm:.3f} mm, "
         f"{stream.committed_s:.1f} s ahead in the controller, {left}, {stream.underruns} rests for want of chunks"

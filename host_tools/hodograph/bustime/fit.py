@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from ..config import Machine
 from ..config.axis_table import MAX_AXES
+from ..config.outputs import Outputs
 from ..errors import InputError
 from .model import BusTime
 from .pdos import PdoChoice
@@ -19,10 +20,16 @@ BITRATES = (125_000, 250_000, 500_000, 800_000, 1_000_000)
 
 
 def bus_time(
-    drives: Mapping[int, PdoChoice], period_us: int, bitrate: int, *, controller: int = 1
+    drives: Mapping[int, PdoChoice],
+    period_us: int,
+    bitrate: int,
+    *,
+    controller: int = 1,
+    outputs: Outputs | None = None,
 ) -> BusTime:
-    """The bus time of these drives, by node."""
-    return BusTime(messages(drives, period_us, controller=controller), bitrate, period_us)
+    """The bus time of these drives, by node, and of an I/O module."""
+    found = messages(drives, period_us, controller=controller, outputs=outputs)
+    return BusTime(found, bitrate, period_us)
 
 
 def machine_bus_time(machine: Machine) -> BusTime:
@@ -42,6 +49,7 @@ def _with(
         period_us or machine.period_us,
         bitrate or machine.bitrate,
         controller=machine.node,
+        outputs=machine.outputs,
     )
 
 

@@ -16,7 +16,7 @@ COMPUTE_US = 55
 """Assumed of the controller, from the request of SYNC to that of the last setpoint: the shortest SYNC at 1 Mbit/s."""
 
 _SCALE = 1_000_000
-_SENT_WITH_SYNC = ("setpoints", "offsets")
+_SENT_WITH_SYNC = ("setpoints", "offsets", "outputs")
 """By the controller, ready `compute_us` after the request of SYNC: while it is on the wire, as a rule."""
 
 

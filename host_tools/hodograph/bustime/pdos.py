@@ -14,7 +14,7 @@ import canopen
 from canopen.objectdictionary import datatypes
 
 from ..config import Axis, Machine
-from ..data import DRIVE_EDS
+from ..data import DRIVE_EDS, object_dictionary
 from ..errors import InputError
 
 CONTROLWORD, TARGET, TORQUE_OFFSET, VELOCITY_OFFSET = 0x60400010, 0x607A0020, 0x60B20010, 0x60B10020
@@ -83,7 +83,7 @@ def drive_pdos(
     TPDO2 and TPDO3 are left out where the EDS has no such object.
     """
     try:
-        dictionary = canopen.import_od(str(eds), node_id=node)
+        dictionary = object_dictionary(eds, node)
         return tuple(_pdos(dictionary, node, choice or PdoChoice()))
     except (OSError, ValueError, KeyError, TypeError, configparser.Error) as error:
         text = " ".join(str(error).split())

@@ -10,10 +10,11 @@ from functools import cache
 import numpy as np
 
 from ..config import Machine
+from ..config.outputs import Outputs
 from .frame_bits import exact_bits, generic_worst_bits, plain_bits, worst_bits
 from .pdos import PdoChoice, axis_choice, drive_pdos
 
-SYNC_ID, HEARTBEAT_ID, SDO_ID = 0x080, 0x700, 0x580
+SYNC_ID, RPDO1_ID, HEARTBEAT_ID, SDO_ID = 0x080, 0x200, 0x700, 0x580
 SYNC_OVERFLOW = 240
 HEARTBEAT_MS = 100
 SDO_BYTES = 8
@@ -21,11 +22,11 @@ SDO_BYTES = 8
 INHIBIT_US = 10_000
 """Of TPDO3: it comes when an input changes, but not sooner than this after the last one."""
 
-SPORADIC = ("inputs",)
+SPORADIC = ("inputs", "outputs")
 """Kinds of frames that may stay away altogether."""
 CYCLIC = ("SYNC", "setpoints", "offsets", "positions", "volts")
 """Kinds of frames that come once a tick."""
-NEEDED = ("SYNC", "setpoints", "offsets", "positions")
+NEEDED = ("SYNC", "setpoints", "offsets", "outputs", "positions")
 """Those that must be through before the next SYNC: the drive latches, the controller supervises."""
 _KINDS = {
     "RPDO1": "setpoints",
@@ -71,9 +72,13 @@ def sync_bits() -> tuple[int, int]:
 
 
 def messages(
-    drives: Mapping[int, PdoChoice], period_us: int, *, controller: int = 1
+    drives: Mapping[int, PdoChoice],
+    period_us: int,
+    *,
+    controller: int = 1,
+    outputs: Outputs | None = None,
 ) -> tuple[Message, ...]:
-    """All frames in steady motion, most urgent first; `drives` by node."""
+    """All frames in steady motion, most urgent first; `drives` by node. Outputs may change in each tick."""
     found = [Message("SYNC", SYNC_ID, 1, period_us)]
     for node, choice in drives.items():
         for pdo in drive_pdos(node, choice):
@@ -82,8 +87,10 @@ def messages(
             found.append(Message(kind, pdo.cob_id, pdo.size, least_us))
     found += [
         Message("heartbeats", HEARTBEAT_ID + node, 1, 1000 * HEARTBEAT_MS)
-        for node in (controller, *drives)
+        for node in (controller, *drives, *((outputs.node,) if outputs is not None else ()))
     ]
+    if outputs is not None:
+        found.append(Message("outputs", RPDO1_ID + outputs.node, outputs.frame_bytes, period_us))
     return tuple(sorted(found, key=lambda message: message.identifier))
 
 

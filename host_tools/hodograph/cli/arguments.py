@@ -28,7 +28,12 @@ from .options import (
 def _init(command: Command) -> None:
     init = command("init", "write a machine file, a path file and a drive file to begin with")
     init.add_argument(
-        "folder", metavar="DIR", type=Path, nargs="?", default=Path(), help="default: here"
+        "folder",
+        metavar="DIR",
+        type=Path,
+        nargs="?",
+        default=Path(),
+        help="folder (default: the current one)",
     )
 
 
@@ -38,7 +43,11 @@ def _schema(command: Command) -> None:
         "name", metavar="NAME", nargs="?", help="path, machine, drive, campaign or scenario"
     )
     schema.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="write DIR/NAME.schema.json (default: all)"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="write DIR/NAME.schema.json; without NAME all schemas",
     )
 
 
@@ -69,7 +78,11 @@ def _compile(command: Command) -> None:
     options.toolpath(compile_)
     options.json(compile_)
     compile_.add_argument(
-        "-o", "--output", type=Path, metavar="IMAGE", help="default: FILE with .hdgp, here"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="IMAGE",
+        help="image file (default: FILE with .hdgp, in the current folder)",
     )
 
 
@@ -82,13 +95,13 @@ def _inspect(command: Command) -> None:
 
 
 def _verify(command: Command) -> None:
-    verify = command("verify", "look whether a program keeps the limits of its path file")
+    verify = command("verify", "check whether a program keeps the limits of its path file")
     options.file(verify, what=f"path file (TOML), or {options.TOOLPATH}")
     options.toolpath(verify)
     options.machine(verify)
     options.json(verify)
     verify.add_argument(
-        "--program", type=Path, metavar="IMAGE", help="look at this image, not at FILE planned anew"
+        "--program", type=Path, metavar="IMAGE", help="check this image instead of planning FILE"
     )
 
 
@@ -97,12 +110,14 @@ def _import(command: Command) -> None:
     options.file(import_, what=options.TOOLPATH)
     options.machine(import_)
     options.toolpath(import_)
-    import_.add_argument("-o", "--output", type=Path, metavar="TOML", help="write it there")
+    import_.add_argument(
+        "-o", "--output", type=Path, metavar="TOML", help="write sections and commands to this file"
+    )
     options.json(import_)
 
 
 def _simulate(command: Command) -> None:
-    simulate = command("simulate", "run a path without a bus, as fast as it goes")
+    simulate = command("simulate", "run a path without a bus, as fast as the computer can")
     options.file(simulate, what=f"path file (TOML), or {options.TOOLPATH}")
     options.toolpath(simulate)
     options.machine(simulate)
@@ -112,7 +127,7 @@ def _simulate(command: Command) -> None:
         "--trace",
         type=Path,
         metavar="CSV",
-        help="write one row a tick; with stops a file for each, CSV.KIND-S.csv, as well",
+        help="write one row a tick; for each stop write a file of its own too, CSV.KIND-S.csv",
     )
     for name, text in (
         ("hold", "feed hold"),
@@ -137,7 +152,12 @@ def _report(command: Command) -> None:
     options.machine(report)
     options.kernel(report)
     report.add_argument(
-        "-o", "--output", type=Path, default=Path("report"), metavar="DIR", help="default: report"
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("report"),
+        metavar="DIR",
+        help="folder (default: report)",
     )
 
 
@@ -145,16 +165,22 @@ def _campaign(command: Command) -> None:
     campaign = command("campaign", "make many simulated runs on all cores, or on a cluster")
     options.file(campaign, what="campaign file (TOML)")
     campaign.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", help="default: FILE without .toml, here"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="DIR",
+        help="folder (default: FILE without .toml, in the current folder)",
     )
     campaign.add_argument(
         "--workers", type=at_least_one, metavar="N", help="processes (default: one for each core)"
     )
     campaign.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, as tcp://host:8786"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of the scheduler of a Dask cluster, such as tcp://host:8786",
     )
     campaign.add_argument(
-        "--fresh", action="store_true", help="begin anew, whatever DIR holds already"
+        "--fresh", action="store_true", help="make all runs, also those that DIR already holds"
     )
     options.json(campaign)
 
@@ -168,10 +194,17 @@ def _dbc(command: Command) -> None:
     dbc = command("dbc", "write the bus of a machine as a DBC file for other CAN tools")
     dbc.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
     dbc.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="default: MACHINE with .dbc, here"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="DBC file (default: MACHINE with .dbc, in the current folder)",
     )
     dbc.add_argument(
-        "--eds", type=Path, metavar="EDS", help="of the drives (default: the simulated drive's)"
+        "--eds",
+        type=Path,
+        metavar="EDS",
+        help="EDS file of the drives (default: that of the simulated drives)",
     )
 
 
@@ -183,12 +216,14 @@ def _tune(command: Command) -> None:
         type=Path,
         action="append",
         metavar="FILE",
-        help="path for the table of contour errors, and, without --bandwidth, to be best for (may be repeated)",
+        help="print contour errors of this path; without --bandwidth search the best loop for it (may be repeated)",
     )
     tune.add_argument(
         "--bandwidth", type=positive, metavar="HZ", help="natural frequency of the closed loop"
     )
-    tune.add_argument("--damping", type=positive, metavar="Z", help="of it (default 1)")
+    tune.add_argument(
+        "--damping", type=positive, metavar="Z", help="damping of the closed loop (default 1)"
+    )
     tune.add_argument(
         "--stiffness",
         type=positive,
@@ -198,7 +233,7 @@ def _tune(command: Command) -> None:
     tune.add_argument(
         "--interpolation",
         choices=INTERPOLATIONS,
-        help="of setpoints in the drives (default: as they have it)",
+        help="how the drives join setpoints (default: as in their files)",
     )
     tune.add_argument(
         "--velocity",
@@ -218,7 +253,7 @@ def _tune(command: Command) -> None:
         type=finite,
         default=125.0,
         metavar="US",
-        help="dead time that the margins must stand, beyond the model's (default 125)",
+        help="additional dead time with which the margins must hold (default 125)",
     )
     tune.add_argument("--report", type=Path, metavar="DIR", help="write a report with figures")
     tune.add_argument(
@@ -238,9 +273,11 @@ def _identify(command: Command) -> None:
         type=Path,
         required=True,
         metavar="FILE",
-        help="machine file it was made with: nodes, and drive files with the loops",
+        help="machine file of that run: nodes, and drive files with the servo loops",
     )
-    identify.add_argument("--channel", metavar="NAME", help="of a recording with several")
+    identify.add_argument(
+        "--channel", metavar="NAME", help="channel to read, if the recording has several"
+    )
     identify.add_argument(
         "-o", "--output", type=Path, metavar="FILE", help="write a machine file and its drive files"
     )
@@ -269,10 +306,14 @@ def _goto(command: Command) -> None:
         "file", metavar="FILE", type=Path, help="path file, or a machine file with --to"
     )
     goto.add_argument(
-        "--to", type=finite, nargs=2, metavar=("X", "Y"), help="move there instead (machine mm)"
+        "--to",
+        type=finite,
+        nargs=2,
+        metavar=("X", "Y"),
+        help="move to this point instead (machine coordinates, mm)",
     )
     goto.add_argument(
-        "--z", type=finite, metavar="Z", help="with --to: of the third axis that draws paths"
+        "--z", type=finite, metavar="Z", help="with --to: coordinate of the third path axis"
     )
     options.unhomed(goto)
     options.machine(goto)
@@ -293,18 +334,24 @@ def _stream(command: Command) -> None:
         "--continue",
         dest="resume",
         action="store_true",
-        help="go on with the job of the journal where the machine rests",
+        help="continue the job of the journal from where the machine rests",
     )
     stream.add_argument(
         "--journal",
         type=Path,
         metavar="JSON",
-        help="of the job (default stream.json in ~/.local/state/hodograph)",
+        help="journal of the job (default stream.json in ~/.local/state/hodograph)",
     )
     stream.add_argument(
         "--simulate",
         action="store_true",
         help="no bus: plan all chunks, check them and take them over as the controller does",
+    )
+    stream.add_argument(
+        "--record",
+        type=Path,
+        metavar="RECORDING",
+        help="keep all frames of the bus meanwhile: .log (candump), .asc or .blf",
     )
     options.unhomed(stream)
     stream.add_argument("--machine", type=Path, metavar="FILE", help="machine file")
@@ -324,7 +371,9 @@ def _stream(command: Command) -> None:
 def _pace(parser: ArgumentParser) -> None:
     """--pace, of commands that find a controller or start one."""
     parser.add_argument(
-        "--pace", choices=PACES, help="of a controller started here (default real-time)"
+        "--pace",
+        choices=PACES,
+        help="pace of a controller that this command starts (default real-time)",
     )
 
 
@@ -382,7 +431,12 @@ def _rig(command: Command) -> None:
     )
     options.bus(rig, can_serve=True)
     options.kernel(rig)
-    rig.add_argument("--pace", choices=PACES, default="real-time")
+    rig.add_argument(
+        "--pace",
+        choices=PACES,
+        default="real-time",
+        help="pace of the controller (default real-time)",
+    )
     options.controller(rig)
 
 
@@ -390,14 +444,14 @@ _MOVING = (_upload, _goto, _run, _stream, _demo, _rig)
 
 
 def _start(command: Command) -> None:
-    start = command("start", "switch the drives on if need be and start the loaded program")
+    start = command("start", "switch the drives on if they are off, and start the loaded program")
     start.add_argument("--reset", action="store_true", help="reset a fault first")
     start.add_argument(
         "--from",
         dest="from_mm",
         type=finite,
         metavar="MM",
-        help="from rest at this arc length, where the axes must stand",
+        help="start at this arc length, where the axes must stand",
     )
     start.add_argument("--follow", action="store_true", help="return when the axes stand again")
     options.unhomed(start)
@@ -407,7 +461,7 @@ def _start(command: Command) -> None:
 
 def _stop(command: Command) -> None:
     stop = command("stop", "stop on the path, jerk-limited")
-    stop.add_argument("--off", action="store_true", help="then switch the drives off")
+    stop.add_argument("--off", action="store_true", help="switch the drives off afterwards")
     options.bus(stop)
     options.node(stop)
 
@@ -415,7 +469,7 @@ def _stop(command: Command) -> None:
 def _hold(command: Command) -> None:
     for name, text in (
         ("hold", "hold the feed: come to rest on the path until resumed"),
-        ("resume", "go on after a hold"),
+        ("resume", "continue after a hold"),
     ):
         parser_ = command(name, text)
         options.bus(parser_)
@@ -425,7 +479,9 @@ def _hold(command: Command) -> None:
 
 
 def _scan(command: Command) -> None:
-    scan = command("scan", "find the nodes on a bus, and what its drives say of themselves")
+    scan = command(
+        "scan", "find the nodes on a bus, and print what its drives report about themselves"
+    )
     options.bus_name(scan)
     scan.add_argument(
         "--bitrate", type=bit_rate, default=1_000_000, metavar="N", help="bit/s (default 1000000)"
@@ -436,7 +492,9 @@ def _scan(command: Command) -> None:
     )
     scan.add_argument("--force", action="store_true", help="replace a file that is there")
     scan.add_argument(
-        "--no-lss", action="store_true", help="do not ask for nodes without number (LSS Fastscan)"
+        "--no-lss",
+        action="store_true",
+        help="do not search for nodes without a number (LSS Fastscan)",
     )
     scan.add_argument(
         "--assign",
@@ -444,10 +502,12 @@ def _scan(command: Command) -> None:
         action="append",
         default=[],
         metavar="[SERIAL=]NODE",
-        help="give the node without number, or that with this serial number, a node number (LSS)",
+        help="give this node number to the only node without one, or to that with this serial number (LSS)",
     )
     scan.add_argument(
-        "--store", action="store_true", help="--assign: the nodes keep their number without power"
+        "--store",
+        action="store_true",
+        help="with --assign: the nodes keep their number without power",
     )
     options.json(scan)
 
@@ -459,7 +519,7 @@ def _check(command: Command) -> None:
     check.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
     options.bus_name(check)
     options.answer_wait(check)
-    check.add_argument("--all", action="store_true", help="print what is as needed, too")
+    check.add_argument("--all", action="store_true", help="also print objects that are as needed")
     options.json(check)
 
 
@@ -476,7 +536,7 @@ def _machine_file(parser: ArgumentParser, then: str = "") -> None:
 
 def _home(command: Command) -> None:
     home = command(
-        "home", "find the zero of every axis that has a homing method; drives off before and after"
+        "home", "home every axis that has a homing method; drives are off before and after"
     )
     _machine_file(home, ": configure the controller from it first")
     options.bus(home)
@@ -486,18 +546,19 @@ def _home(command: Command) -> None:
 
 def _configure(command: Command) -> None:
     configure = command(
-        "configure", "bring the controller's configuration to a machine file, keep it, or forget it"
+        "configure",
+        "write a machine file's configuration to the controller, store it, or clear what is stored",
     )
     _machine_file(configure)
     configure.add_argument(
         "--store",
         action="store_true",
-        help="keep the parameters over a loss of power, until they are stored again",
+        help="store the parameters, so that they are kept without power",
     )
     configure.add_argument(
         "--forget",
         action="store_true",
-        help="forget what is stored: after the next power-on the controller has no configuration",
+        help="clear what is stored: after the next power-on the controller has no configuration",
     )
     configure.add_argument(
         "--set-node",
@@ -533,16 +594,23 @@ def _status(command: Command) -> None:
     options.bus(status)
     status.add_argument("--node", type=node_number, help="the controller's node number (default 1)")
     status.add_argument(
-        "--machine", type=Path, metavar="FILE", help="for node number, bit rate, names of the axes"
+        "--machine",
+        type=Path,
+        metavar="FILE",
+        help="machine file, for node number, bit rate and names of the axes",
     )
     options.json(status)
     status.add_argument(
         "--watch",
         action="store_true",
-        help="again and again until Ctrl-C; with --json a line each time",
+        help="repeat until Ctrl-C; with --json one line each time",
     )
     status.add_argument(
-        "--interval", type=seconds, default=0.5, metavar="S", help="of --watch (default 0.5)"
+        "--interval",
+        type=seconds,
+        default=0.5,
+        metavar="S",
+        help="time between two outputs of --watch (default 0.5)",
     )
 
 
@@ -575,21 +643,28 @@ def _monitor(command: Command) -> None:
         default="127.0.0.1",
         help="address to serve (default 127.0.0.1: this machine only)",
     )
-    parser.add_argument("--port", type=port_number, default=8402, help="default 8402")
-    parser.add_argument("--token", help="what commands need (default: made up, and printed)")
-    parser.add_argument("--token-file", type=Path, metavar="FILE", help="a file that holds it")
-    parser.add_argument("--replay", type=Path, metavar="FILE", help="a recording instead of a bus")
+    parser.add_argument("--port", type=port_number, default=8402, help="TCP port (default 8402)")
     parser.add_argument(
-        "--speed", type=finite, default=1.0, metavar="N", help="of the replay (default 1)"
+        "--token", help="token that a browser needs to give commands (default: random, printed)"
+    )
+    parser.add_argument("--token-file", type=Path, metavar="FILE", help="file that holds the token")
+    parser.add_argument(
+        "--replay", type=Path, metavar="FILE", help="show this recording instead of a bus"
+    )
+    parser.add_argument(
+        "--speed", type=finite, default=1.0, metavar="N", help="speed of the replay (default 1)"
     )
 
 
 def _record(command: Command) -> None:
     record = command("record", "record the bus into a file until Ctrl-C")
     record.add_argument("file", metavar="RECORDING", type=Path, help=".log (candump), .asc or .blf")
-    record.add_argument("--seconds", type=seconds, metavar="S", help="for so long only")
+    record.add_argument("--seconds", type=seconds, metavar="S", help="stop after this time")
     options.bus_name(record)
-    options.node(record, "for nodes and limits of the setpoints (without: the controller's)")
+    options.node(
+        record,
+        "machine file, for nodes and limits of the setpoints (default: the controller's limits)",
+    )
     options.json(record)
 
 
@@ -601,7 +676,9 @@ def _replay(command: Command) -> None:
     replay.add_argument("file", metavar="FILE", type=Path, help="path file, or a program image")
     options.machine(replay)
     options.kernel(replay)
-    replay.add_argument("--channel", metavar="NAME", help="where the recording has several")
+    replay.add_argument(
+        "--channel", metavar="NAME", help="channel to read, if the recording has several"
+    )
     replay.add_argument("--trace", type=Path, metavar="CSV", help="write one row a tick")
     replay.add_argument(
         "--report", type=Path, metavar="DIR", help="write report.html and figures there"
@@ -614,28 +691,37 @@ def _latency(command: Command) -> None:
     latency.add_argument(
         "--bus",
         metavar="INTERFACE:CHANNEL",
-        help="listen to the controller there (default: one started here, on a local bus in real time)",
+        help="bus of the controller to measure (default: one that is started, on a local bus in real time)",
     )
     latency.add_argument(
-        "--machine", type=Path, metavar="FILE", help="for the period (default: an example, 1000 us)"
+        "--machine",
+        type=Path,
+        metavar="FILE",
+        help="machine file, for the period (default: an example, 1000 us)",
     )
     latency.add_argument(
-        "--seconds", type=seconds, default=10.0, metavar="S", help="for so long (default 10)"
+        "--seconds",
+        type=seconds,
+        default=10.0,
+        metavar="S",
+        help="duration of the measurement (default 10)",
     )
     options.json(latency)
 
 
 def _faults(command: Command) -> None:
-    faults = command("faults", "inject faults into simulated machines and judge what comes of it")
+    faults = command("faults", "inject faults into simulated machines and judge their reaction")
     faults.add_argument(
         "scenarios",
         metavar="SCENARIO",
         nargs="*",
         help="names or files; default: all of examples/faults",
     )
-    faults.add_argument("--seeds", type=count, default=5, metavar="N", help="cases a scenario")
+    faults.add_argument(
+        "--seeds", type=count, default=5, metavar="N", help="cases for each scenario (default 5)"
+    )
     faults.add_argument("--seed", type=count, metavar="N", help="one case only, with this seed")
-    faults.add_argument("--folder", type=Path, metavar="DIR", help="of other scenario files")
+    faults.add_argument("--folder", type=Path, metavar="DIR", help="folder of other scenario files")
     faults.add_argument(
         "--buses",
         nargs=2,

@@ -29,6 +29,8 @@ from .targets import target
 
 _BUSY_S = 0.1
 """How long a command to stop waits for others, to see first that it speaks to a controller."""
+_TURN_S = 3.0
+"""How long it then waits for each turn at the controller, to see that the axes stand."""
 
 
 @contextmanager
@@ -45,13 +47,20 @@ def commanded(
 ) -> Iterator[Controller]:
     """A controller that has been commanded to stop or to hold, whoever else talks to it.
 
-    Raises BusError when it does not answer within `wait_s`.
+    Raises BusError when it does not answer within `wait_s`. What is inside looks how it ends: raises BusyError when
+    another command of this computer keeps the controller to itself, as one does that was stopped by Ctrl-Z or SIGSTOP.
     """
     with connect(address, node, bitrate) as controller:
         with suppress(BusyError):
             controller.require(wait_s, _BUSY_S)
         controller.command(command)
-        yield controller
+        controller.turn_wait_s = _TURN_S
+        try:
+            yield controller
+        except BusyError as error:
+            raise BusyError(
+                f"the controller has taken the command, but whether the axes stand is not known: {error}"
+            ) from error
 
 
 @contextmanager

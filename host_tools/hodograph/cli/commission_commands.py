@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 
 from ..bus.address import BusAddress
 from ..bus.own_bus import bus_address
@@ -42,6 +42,53 @@ def scan(options: Namespace) -> None:
     if options.store and not options.assign:
         raise InputError("--store: stores what --assign gives: add --assign")
     address = bus_address(options.bus)
+    scanned = _scanned(options, address)
+    if scanned.unconfigured.hidden is not None:
+        note(scanned.unconfigured.hidden)
+    if not scanned.nodes and not scanned.unconfigured.identities:
+        raise BusError(
+            f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
+        )
+    if options.output is not None:
+        _write(options, address, [facts for facts in scanned.nodes if facts.is_drive])
+    if options.json:
+        written = None if options.output is None else str(options.output)
+        print_json({"bus": str(address), **scanned.document(), "file": written})
+        return
+    for line in scanned.lines():
+        print(line)
+    if options.output is not None:
+        print(options.output)
+
+
+@dataclass(frozen=True)
+class _Scanned:
+    """The nodes of a bus, those without number, and the numbers that were given to some of these."""
+
+    nodes: list[DriveFacts]
+    unconfigured: Unconfigured
+    assigned: dict[Identity, int]
+
+    def document(self) -> dict[str, object]:
+        """For --json."""
+        without = [
+            asdict(identity) | {"assigned": self.assigned.get(identity)}
+            for identity in self.unconfigured.identities
+        ]
+        return {"nodes": [facts.json() for facts in self.nodes], "unconfigured": without}
+
+    def lines(self) -> Iterator[str]:
+        """For people."""
+        for identity in self.unconfigured.identities:
+            node = self.assigned.get(identity)
+            became = "no node number" if node is None else f"is node {node} now"
+            yield f"LSS: {identity}: {became}"
+        for facts in self.nodes:
+            yield from _lines(facts)
+
+
+def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
+    """Asks the bus, and gives node numbers where the options say so."""
     wanted = [Assignment(*one) for one in options.assign]
     unconfigured, assigned = Unconfigured(()), dict[Identity, int]()
     with opened_bus(address, options.bitrate) as network:
@@ -58,42 +105,11 @@ def scan(options: Namespace) -> None:
             new = found_nodes(network, options.wait, assigned.values())
             found += [read_facts(NodeReader(network, node)) for node in new]
             found.sort(key=lambda facts: facts.node)
-    if unconfigured.hidden is not None:
-        note(unconfigured.hidden)
-    if not found and not unconfigured.identities:
-        raise BusError(
-            f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
-        )
-    drives = [facts for facts in found if facts.is_drive]
-    if options.output is not None:
-        _write(options, address, drives)
-    if options.json:
-        written = None if options.output is None else str(options.output)
-        without = [
-            asdict(identity) | {"assigned": assigned.get(identity)}
-            for identity in unconfigured.identities
-        ]
-        print_json(
-            {
-                "bus": str(address),
-                "nodes": [f.json() for f in found],
-                "unconfigured": without,
-                "file": written,
-            }
-        )
-        return
-    for identity in unconfigured.identities:
-        became = f"is node {assigned[identity]} now" if identity in assigned else "no node number"
-        print(f"LSS: {identity}: {became}")
-    for facts in found:
-        for line in _lines(facts):
-            print(line)
-    if options.output is not None:
-        print(options.output)
+    return _Scanned(found, unconfigured, assigned)
 
 
 def _identity(facts: DriveFacts) -> Identity:
-    """As LSS compares it: what a node does not tell is 0."""
+    """As LSS compares it: what a node does not report is 0."""
     numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
     return Identity(*(number or 0 for number in numbers))
 

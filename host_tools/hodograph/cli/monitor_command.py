@@ -85,6 +85,7 @@ def machine_layout(machine: Machine) -> Layout:
         period_us=machine.period_us,
         bitrate=machine.bitrate,
         limits=step_limits(machine),
+        controller=machine.node,
     )
 
 

@@ -136,7 +136,7 @@ def bus_name(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> Non
     parser.add_argument(
         "--bus",
         metavar="INTERFACE:CHANNEL",
-        help=f"as python-can has it (default ${BUS_VARIABLE}, else {DEFAULT_BUS}, else {where})",
+        help=f"bus, in the notation of python-can (default ${BUS_VARIABLE}, else {DEFAULT_BUS}, else {where})",
     )
 
 
@@ -144,7 +144,11 @@ def bus(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
     """--bus, --wait."""
     bus_name(parser, can_serve=can_serve)
     parser.add_argument(
-        "--wait", type=finite, default=2.0, metavar="S", help="how long to wait for the controller"
+        "--wait",
+        type=finite,
+        default=2.0,
+        metavar="S",
+        help="how long to wait for the controller (default 2)",
     )
 
 
@@ -164,7 +168,7 @@ def controller(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--controller",
         metavar="COMMAND",
-        help="program started as the controller, as 'tools/emulate.py an386' (default hodograph-controller)",
+        help="program to start as the controller, such as 'tools/emulate.py an386' (default hodograph-controller)",
     )
 
 
@@ -178,7 +182,9 @@ def timeout(parser: argparse.ArgumentParser, usual: str) -> None:
     )
 
 
-def node(parser: argparse.ArgumentParser, why: str = "for node number and bit rate") -> None:
+def node(
+    parser: argparse.ArgumentParser, why: str = "machine file, for node number and bit rate"
+) -> None:
     """--node and --machine."""
     parser.add_argument("--node", type=node_number, help="the controller's node number (default 1)")
     parser.add_argument("--machine", type=Path, metavar="FILE", help=why)
@@ -215,7 +221,10 @@ def json(parser: argparse.ArgumentParser) -> None:
 def machine(parser: argparse.ArgumentParser) -> None:
     """--machine."""
     parser.add_argument(
-        "--machine", type=Path, metavar="FILE", help="machine file instead of the one FILE names"
+        "--machine",
+        type=Path,
+        metavar="FILE",
+        help="machine file; replaces the one that a path file names",
     )
 
 
@@ -225,13 +234,13 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         "--tolerance",
         type=finite,
         metavar="MM",
-        help="of a toolpath: how far curves may be from it (default 0.01; 0: stop at the end of each move)",
+        help="of a toolpath: greatest distance of the curves from it (default 0.01; 0: stop at the end of each move)",
     )
     parser.add_argument(
         "--feed",
         type=positive,
         metavar="MM/S",
-        help="of a toolpath, instead of its own feeds; drawings need it",
+        help="of a toolpath: feed instead of its own ones; drawings need it",
     )
     for name, text in (
         ("layer", "of a drawing: this layer only (may be repeated: in this order)"),
@@ -239,9 +248,13 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
     ):
         parser.add_argument(f"--{name}", action="append", default=[], metavar="NAME", help=text)
     for name, unit, text in (
-        ("gap", "MM", "of a drawing: ends of contours so near are joined (default 0.01)"),
-        ("lift", "MM", "of a drawing: rapid moves are so far above it (default 0: beside it)"),
-        ("scale", "K", "of a drawing or of points: lengths times this"),
+        (
+            "gap",
+            "MM",
+            "of a drawing: join ends of contours that are at most this far apart (default 0.01)",
+        ),
+        ("lift", "MM", "of a drawing: height of rapid moves above it (default 0: in its plane)"),
+        ("scale", "K", "of a drawing or of points: factor of all lengths"),
     ):
         parser.add_argument(f"--{name}", type=finite, metavar=unit, help=text)
     parser.add_argument(
@@ -250,7 +263,7 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         metavar="UNIT",
         help="of a drawing or of points: mm, cm, m, um, in, or a number of mm (default: as the file says)",
     )
-    parser.add_argument("--closed", action="store_true", help="of points: back to the first one")
+    parser.add_argument("--closed", action="store_true", help="of points: return to the first one")
 
 
 def kernel(parser: argparse.ArgumentParser) -> None:

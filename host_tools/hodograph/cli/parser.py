@@ -6,7 +6,8 @@ from __future__ import annotations
 import argparse
 import difflib
 import re
-from typing import NoReturn
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 from .. import __version__
 from ..errors import InputError
@@ -26,7 +27,7 @@ EVERYWHERE = (
     (("--no-progress",), "no progress on stderr"),
     (("--debug",), "show tracebacks (or HODOGRAPH_DEBUG=1)"),
 )
-"""Options that may stand before the command or behind it."""
+"""Options that may stand before or after the command."""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -40,6 +41,19 @@ class _Parser(argparse.ArgumentParser):
             advice = f'did you mean "{near[0]}"?' if near else "one of: " + ", ".join(names)
             message = f'there is no command "{match[1]}"; {advice}'
         raise InputError(f"{message} (see {self.prog} --help)")
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse; an option that a command does not know is refused here, where its own options are known."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unknown: {' '.join(unknown)}{self._advice(unknown)}")
+        return found, unknown
+
+    def _advice(self, unknown: Sequence[str]) -> str:
+        """Names the option that is most like the first unknown one."""
+        option = next((word for word in unknown if word.startswith("-")), "").partition("=")[0]
+        near = difflib.get_close_matches(option, list(self._option_string_actions), n=1)
+        return f'; did you mean "{near[0]}"?' if near else ""
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -94,7 +94,7 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> 
 
 
 def _places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> list[list[float]]:
-    """Points at arc lengths, with the extra axes behind x, y, z."""
+    """Points at arc lengths, with the extra axes after x, y, z."""
     if isinstance(curve, SpatialPHSpline):
         return _lists(curve.axes_point(s))
     return _lists(curve.point(s))
@@ -125,8 +125,21 @@ def print_notes(pipeline: Pipeline, plan: FeedPlan) -> None:
 def feed(options: Namespace) -> None:
     """hodograph feed."""
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
+    print_notes(pipeline, pipeline.plan)
+    program = _program_of(pipeline)
+    at_s = None
+    if options.at is not None:
+        at_s = _within("--at", options.at, pipeline.plan.duration_s, "s")
+    if options.json:
+        print_json(_feed_document(pipeline, program, at_s))
+    else:
+        _print_feed(pipeline, program, at_s)
+
+
+def _feed_document(
+    pipeline: Pipeline, program: Program | None, at_s: np.ndarray | None
+) -> dict[str, object]:
     plan = pipeline.plan
-    print_notes(pipeline, plan)
     result: dict[str, object] = {
         "profile": plan.profile,
         "n_c": plan.n_c,
@@ -141,16 +154,16 @@ def feed(options: Namespace) -> None:
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
     }
-    stops = _program_of(pipeline)
-    if stops is not None:
-        result["stops"] = stops_dict(stops.stops, stops.piece_starts_mm)
-    if options.at is not None:
-        t = _within("--at", options.at, plan.duration_s, "s")
-        result["arc_length_mm"] = np.atleast_1d(plan.arc_length(t)).tolist()
-        result["feed_mm_s"] = np.atleast_1d(plan.feed(t)).tolist()
-    if options.json:
-        print_json(result)
-        return
+    if program is not None:
+        result["stops"] = stops_dict(program.stops, program.piece_starts_mm)
+    if at_s is not None:
+        result["arc_length_mm"] = np.atleast_1d(plan.arc_length(at_s)).tolist()
+        result["feed_mm_s"] = np.atleast_1d(plan.feed(at_s)).tolist()
+    return result
+
+
+def _print_feed(pipeline: Pipeline, program: Program | None, at_s: np.ndarray | None) -> None:
+    plan = pipeline.plan
     slope = "" if plan.n_c is None else f", n_c {plan.n_c:.6g} ({plan.evaluations} evaluations)"
     ramps = [] if plan.ramp_time_s is None else [("ramps", f"{number(plan.ramp_time_s)} s")]
     print_rows(
@@ -164,8 +177,8 @@ def feed(options: Namespace) -> None:
             ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
         ]
     )
-    if stops is not None:
-        for line in stops_text(stops.stops, stops.piece_starts_mm):
+    if program is not None:
+        for line in stops_text(program.stops, program.piece_starts_mm):
             print(line)
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
     for name, peak in pipeline.peaks.items():
@@ -173,9 +186,9 @@ def feed(options: Namespace) -> None:
             f"{name:28} {peak.value:12.6g} {peak.limit.given:12.6g} "
             f"{100.0 * peak.value / peak.limit.given:8.2f} {peak.s_mm:12.6g}"
         )
-    if options.at is not None:
+    if at_s is not None:
         print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
-        for at, s, v in zip(options.at, plan.arc_length(t), plan.feed(t), strict=True):
+        for at, s, v in zip(at_s, plan.arc_length(at_s), plan.feed(at_s), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
 
 
@@ -381,7 +394,7 @@ def motion_rows(motion: Motion) -> list[tuple[str, str]]:
 
 
 def _orientation_rows(motion: Motion) -> list[tuple[str, str]]:
-    """The greatest errors of the axes behind x, y, z."""
+    """The greatest errors of the axes after x, y, z."""
     if not motion.extra_names:
         return []
     every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)

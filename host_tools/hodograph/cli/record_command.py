@@ -7,12 +7,10 @@ from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from ..bus.address import BusAddress, check_raw
-from ..bus.capture.decode import unhomed_starts
-from ..bus.capture.frames import Frames
-from ..bus.capture.recorder import Recorder
-from ..bus.capture.recordings import RecordingWriter, check_suffix
-from ..bus.capture.setpoint_check import Jump, Step, limits_at, step_limits
-from ..bus.capture.setpoint_watch import SetpointWatch, jumps
+from ..bus.capture.bus_recording import BusRecording
+from ..bus.capture.recordings import check_suffix
+from ..bus.capture.setpoint_check import Jump, limits_at, step_limits
+from ..bus.capture.setpoint_watch import jumps
 from ..bus.clock import REAL_CLOCK, Clock, VirtualClock
 from ..bus.own_bus import bus_address
 from ..bus.processes import virtual_clock
@@ -44,15 +42,13 @@ def record(options: Namespace) -> None:
         raise BusError(f"{address}: record takes SocketCAN: use socketcan:CHANNEL")
     check_raw(address)
     machine = _machine(options)
-    with _Recording(address, options, machine) as recording:
-        recording.go_on()
+    with _Recording(address, options, machine) as under_way:
+        under_way.go_on()
+    recording = under_way.made
     if recording.dropped:
-        raise RunError(
-            f"{options.file}: {recording.dropped} frames are missing, which the kernel dropped: record as root if "
-            "you can (larger receive buffer)"
-        )
+        raise RunError(recording.dropped_text())
     found = _jumps(recording, address, options, machine)
-    _print(options, recording, found)
+    _print(options, recording, under_way.seconds, found)
     for jump in (found or [])[1:]:
         note(str(jump))
     if found:
@@ -68,18 +64,14 @@ def _machine(options: Namespace) -> Machine | None:
 
 
 class _Recording:
-    """A file in the making; keeps the worst step by each rule."""
+    """A recording until the time is over or Ctrl-C, on the clock of its bus."""
 
     def __init__(self, address: BusAddress, options: Namespace, machine: Machine | None) -> None:
         self._options = options
-        self._watch = SetpointWatch(None if machine is None else machine.nodes)
-        self.unhomed_starts = 0
-        self._worst: dict[tuple[str, tuple[int, ...], tuple[int, ...]], Step] = {}
-        self._writer = RecordingWriter(options.file, address.name)
-        self._virtual: VirtualClock | None = None
+        self._virtual: VirtualClock | None = virtual_clock(address)
         try:
-            self._virtual = virtual_clock(address)
-            self._recorder = Recorder(address)
+            nodes = None if machine is None else machine.nodes
+            self.made = BusRecording(address, options.file, nodes)
         except BaseException:
             self._release()
             raise
@@ -89,18 +81,19 @@ class _Recording:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._recorder.stop()
-        self._release()
+        try:
+            self.made.close()
+        finally:
+            self._release()
 
     def _release(self) -> None:
-        self._writer.close()
         if self._virtual is not None:
             self._virtual.release()
             self._virtual = None
 
     def go_on(self) -> None:
         """Until the time is over or Ctrl-C, which is how it is meant to end."""
-        recorder, clock, seconds = self._recorder, self._clock, self._options.seconds
+        clock, seconds = self._clock, self._options.seconds
         begun = clock.now_s()
         try:
             while seconds is None or clock.now_s() - begun < seconds:
@@ -108,49 +101,17 @@ class _Recording:
                 if seconds is not None:
                     left_s = min(left_s, begun + seconds - clock.now_s())
                 clock.sleep(left_s)
-                self._keep(recorder.take())
+                self.made.keep()
         except KeyboardInterrupt as error:
             if type(error) is not KeyboardInterrupt:  # SIGTERM ends it as well, with its own status
                 raise
         finally:
-            recorder.stop()
-            self._keep(recorder.take())
+            self.made.close()
             self.seconds = clock.now_s() - begun
-        self._look(self._watch.close())
-
-    def _keep(self, frames: Frames) -> None:
-        self.unhomed_starts += unhomed_starts(frames)
-        self._writer.write(frames)
-        self._look(self._watch.feed(frames))
-
-    def _look(self, steps: list[Step]) -> None:
-        for step in steps:
-            kind = step.rule, step.axes, step.group
-            known = self._worst.get(kind)
-            if known is None or known.needed < step.needed:
-                self._worst[kind] = step
-
-    @property
-    def frame_count(self) -> int:
-        return self._recorder.frame_count
-
-    @property
-    def dropped(self) -> int:
-        return self._recorder.dropped
-
-    @property
-    def nodes(self) -> tuple[int, ...]:
-        """That got setpoints."""
-        return self._watch.seen
-
-    @property
-    def steps(self) -> list[Step]:
-        """The worst ones, in their order."""
-        return sorted(self._worst.values(), key=lambda step: step.sync)
 
 
 def _jumps(
-    recording: _Recording, address: BusAddress, options: Namespace, machine: Machine | None
+    recording: BusRecording, address: BusAddress, options: Namespace, machine: Machine | None
 ) -> list[Jump] | None:
     """Steps beyond the limits of the machine file, or else of the controller; None: nobody says what they are."""
     if not recording.steps:
@@ -182,8 +143,10 @@ def _jumps(
     return jumps(recording.steps, limits)
 
 
-def _print(options: Namespace, recording: _Recording, found: list[Jump] | None) -> None:
-    frames, seconds = recording.frame_count, recording.seconds
+def _print(
+    options: Namespace, recording: BusRecording, seconds: float, found: list[Jump] | None
+) -> None:
+    frames = recording.frame_count
     if options.json:
         jumps = None if found is None else [str(jump) for jump in found]
         print_json(

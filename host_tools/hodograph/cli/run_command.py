@@ -23,7 +23,7 @@ from .bus_session import await_enter, pass_stop, session
 from .motion_commands import print_run
 from .output import duration_text, note, number, print_json, print_rows, progress
 from .path_commands import print_notes
-from .stream_command import stream_on
+from .stream_command import has_paths, stream_on
 from .toolpath_commands import job_rows, refuse_toolpath_options, toolpath_job
 
 Task = Pipeline | PreparedJob
@@ -43,10 +43,18 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
             "(slcand makes one of a serial adapter)"
         )
     _check_outputs(options)
+    if len(options.files) == 1 and has_paths(options.files[0]):
+        if any((options.trace, options.report)):
+            raise InputError(
+                f"{options.files[0]}: --trace and --report take one path: a list of paths is streamed"
+            )
+        refuse_toolpath_options(options, options.files[0])
+        stream_on(options, address)
+        return
     try:
         tasks = [_task(options, file) for file in options.files]
     except NoRoomError as error:
-        if len(options.files) > 1 or any((options.trace, options.report, options.record)):
+        if len(options.files) > 1 or any((options.trace, options.report)):
             raise
         note(f"{error}: it is streamed")
         stream_on(options, address)

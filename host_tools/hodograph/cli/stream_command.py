@@ -7,37 +7,45 @@ import os
 import random
 import time
 from argparse import Namespace
-from dataclasses import asdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from ..bus.address import BusAddress
+from ..bus.capture.bus_recording import BusRecording
+from ..bus.capture.recordings import check_suffix
+from ..bus.capture.setpoint_check import step_limits
+from ..bus.capture.setpoint_watch import jumps
 from ..bus.own_bus import opened_bus
-from ..bus.run import bring_up
+from ..bus.run import RunSession, bring_up
 from ..bus.sdo.controller import connect
-from ..bus.sdo.objects import ON_PATH, STREAM
+from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
-from ..config import Machine, load_machine
-from ..errors import InputError
+from ..config import Machine, load_machine, load_paths
+from ..errors import BusError, InputError, RefusedError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
-from ..names import STANDARD_INPUT
+from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
-from ..pipeline import program_limits
+from ..pipeline import Pipeline, program_limits
+from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
 from ..stream.plan import JobFiles, JobPlan, Place
+from ..stream.resuming import nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
 from .bus_session import await_enter, pass_stop, session
 from .output import duration_text, note, number, print_json, print_rows, progress, size_text
-from .toolpath_commands import reading_of, require_toolpath
+from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
 
 _RING_SHARE = 3
 """A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
 
-_SMALL_RING = 48 * 1024
+_SMALL_RING = RING_BYTES
 """Of the small controllers; --simulate makes chunks for it."""
 
 _EVERY_S = 5.0
@@ -54,8 +62,10 @@ def stream(options: Namespace) -> None:
     if not options.files:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
     for file in options.files:
-        require_toolpath(file)
+        _require_job_file(options, file)
     if options.simulate:
+        if options.record is not None:
+            raise InputError("--record: --simulate has no bus to record")
         _simulate(_job(options), options)
         return
     with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
@@ -70,11 +80,31 @@ def stream_on(options: Namespace, address: BusAddress) -> None:
     _run(job, options, address, number, Place(), _journal(job, options, number))
 
 
+def _require_job_file(options: Namespace, file: Path) -> None:
+    """Raises InputError: the file is neither a toolpath nor a path file, or has options of the other kind."""
+    if file.suffix == PATH_SUFFIX:
+        refuse_toolpath_options(options, file)
+    else:
+        require_toolpath(file)
+
+
+def has_paths(file: Path) -> bool:
+    """Whether a file is a path file with a list of paths. Raises InputError."""
+    return file.suffix == PATH_SUFFIX and len(load_paths(file)) > 1
+
+
+def _machine(options: Namespace) -> Machine:
+    if options.machine is not None:
+        return load_machine(options.machine)
+    first: Path = options.files[0]
+    if is_toolpath(first):
+        raise InputError(f"{first}: a toolpath names no machine: add --machine FILE")
+    return Pipeline(load_paths(first)[0].file).machine
+
+
 def _job(options: Namespace) -> JobFiles:
-    if options.machine is None:
-        raise InputError(f"{options.files[0]}: a toolpath names no machine: add --machine FILE")
     tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
-    machine = load_machine(options.machine)
+    machine = _machine(options)
     return JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
 
 
@@ -93,7 +123,7 @@ def _journal(job: JobFiles, options: Namespace, number: int) -> Journal | None:
         return None
     marks = tuple(mark(file) for file in job.files)
     own = {"tolerance_mm": job.tolerance_mm, "reading": asdict(job.reading)}
-    machine = str(options.machine.resolve())
+    machine = str(job.machine.file.resolve())
     return Journal(journal_file(options), Entry(marks, machine, own, number))
 
 
@@ -128,18 +158,33 @@ def _run(
     kernel = options.kernel or job.machine.kernel
     if begin is None:
         assert entry is not None
-        begin = _rests_at(entry, job.machine, address, options.wait)
-    with session(job.machine, address, options) as at:
+        begin = _rests_at(entry, job.machine, address, options.wait)  # None: the job is lost
+    with (
+        recorded(options.record, job.machine, address) as recording,
+        session(job.machine, address, options) as at,
+    ):
+        bring_up(at, job.machine, kernel)
+        if begin is None:
+            assert entry is not None
+            begin = _nearest(at, job, entry, unhomed=options.unhomed)
         if entry is not None:
-            fresh = Entry(
-                entry.files, entry.machine, entry.options, job_number, begin.section, begin.way_q40
+            note(
+                f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
+            )
+            fresh = replace(
+                entry,
+                job0=job_number,
+                section=begin.section,
+                way_q40=begin.way_q40,
+                committed_q40=begin.way_q40,
+                first=begin.section,
+                starts=((begin.section, 0),),
             )
             journal = Journal(journal_file(options), fresh)
-        bring_up(at, job.machine, kernel)
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
-        with JobPlan(job, most, job_number, begin) as plan:
+        with JobPlan(job, most, job_number, begin, stops=not options.no_stops) as plan:
             sender = Sender(
                 at,
                 job.machine,
@@ -150,6 +195,7 @@ def _run(
                 kernel,
                 unhomed=options.unhomed,
                 slow=_free_rate(job.machine, address),
+                recording=recording,
             )
             done = sender.run()
             for line in plan.notes:
@@ -157,25 +203,72 @@ def _run(
     _print(done, options)
 
 
-def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place:
-    """Where the machine rests, after a stop: what the controller says of the job if it is still there, else the
-    journal.
-    """
-    place = Place(entry.section, entry.way_q40)
+@contextmanager
+def recorded(
+    file: Path | None, machine: Machine, address: BusAddress
+) -> Iterator[BusRecording | None]:
+    """Records the bus, if there is a file for it. Raises RunError at its end: frames are missing, a setpoint jumps."""
+    if file is None:
+        yield None
+        return
+    check_suffix(file)
+    if not address.is_raw:
+        raise BusError(f"{address}: --record takes SocketCAN: use socketcan:CHANNEL")
+    made = BusRecording(address, file, machine.nodes)
+    try:
+        yield made
+    finally:
+        made.close()
+    note(f"{file}: {made.frame_count} frames")
+    if made.dropped:
+        raise RunError(made.dropped_text())
+    found = jumps(made.steps, step_limits(machine))
+    if found:
+        raise RunError(f"{file}: {found[0]}; the file is complete")
+
+
+def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place | None:
+    """Where the machine rests, after a stop, as the controller has it; None: the controller does not know the job."""
     with connect(address, machine.node, machine.bitrate) as controller:
-        known = controller.answers(wait_s)
-        if known:
-            if controller.state() in ON_PATH:
-                controller.stop_and_wait()
-            status = stream_status(controller)
-            known = status.job == entry.job
-            place = Place(entry.section, round(status.way_mm * 2**40)) if known else place
-    if not known:
-        note(
-            "the controller no longer knows the job: it goes on from the last place in the journal"
+        if not controller.answers(wait_s):
+            return None
+        if controller.state() in ON_PATH:
+            controller.stop_and_wait()
+        status = stream_status(controller)
+        if status.job != entry.job:
+            return None
+        return Place(*entry.place_at(round(status.way_mm * 2**40)))
+
+
+def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> Place:
+    """The place of the job nearest to the axes. Raises RefusedError: they are not homed, or not on the path."""
+    machine = job.machine
+    note("the controller no longer knows the job: it goes on where the axes stand on its path")
+    lost = [
+        axis.name
+        for i, axis in enumerate(machine.axes, 1)
+        if at.controller.read(HOMING_METHOD, i) and not at.controller.read(HOMED, i)
+    ]
+    if lost and not unhomed:
+        raise RefusedError(
+            f"axis {', '.join(lost)} is not homed, so nobody knows where it stands: hodograph home, hodograph goto "
+            "back to the path, then hodograph stream --continue"
         )
-    note(f"goes on in section {place.section + 1} at {number(place.way_q40 * 2.0**-40)} mm of it")
-    return place
+    counts = at.controller.targets(machine.path_count)
+    found = nearest_place(
+        job,
+        entry,
+        tuple(one / per for one, per in zip(counts, machine.path_counts, strict=True)),
+    )
+    if found.distance_mm > machine.start_tolerance_mm:
+        point = [number(one) for one in found.point_mm]
+        more = f" --z {point[2]}" if len(point) > 2 else ""
+        raise RefusedError(
+            f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
+            f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
+            f"--to {point[0]} {point[1]}{more}, then hodograph stream --continue"
+        )
+    return found.place
 
 
 def _free_rate(machine: Machine, address: BusAddress) -> float | None:
@@ -226,9 +319,9 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     begin_s = time.perf_counter()
     with (
         JobPlan(job, _SMALL_RING // _RING_SHARE, 1, Place()) as plan,
-        progress("simulate", "section") as bar,
+        progress("simulate", "job") as bar,
     ):
-        for chunks in plan.by_section():
+        for chunks in plan.by_job():
             found.append(simulate_chunks(chunks, limits, kernel, machine.counts_per_mm))
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
@@ -243,13 +336,13 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 "wall_s": took_s,
                 "greatest_bytes_per_s": rate,
                 **counted,
-                "section": [asdict(one) for one in found],
+                "job": [asdict(one) for one in found],
             }
         )
         return
     print_rows(
         [
-            ("sections", str(len(found))),
+            ("sections", str(sum(one.sections for one in found))),
             ("chunks", f"{counted['chunks']}, {size_text(counted['bytes'])}"),
             (
                 "motion",
@@ -259,7 +352,8 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
         ]
     )
     for k, one in enumerate(found, 1):
-        print(f"section {k}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
+        many = f" with {one.sections} sections" if one.sections > 1 else ""
+        print(f"job {k}{many}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
 
 
 COMMANDS = {"stream": stream}

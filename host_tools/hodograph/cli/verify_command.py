@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 
@@ -49,28 +49,59 @@ def verify(options: Namespace) -> None:
         return
     refuse_toolpath_options(options, options.file)
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
-    machine = pipeline.machine_or_none
     native = _planned(pipeline) if options.program is None else _given(options.program)
-    program = decode_file(options.program or options.file, native.image)
-    fault = None
-    if machine is not None and options.program is not None:  # else it has been accepted already
-        fault = controller_verdict(native, machine)
-    native.require()
-    stops = None if machine is None or fault is not None else proved_stops(native, program, machine)
-    found = verify_program(program, pipeline.limits, _drives(machine))
-    drives_see = sampled(native)
-    counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
-    noise = bus_noise(counts_per_mm, program.period_us)
+    given = options.program is not None  # else the controller's check has accepted it already
+    checked = _check(pipeline, native, options.program or options.file, given=given)
     if options.json:
-        verdict = _verdict_document(machine, fault) | {"stops": _stops_document(stops)}
-        print_json(verdict | _document(found, drives_see, noise))
+        print_json(checked.document())
     else:
-        print(_verdict(machine, fault))
-        print("".join(f"{_stops_line(one)}\n" for one in stops or ()), end="")
-        print(_text(found, drives_see, noise, _axes(pipeline, program.axis_count)))
-    if fault is not None:
-        raise LimitError(f"{options.file}: the controller would refuse it: {fault.text}")
-    _require_kept(str(options.file), [found])
+        print(checked.text())
+    if checked.fault is not None:
+        raise LimitError(f"{options.file}: the controller would refuse it: {checked.fault.text}")
+    _require_kept(str(options.file), [checked.found])
+
+
+@dataclass(frozen=True)
+class _Checked:
+    """A program beside its limits: the verdict of the controller, what is proved of stops, peaks, setpoints."""
+
+    machine: Machine | None
+    fault: NativeFault | None
+    stops: tuple[ProvedStops, ...] | None
+    found: Verification
+    drives_see: tuple[Sampled, ...]
+    noise: BusNoise
+    axes: list[tuple[str, str]]
+
+    def document(self) -> dict[str, object]:
+        """For --json."""
+        verdict = _verdict_document(self.machine, self.fault)
+        stops = {"stops": _stops_document(self.stops)}
+        return verdict | stops | _document(self.found, self.drives_see, self.noise)
+
+    def text(self) -> str:
+        """For people."""
+        lines = [_verdict(self.machine, self.fault)]
+        lines += [_stops_line(one) for one in self.stops or ()]
+        return "\n".join([*lines, _text(self.found, self.drives_see, self.noise, self.axes)])
+
+
+def _check(pipeline: Pipeline, native: NativeProgram, file: Path, *, given: bool) -> _Checked:
+    """Checks a program of a pipeline; `given`: it comes from a file, so the controller's check has not seen it."""
+    machine = pipeline.machine_or_none
+    program = decode_file(file, native.image)
+    fault = controller_verdict(native, machine) if given and machine is not None else None
+    native.require()
+    counts_per_mm = COUNTS_PER_MM if machine is None else machine.counts_per_mm
+    return _Checked(
+        machine,
+        fault,
+        None if machine is None or fault is not None else proved_stops(native, program, machine),
+        verify_program(program, pipeline.limits, _drives(machine)),
+        sampled(native),
+        bus_noise(counts_per_mm, program.period_us),
+        _axes(pipeline, program.axis_count),
+    )
 
 
 def _axes(pipeline: Pipeline, count: int) -> list[tuple[str, str]]:
@@ -95,21 +126,16 @@ def _verify_toolpath(options: Namespace) -> None:
             f"{options.file}: --program is for path files; a toolpath is verified as it is planned now: leave it out"
         )
     job = toolpath_job(options, options.file)
-    noise = bus_noise(job.machine.counts_per_mm, job.machine.period_us)
     found, documents = [], []
     for index, section in enumerate(job.sections, 1):
         pipeline = section.pipeline
-        native = pipeline.accepted
-        program = decode_file(options.file, native.image)
-        result = verify_program(program, pipeline.limits, _drives(job.machine))
-        drives_see = sampled(native)
-        found.append(result)
+        checked = _check(pipeline, pipeline.accepted, options.file, given=False)
+        found.append(checked.found)
         if options.json:
-            documents.append(section.lines_summary() | _document(result, drives_see, noise))
+            documents.append(section.lines_summary() | checked.document())
         else:
             print(f"section {index}, lines {section.first_line} … {section.last_line}")
-            print(_verdict(job.machine, None))
-            print(_text(result, drives_see, noise, _axes(pipeline, program.axis_count)) + "\n")
+            print(checked.text() + "\n")
     if options.json:
         print_json({"kept": all(one.kept for one in found), "section": documents})
     _require_kept(str(options.file), found)
@@ -125,8 +151,14 @@ def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
 
 
 def _stops_line(stops: ProvedStops) -> str:
-    """In how many of the pieces from which a stop may begin it is proved to keep the machine's limits."""
-    tested = "" if stops.proved == stops.pieces else "; the others are tested, not proved"
+    """In how many of the pieces from which a stop may begin, and in which share of their time, it is proved to keep the
+    machine's limits.
+    """
+    tested = (
+        ""
+        if stops.proved == stops.pieces
+        else f" ({100 * stops.time_share:.0f} % of their time); the others are tested, not proved"
+    )
     return (
         f"{stops.name}: the same limits are proved until standstill in {stops.proved} of {stops.pieces} "
         f"feed pieces in which one may begin{tested}"
@@ -137,7 +169,12 @@ def _stops_document(stops: tuple[ProvedStops, ...] | None) -> dict[str, object] 
     if stops is None:
         return None
     return {
-        one.kind: {"pieces": one.pieces, "proved": one.proved, "not_proved_at_mm": one.open_mm}
+        one.kind: {
+            "pieces": one.pieces,
+            "proved": one.proved,
+            "proved_time_share": one.time_share,
+            "not_proved_at_mm": one.open_mm,
+        }
         for one in stops
     }
 

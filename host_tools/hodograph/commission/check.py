@@ -137,7 +137,7 @@ def _communication(reader: NodeReader) -> Iterator[Finding]:
             0x1029,
             1,
             "state after a communication error",
-            "it may go pre-operational and tell nothing",
+            "it may go pre-operational and send nothing",
         ),
         (0x6007, 0, "reaction to it", "set quick stop with the drive's own tool"),
     ):
@@ -185,7 +185,7 @@ def _scaling(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
     feed, turns = reader.number(0x6092, 1), reader.number(0x6092, 2)
     unit, key = axis.unit, f"counts_per_{axis.unit}"
     if not feed or not turns:
-        text = f"counts for a turn are not told: see with the drive's own tool that 1 {unit} is {axis.counts_per_unit}"
+        text = f"counts for a turn are not reported: check in the drive's tool that 1 {unit} is {axis.counts_per_unit}"
         yield Finding(0x6092, 1, NOTE, text, feed)
         return
     way = feed / turns / axis.counts_per_unit

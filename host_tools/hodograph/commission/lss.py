@@ -56,7 +56,7 @@ class Assignment:
 class Unconfigured:
     """The nodes without number.
 
-    hidden  why there may be more than could be told apart; None: these are all
+    hidden  why there may be more than could be identified; None: these are all
     """
 
     identities: tuple[Identity, ...]
@@ -161,7 +161,7 @@ class _Fastscan:
     def next_identity(self) -> Identity | str | None:
         """The lowest identity that takes part, whose node is in the configuration state then.
 
-        None: nobody takes part. A text: somebody does, but cannot be told.
+        None: nobody takes part. A text: somebody does, but cannot be identified.
         """
         if not self._asked(0, _ANYBODY, 0, 0):
             return None

@@ -44,7 +44,7 @@ def _said(drive: DriveFacts) -> Iterator[str]:
     yield f"# Node {drive.node}: {', '.join(names) or 'no name'}"
     if CSP not in drive.modes:
         yield "# has no mode cyclic synchronous position: Hodograph cannot use this drive"
-    yield f"# modes {', '.join(map(str, drive.modes)) or 'not told'} of CiA 402"
+    yield f"# modes {', '.join(map(str, drive.modes)) or 'not reported'} of CiA 402"
     for text, value in (
         ("encoder increments for a turn of the motor (0x608F)", drive.encoder_increments),
         ("turns of the motor for one of the shaft (0x6091)", drive.gear_ratio),
@@ -63,7 +63,7 @@ def _keys(drive: DriveFacts, name: str) -> Iterator[str]:
     yield f"node = {drive.node}"
     yield f"counts_per_mm = {COUNTS_PER_MM}         # SET, the same for all axes{_screw(drive)}"
     low, high = _travel(drive)
-    told = "the drive's software limits" if _has_limits(drive) else "the drive tells no limits"
+    told = "the drive's software limits" if _has_limits(drive) else "the drive reports no limits"
     yield f"travel_mm = [{low:.10g}, {high:.10g}]          # SET; {told}"
     yield f"velocity_mm_s = {_FEED}              # SET; low to begin with"
     yield f"acceleration_mm_s2 = {_ACCELERATION}        # SET"

@@ -69,7 +69,7 @@ class NodeReader:
         self._sdo.RESPONSE_TIMEOUT = _ANSWER_S
 
     def data(self, index: int, sub: int = 0) -> bytes | None:
-        """The bytes of an object; None: the node has none; empty: it has one that it does not tell now, or to nobody.
+        """The bytes of an object; None: the node has none; empty: it has one that it does not report now, or never.
 
         Raises BusError when the node does not answer.
         """

@@ -4,7 +4,7 @@
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
 from .machine_file import PLANE_AXES, SPACE_AXES, Machine, Supervision, load_machine, machine_of
-from .path_file import PathFile, PathSpec, SpacePathSpec, load_path_file
+from .path_file import ListedPath, PathFile, PathSpec, SpacePathSpec, load_path_file, load_paths
 from .table import is_there, read_toml
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Drive",
     "Feedforward",
     "Homing",
+    "ListedPath",
     "Machine",
     "PathFile",
     "PathSpec",
@@ -24,6 +25,7 @@ __all__ = [
     "load_drive",
     "load_machine",
     "load_path_file",
+    "load_paths",
     "machine_of",
     "read_toml",
 ]

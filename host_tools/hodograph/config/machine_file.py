@@ -12,6 +12,7 @@ from ..errors import InputError
 from ..names import AXES, KERNELS
 from .axis_table import MAX_AXES, Axis, Feedforward, read_axes
 from .drive_file import Drive
+from .outputs import Outputs, read_outputs
 from .table import Table, read_toml
 
 PLANE_AXES, SPACE_AXES = 2, 3
@@ -54,6 +55,8 @@ class Machine:
     path_count: int
     program_bytes: int | None = None
     """Room for a program in the controller's memory (0x2041 sub 1), for `compile`'s warning; None: not known."""
+    outputs: Outputs | None = None
+    """The outputs that a path switches; None: there is no I/O module."""
 
     @property
     def start_tolerance_counts(self) -> int:
@@ -142,7 +145,7 @@ class Machine:
         return tuple(axis.drive for axis in axes if axis.drive is not None)
 
 
-_SECTIONS = ("path", "bus", "controller", "supervision", "work", "axis")
+_SECTIONS = ("path", "bus", "controller", "supervision", "work", "outputs", "axis")
 _CONTROLLER = (
     "node",
     "kernel",
@@ -192,6 +195,7 @@ def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
         axes=path + tuple(axis for axis in given if axis not in path),
         path_count=len(path),
         program_bytes=controller.integer("program_bytes", 0, low=0, high=2**32 - 1) or None,
+        outputs=read_outputs(root, (node, *(axis.node for axis in given))),
     )
 
 

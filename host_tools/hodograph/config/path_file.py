@@ -27,6 +27,7 @@ from ..feed.request import (
 )
 from ..names import AXES, is_toolpath
 from ..spline import END_NAMES, KNOT_NAMES
+from .outputs import PATH_OUTPUT, PathOutput, read_path_outputs
 from .table import Table, read_toml
 
 COORDINATE_LIMIT_MM = 4096.0
@@ -80,6 +81,7 @@ class PathFile:
     feed: FeedRequest | None
     limits: Limits
     machine_file: Path | None
+    outputs: tuple[PathOutput, ...] = ()
 
     @property
     def path(self) -> PathSpec:
@@ -96,7 +98,23 @@ class PathFile:
         return self.given_path
 
 
-_SECTIONS = ("path", "feed", "limits", "machine")
+@dataclass(frozen=True, eq=False)
+class ListedPath:
+    """One of the paths of a file, and what happens at rest before it.
+
+    dwell_ms  standstill
+    stop      one of STOPS
+    """
+
+    file: PathFile
+    dwell_ms: int = 0
+    stop: str = "none"
+
+
+STOPS = ("none", "program", "optional")
+LONGEST_DWELL_MS = 86_400_000
+_RESTS = ("dwell_ms", "stop")
+_SECTIONS = ("path", "feed", "limits", "machine", "output")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
 _FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
 _LIMITS = (
@@ -127,8 +145,38 @@ def load_path_file(file: Path) -> PathFile:
             "give a path file"
         )
     root = Table(file, "", read_toml(file), _SECTIONS)
+    if root.is_list("path"):
+        raise root.error("path", "is a list of paths, which is a job: only stream and run take it")
+    return _path_file(root, root.table("path", _PATH))
+
+
+def load_paths(file: Path) -> tuple[ListedPath, ...]:
+    """The paths of a path file, in order: of [path] the one, of [[path]] all. Raises InputError."""
+    root = Table(file, "", {} if is_toolpath(file) else read_toml(file), _SECTIONS)
+    if not root.is_list("path"):
+        return (ListedPath(load_path_file(file)),)
+    tables = root.tables("path", (*_PATH, *_RESTS))
+    found = tuple(_listed(root, table) for table in tables)
+    if len({type(one.file.given_path) for one in found}) > 1:
+        raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")
+    for key in _RESTS:
+        if tables[0].has(key):
+            raise tables[0].error(
+                key, "is about the rest between two paths: the first path has none"
+            )
+    return found
+
+
+def _listed(root: Table, table: Table) -> ListedPath:
+    dwell_ms = table.integer("dwell_ms", 0, low=0, high=LONGEST_DWELL_MS)
+    return ListedPath(_path_file(root, table), dwell_ms, table.choice("stop", STOPS, STOPS[0]))
+
+
+def _path_file(root: Table, table: Table) -> PathFile:
+    """What a file says of one of its paths."""
+    file = root.file
     machine = root.table("machine", ("file",), required=False)
-    path = _path(root.table("path", _PATH))
+    path = _path(table)
     feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
     axes = path.axes if isinstance(path, SpacePathSpec) else 2
     limits = _limits(root.table("limits", _LIMITS, required=False), axes)
@@ -139,6 +187,11 @@ def load_path_file(file: Path) -> PathFile:
         feed=feed,
         limits=limits,
         machine_file=machine.path("file") if machine.has("file") else None,
+        outputs=read_path_outputs(
+            root.tables("output", PATH_OUTPUT, required=False),
+            file,
+            len(path.points) if path.through else None,
+        ),
     )
 
 

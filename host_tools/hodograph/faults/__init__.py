@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Faults injected and survived: scenarios run on two virtual buses, and judged.
 
-scenario   what a scenario file says, and what a seed makes of it
-stand      controller, injector and drives as processes
-run_case   one scenario with one seed, by disturb (uploads), and recover
-actions    what the host does to processes and uploads meanwhile
-record     what a case works with and leaves
-evidence   what the recordings of both buses tell
-judge      what of that must not be
-campaign   all scenarios with all seeds
-table      the result for people and for JSON
+scenario       keys of a scenario file, and the fault rules that a seed makes of it
+bench          controller, injector and drives as processes
+run_case       one scenario with one seed, by disturb (uploads), and recover
+fault_actions  what the host does to processes and uploads meanwhile
+case_run       what a case works with, and what it leaves for the judge
+case_record    what the recordings of both buses show
+judge          violations in a case record
+campaign       all scenarios with all seeds
+case_table     the result for people and for JSON
 """

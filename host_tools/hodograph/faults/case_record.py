@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the recordings of the two buses tell about one case."""
+"""What the recordings of the two buses show about one case."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from ..bus.processes import Process
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import PROGRAM
-from ..data import DRIVE_EDS
+from ..data import DRIVE_EDS, object_dictionary
 from ..errors import RunError
 
 _STATUSWORD, _POSITION = 0x6041, 0x6064
@@ -53,7 +53,7 @@ def drives_at(bus: BusAddress, nodes: Sequence[int], bitrate: int) -> Iterator[l
         clients = []
         for node in nodes:
             network = stack.enter_context(open_network(bus, node, bitrate))
-            client = network.add_node(node, str(DRIVE_EDS)).sdo
+            client = network.add_node(node, object_dictionary(DRIVE_EDS, node)).sdo
             client.RESPONSE_TIMEOUT = 1.0
             clients.append(client)
         yield clients

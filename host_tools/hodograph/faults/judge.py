@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What of a case's record must not be, and the figures that are worth a table."""
+"""Violations in a case's record, and the figures of the result table."""
 
 from __future__ import annotations
 

@@ -452,7 +452,7 @@ def ineffective_limits(
     for number, zone in enumerate(limits.zones, start=1):
         if zone.from_mm >= length_mm:
             yield (
-                f"limits: cap {number} begins at {zone.from_mm:g} mm, behind the end of the path at "
+                f"limits: cap {number} begins at {zone.from_mm:g} mm, after the end of the path at "
                 f"{length_mm:.6g} mm: it does nothing"
             )
     for axis, plant in zip(limits.names, plants or (), strict=False):

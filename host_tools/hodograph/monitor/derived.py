@@ -59,14 +59,14 @@ class ProgramPath:
         return self._at(arcs, self._points_mm)
 
     def extra_drawing(self) -> tuple[Floats, Floats]:
-        """Arc lengths (n,) in mm and the axes behind x, y, z there (n, A - 3), in mm or degrees."""
+        """Arc lengths (n,) in mm and the axes after x, y, z there (n, A - 3), in mm or degrees."""
         arcs = np.linspace(0.0, self.length_mm, min(DRAWN_POINTS, self._arc_mm.size))
         extra = self._at(arcs, self._extra) if self._extra.shape[1] else np.zeros((arcs.size, 0))
         return arcs, extra
 
     def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
         """Distance of the positions (n, A) from the curve, in um, beside the setpoints (n, A), all in counts; A is
-        `axes`, or more: what is behind them counts for nothing. And the arc lengths of the setpoints, in mm.
+        `axes`, or more: what is after them counts for nothing. And the arc lengths of the setpoints, in mm.
 
         NaN where the setpoint is not on the curve, or something did not come.
         """

@@ -38,8 +38,8 @@ from ..bus.sdo.objects import (
     START,
     STOP,
 )
-from ..bus.sdo.status import read_status
-from ..data import CONTROLLER_EDS
+from ..bus.sdo.status import read_status, stream_dict
+from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
 from .pump import Publish
 
@@ -137,7 +137,7 @@ class Link:
     @contextmanager
     def _open(self) -> Iterator[_Prompt]:
         with open_network(self._address, self._node, self._bitrate) as network:
-            remote = network.add_node(self._node, str(CONTROLLER_EDS))
+            remote = network.add_node(self._node, object_dictionary(CONTROLLER_EDS, self._node))
             controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
             controller.before_read = lambda: self._execute(controller)
@@ -246,6 +246,7 @@ def _changed(controller: Controller, status: dict[str, Any]) -> bool:
 def _moving_part(controller: Controller) -> dict[str, Any]:
     """What changes from reading to reading: some objects instead of all, the same keys as in `read_status`."""
     return {
+        "stream": stream_dict(controller),
         "motion": {
             "arc_length_mm": controller.read(MOTION, 1) * 2.0**-40,
             "feed_mm_s": controller.read(MOTION, 2) / 1000,

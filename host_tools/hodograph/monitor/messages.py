@@ -54,7 +54,7 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 
 
 def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
-    """The program's curve to draw, in space with z; axes behind z over arc length; `note` says why there is none, or
+    """The program's curve to draw, in space with z; axes after z over arc length; `note` says why there is none, or
     what is odd about it.
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
@@ -74,6 +74,14 @@ def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
                 "extra": [numbers(column, 4) for column in extra.T],
             }
     return message
+
+
+def job_message(job: int, points_mm: Floats) -> dict[str, Any]:
+    """The path of a streamed job as far as it is known, points (n, 2) or (n, 3), in place of that of a program."""
+    message: dict[str, Any] = {"type": "path", "note": "", "name": f"job {job}"}
+    return message | {
+        name: numbers(column, 5) for name, column in zip("xyz", points_mm.T, strict=False)
+    }
 
 
 def rows_message(

@@ -20,10 +20,11 @@ from ..bus.capture.setpoint_check import StepLimits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
+from ..stream.bus_chunks import ChunkCapture, JobPoints
 from .decoder import Decoder, Samples
 from .derived import Derivation, ProgramPath
 from .emergencies import Emergencies
-from .messages import path_message, rows_message
+from .messages import job_message, path_message, rows_message
 from .source import Source, Taken
 
 LOOK_S = 0.04
@@ -50,6 +51,8 @@ class Layout:
     """Of setpoints; None: nobody says what they are."""
     path_axes: int = 2
     """How many of the axes follow a path."""
+    controller: int = 1
+    """Its node."""
 
 
 @dataclass
@@ -78,6 +81,7 @@ class Pump:
         self._watch = SetpointWatch(layout.nodes)
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
+        self._chunks, self._job = ChunkCapture(layout.controller), JobPoints()
         self._state_due_s = 0.0
         self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
 
@@ -144,6 +148,7 @@ class Pump:
             taken = source.take()
             if taken.frames.size:
                 self._pass_on(taken)
+            self._draw_chunks(taken)
             for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
             self._tally.busy_s += time.thread_time() - begun_s
@@ -176,6 +181,15 @@ class Pump:
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
             self._publish(self._drives(samples))
+
+    def _draw_chunks(self, taken: Taken) -> None:
+        """The path of a streamed job grows with the chunks that pass on the bus."""
+        chunks = self._chunks.feed(taken.frames)
+        for chunk in chunks:
+            self._job.add(chunk)
+        if chunks:
+            self._path = None
+            self._publish(job_message(self._job.job, self._job.points_mm[:, : self._layout.drawn]))
 
     def _check_setpoints(self, taken: Taken) -> None:
         """Once in half a thousand SYNCs the worst step by each rule, if it breaks its limit."""

@@ -25,6 +25,7 @@ HEADERS = (
     "core/coefficients.h",
     "core/interpolator.h",
     "core/chunk.h",
+    "core/path_outputs.h",
     "core/feed_override.h",
     "plant/drive.h",
     "offline/contour.h",

@@ -37,7 +37,7 @@ class Contour:
     ) -> NDArray[np.float64]:
         """Contour errors in um, (n,), of encoder positions (n, A) beside commanded arc lengths (n,).
 
-        A is 2 in the plane and at least 3 in space; what is behind z counts for nothing (`extra_errors`).
+        A is 2 in the plane and at least 3 in space; what is after z counts for nothing (`extra_errors`).
         """
         ffi, lib = library()
         arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)

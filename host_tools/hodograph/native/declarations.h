@@ -4,6 +4,7 @@
 
 /* core/program.h, core/program_check.h */
 struct program_header {
+    uint32_t image_size;
     uint32_t period_us;
     uint32_t segment_count;
     uint32_t piece_count;
@@ -11,6 +12,7 @@ struct program_header {
     uint16_t axis_count;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
+    uint32_t event_count;
     ...;
 };
 struct program {
@@ -74,6 +76,22 @@ struct interpolator {
     ...;
 };
 int interpolator_begin(struct interpolator *it, const struct program *p);
+
+/* core/path_outputs.h */
+struct path_outputs_values {
+    uint16_t digital;
+    int16_t analogue[3];
+};
+struct path_outputs {
+    struct path_outputs_values values;
+    ...;
+};
+void path_outputs_begin(struct path_outputs *outputs, const struct program *program,
+                        int64_t arc_length_q40_mm);
+void path_outputs_carry(struct path_outputs *outputs, const struct program *program,
+                        int64_t arc_length_q40_mm);
+void path_outputs_step(struct path_outputs *outputs, int64_t arc_length_q40_mm,
+                       int64_t feed_q32_mm_s);
 
 /* core/feed_override.h */
 struct override_state {
@@ -172,6 +190,8 @@ struct offline_row {
     int32_t act_counts[6];
     int16_t volts_mv[6];
     uint32_t tick;
+    struct path_outputs_values outputs;
+    ...;
 };
 struct offline {
     ...;

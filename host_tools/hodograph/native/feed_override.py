@@ -44,7 +44,7 @@ class Step:
 
 
 class FeedCommands:
-    """What can be asked of a motion, and what it is told: a struct feed_override. Commands act from the next tick."""
+    """Queries and commands of a motion: a struct feed_override. Commands act from the next tick."""
 
     _lib: Any
     _feed: Any

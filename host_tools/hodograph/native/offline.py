@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import HodographError, InputError
+from ..events import ANALOGUES
 from .drive import drive_config
 from .library import library, text
 from .program import AXES, Counts, NativeProgram, counts_by_axis
@@ -29,6 +30,8 @@ ROW = np.dtype(
         ("act_counts", "<i4", (AXES,)),
         ("volts_mv", "<i2", (AXES,)),
         ("tick", "<u4"),
+        ("digital", "<u2"),
+        ("analogue", "<i2", (ANALOGUES,)),
     ]
 )
 """One tick, struct offline_row of sim/offline/offline.h: setpoint k beside the drives' report for

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import HodographError, InputError
+from ..events import ANALOGUES, EVENT, Events
 from ..names import KERNELS
 from .library import library, text
 
@@ -119,6 +120,13 @@ class NativeProgram:
         """Duration, s * 2^32."""
         return int(self.pointer.header.duration_q32_s)
 
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path, by place."""
+        count = int(self.pointer.header.event_count)
+        end = int(self.pointer.header.image_size)
+        return np.frombuffer(self.image, EVENT, count, end - EVENT.itemsize * count)
+
     def check(self, limits: NativeLimits | None = None) -> NativeFault | None:
         """The controller's check of all rules; None: accepted, so that it may be interpolated as well."""
         ffi, lib = library()
@@ -190,6 +198,28 @@ class NativeProgram:
         if made != 0:
             raise InputError(f"kernel {kernel}: cannot interpolate this program (code {made})")
         return points
+
+    def outputs(
+        self, arc_length_q40_mm: NDArray[np.int64], feed_q32_mm_s: NDArray[np.int64]
+    ) -> tuple[NDArray[np.uint16], NDArray[np.int16]]:
+        """Levels (n,) of the digital outputs and values (n, 3) of the analogue ones at setpoints from the first on.
+
+        Arrays are (n,): arc length and feed along the path at each setpoint, as a run gives them.
+        """
+        ffi, lib = library()
+        arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
+        feed = np.ascontiguousarray(feed_q32_mm_s, dtype=np.int64)
+        digital = np.zeros(arc.size, dtype=np.uint16)
+        analogue = np.zeros((arc.size, ANALOGUES), dtype=np.int16)
+        if not len(self.events):
+            return digital, analogue
+        state = ffi.new("struct path_outputs *")
+        lib.path_outputs_begin(state, self.pointer, -1)
+        for k, (place, speed) in enumerate(zip(arc.tolist(), feed.tolist(), strict=True)):
+            lib.path_outputs_step(state, place, speed)
+            digital[k] = state.values.digital
+            analogue[k] = list(state.values.analogue)
+        return digital, analogue
 
     def setpoints(
         self, kernel: str, counts_per_mm: Counts, tick0: int = 0, count: int | None = None

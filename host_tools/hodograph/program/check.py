@@ -16,6 +16,15 @@ from operator import add
 import numpy as np
 from numpy.typing import NDArray
 
+from ..events import (
+    ANALOGUE,
+    ANALOGUES,
+    DIGITAL,
+    EVENTS_A_TICK,
+    PROPORTIONAL,
+    VALUE_HIGH,
+    VALUE_LOW,
+)
 from ..feed.override_levels import FACTOR_ONE_Q14
 from ..feed.pieces import (
     DEGREE,
@@ -425,7 +434,7 @@ LONGEST_Q40_MM = 2**62
 
 @dataclass(frozen=True)
 class Fault:
-    """The first rule broken, and the segment or piece (0 for the header)."""
+    """The first rule broken, and the segment, piece or event (0 for the header)."""
 
     code: ProgramError
     index: int
@@ -435,6 +444,8 @@ class Fault:
         """Where, in words."""
         if self.code > -20 or self.code == ProgramError.STOP_WORST:
             return "header"
+        if self.code <= ProgramError.EVENT_KIND:
+            return f"event {self.index}"
         return f"{'segment' if self.code > -40 else 'piece'} {self.index}"
 
 
@@ -444,7 +455,8 @@ def check(
     """The first rule that `program` breaks, None when it may run. In a chunk it may begin in motion.
 
     The order is that of the controller: header, segments one by one, their end, pieces one by one, their
-    end and sum, then what two segments have to do with the pieces over them, and last the stops.
+    end and sum, then what two segments have to do with the pieces over them, the stops, and last
+    the events.
     """
     return _check(program, limits, _CLEAN, chunk)
 
@@ -477,6 +489,8 @@ def _check(
         or _duration_fault(program)
         or _first([(too_short(program), 0, ProgramError.SEGMENT_SHORT)])
         or _stop_fault(program, limits, reserved)
+        or _first(_event_faults(program))
+        or _first([(_dense(program), EVENTS_A_TICK, ProgramError.EVENT_DENSE)])
     )
 
 
@@ -485,6 +499,37 @@ def _stop_fault(
 ) -> Fault | None:
     found = stop_fault(program, limits, reserved.stops)
     return None if found is None else Fault(*found)
+
+
+def _event_faults(program: Program) -> list[Rule]:
+    """What is wrong with single events, and with their order."""
+    events = program.events
+    kind, value = events["kind"], events["value"]
+    digital = kind == DIGITAL
+    channels = np.where(digital, 1, ANALOGUES)
+    unknown = (kind < DIGITAL) | (kind > PROPORTIONAL) | (events["channel"] >= channels)
+    beside = value.astype(np.int64) & 0xFFFFFFFF & ~events["mask"].astype(np.int64)
+    large = (kind == ANALOGUE) & ((value < VALUE_LOW) | (value > VALUE_HIGH))
+    wrong = np.where(digital, (events["mask"] == 0) | (beside != 0), (events["mask"] != 0) | large)
+    before = np.concatenate((np.zeros(min(1, events.size), dtype=np.int64), events["place"][:-1]))
+    outside = (events["place"] < before) | (events["place"] > program.length_q40)
+    return [
+        (_bool(unknown), 0, ProgramError.EVENT_KIND),
+        (_bool(wrong), 0, ProgramError.EVENT_VALUE),
+        (_bool(outside), 0, ProgramError.EVENT_PLACE),
+    ]
+
+
+def _dense(program: Program) -> Bool:
+    """Events, from number EVENTS_A_TICK on, that a tick at 200 % could pass with so many before them."""
+    places = program.events["place"]
+    if places.size <= EVENTS_A_TICK:
+        return np.zeros(0, dtype=np.bool_)
+    low, high = places[:-EVENTS_A_TICK], places[EVENTS_A_TICK:]
+    allowed_q24 = _crossing_feed_q24(high - low, program.period_us)
+    allowed = np.ldexp(allowed_q24.astype(np.float64), -24)
+    fast = ~(highest_feed(low, high, program.pieces) <= allowed)
+    return _bool(fast | (allowed_q24 < _LEAST_FEED_Q24))
 
 
 def _first(rules: list[Rule]) -> Fault | None:

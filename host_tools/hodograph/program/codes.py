@@ -66,6 +66,10 @@ class ProgramError(IntEnum):
     STOP_BOUND = -62
     STOP_LONG = -63
     STOP_WORST = -64
+    EVENT_KIND = -100
+    EVENT_VALUE = -101
+    EVENT_PLACE = -102
+    EVENT_DENSE = -103
     CHUNK_FORMAT = -80
     CHUNK_CRC = -81
     CHUNK_JOB = -82
@@ -76,6 +80,7 @@ class ProgramError(IntEnum):
     CHUNK_SEGMENT = -87
     CHUNK_PIECE = -88
     CHUNK_OVER = -89
+    CHUNK_REST = -79
 
     @property
     def text(self) -> str:
@@ -94,7 +99,7 @@ _TEXTS = {
     ProgramError.KERNEL: "the controller does not have the kernel configured",
     ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
     ProgramError.PERIOD_USED: "period is not the one configured in the controller",
-    ProgramError.FLAGS: "unknown flag, or a reserved field of the header is not 0",
+    ProgramError.FLAGS: "unknown flag",
     ProgramError.AXES: "axis count is not 2 ... 6, or not that of the machine",
     ProgramError.DURATION: "not the sum of the pieces, or not below 2^22 s",
     ProgramError.LENGTH: "length not in (0, 2^22) mm",
@@ -138,6 +143,10 @@ _TEXTS = {
     ProgramError.STOP_BOUND: "a stop can take longer than its bound",
     ProgramError.STOP_LONG: "a fault stop can take longer than the controller allows",
     ProgramError.STOP_WORST: "the worst stops of the header are not those of the table",
+    ProgramError.EVENT_KIND: "kind or channel of an event is unknown",
+    ProgramError.EVENT_VALUE: "an event changes outputs beside its mask, or its value is too large",
+    ProgramError.EVENT_PLACE: "an event is before the one before it, or not on the path",
+    ProgramError.EVENT_DENSE: "a tick at 200 % could pass more than 16 events",
     ProgramError.CHUNK_FORMAT: "chunk: wrong magic, version, size or flag, or a reserved field is not 0",
     ProgramError.CHUNK_CRC: "chunk: CRC-32 is wrong",
     ProgramError.CHUNK_JOB: "chunk: of another job, or job 0",
@@ -148,4 +157,5 @@ _TEXTS = {
     ProgramError.CHUNK_SEGMENT: "chunk: a shared segment is not that of its predecessor",
     ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",
     ProgramError.CHUNK_OVER: "chunk: of a job that is over, or checked under another configuration",
+    ProgramError.CHUNK_REST: "chunk: does not begin at rest where its predecessor ends",
 }

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
+from ..events import Events, no_events
 from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
 from ..spline import PHSpline
-from ..spline.frames import Curve
+from ..spline.frames import Curve, frames
 from ..spline.spatial import SpatialPHSpline
 from .check import LEAST_FEED_MM_S, Fault, boxes_q40, brief_pairs, check
 from .codes import ProgramError
@@ -30,6 +31,8 @@ _FEED_MARGIN_MM_S = 2.0**-22
 
 _U32_MAX = 2**32 - 1
 _MOST_ROUNDS = 12
+_PLACES = 9
+"""Of a feed piece whose curvature is named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ class ProgramOptions:
 
     `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
     only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
-    beside the plan's limits.
+    beside the plan's limits. `events`: outputs on the path, by place.
     """
 
     name: str = ""
@@ -58,6 +61,7 @@ class ProgramOptions:
     limits: ProgramLimits | None = None
     period_us: int | None = None
     stops: StopTerms = field(default_factory=StopTerms)
+    events: Events = field(default_factory=no_events)
 
 
 _USUAL = ProgramOptions()
@@ -112,12 +116,33 @@ def compile_path(
         pieces=pieces,
         stops=no_stops(len(pieces)),
         extra_q40=geometry.extra_q40,
+        events=_on_path(options.events, length_q40),
     )
+    _require_override_headroom(program, spline)
     program = plan_stops(program, plan, options.stops)
     fault = check(program, options.limits)
     if fault is not None:
         raise PlanError(_advice(fault, program, options.limits, spline, plan.limits.names))
     return Compilation(program, plan, plan.notes, geometry.drift_mm)
+
+
+def _require_override_headroom(program: Program, spline: Curve) -> None:
+    """Raises PlanError where an override rate or override acceleration of a feed piece is rounded to 0."""
+    pieces = program.pieces
+    least = np.minimum(pieces.override_rate_codes, pieces.override_second_codes).min(axis=1)
+    lacking = np.flatnonzero(least == 0)
+    if not lacking.size:
+        return
+    first = int(lacking[0])
+    ends_mm = np.append(pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    low_mm, high_mm = float(ends_mm[first]), float(ends_mm[first + 1])
+    curvature = np.abs(frames(spline, np.linspace(low_mm, high_mm, _PLACES)).curvature)
+    sharpest = float(curvature.max())
+    raise PlanError(
+        f"program: the feed piece at {low_mm:.6g} mm, where the curvature is up to {sharpest:.3g} 1/mm, leaves no "
+        "headroom for a changing override: raise the limits, or smooth the path there (points too close together make "
+        "such places)"
+    )
 
 
 def fit_plan(spline: PHSpline | SpatialPHSpline, plan: FeedPlan, replan: Replan) -> FeedPlan:
@@ -160,6 +185,13 @@ def _fit_feed(
         zones = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
         plan = replan(plan, [FeedZone(*zone) for zone in zones], where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
+
+
+def _on_path(events: Events, length_q40: int) -> Events:
+    """The events; one at the end of the path stays there when that is rounded down."""
+    held = events.copy()
+    held["place"] = np.minimum(events["place"], length_q40)
+    return held
 
 
 def _span(spline: Curve, joints_q40: Int, segment: int) -> tuple[int, float]:

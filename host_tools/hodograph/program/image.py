@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..events import EVENT, Events, no_events
 from ..feed.override_levels import LEVELS
 from ..feed.pieces import FeedPieces
 from .codes import ProgramError
@@ -58,6 +59,7 @@ class Program:
     offset_q40 work offset of each axis, already contained
     pieces     the M feed pieces, and `stops` for each of them
     moving     it begins in motion: only in a chunk of a stream
+    events     outputs that switch on the path, by place
     Limits of 0 mean none.
     """
 
@@ -77,6 +79,7 @@ class Program:
     stops: Stops
     extra_q40: Int = field(default_factory=lambda: np.zeros((0, 0, 5), dtype=np.int64))
     moving: bool = False
+    events: Events = field(default_factory=no_events)
 
     def __post_init__(self) -> None:
         if not len(self.extra_q40):
@@ -101,7 +104,7 @@ class Program:
     @property
     def image_size(self) -> int:
         """Bytes of the image."""
-        return _size(self.axis_count, self.segment_count, self.piece_count)
+        return _size(self.axis_count, self.segment_count, self.piece_count, len(self.events))
 
     @property
     def ticks(self) -> int:
@@ -143,7 +146,7 @@ def encode(program: Program) -> bytes:
     pieces["second"] = own.override_second_codes
     stops = np.zeros(program.piece_count, dtype=_STOP)
     stops["codes"], stops["bound_us"] = program.stops.codes, program.stops.bound_us
-    body = segments.tobytes() + pieces.tobytes() + stops.tobytes()
+    body = segments.tobytes() + pieces.tobytes() + stops.tobytes() + program.events.tobytes()
     name = program.name.encode()
     if len(name) > NAME_SIZE:
         raise InputError(
@@ -167,7 +170,7 @@ def encode(program: Program) -> bytes:
             program.feed_limit_um_s,
             program.acceleration_limit_um_s2,
             program.jerk_limit_mm_s3,
-            0,
+            len(program.events),
             name,
             program.stops.worst_us[0],
             program.stops.worst_um[0],
@@ -216,6 +219,7 @@ def decode(image: bytes) -> Program:
         (head[19], head[21]),
         (head[20], head[22]),
     )
+    stops_end = after + (PIECE_SIZE + STOP_SIZE) * piece_count
     return Program(
         name=head[18].rstrip(b"\0").decode(errors="replace"),
         period_us=head[5],
@@ -238,6 +242,7 @@ def decode(image: bytes) -> Program:
         extra_q40=np.array([_from_i48(one["b"]) for one in extra], dtype=np.int64).reshape(
             max(axes - SPACE_AXES, 0), segment_count, 5
         ),
+        events=np.frombuffer(image, EVENT, head[17], stops_end).copy(),
     )
 
 
@@ -284,8 +289,9 @@ def _from_i48(values: NDArray[np.void]) -> Int:
     return np.asarray((values["high"].astype(np.int64) << 32) | values["low"].astype(np.int64))
 
 
-def _size(axes: int, segments: int, pieces: int) -> int:
-    return header_size(axes) + segment_size(axes) * segments + (PIECE_SIZE + STOP_SIZE) * pieces
+def _size(axes: int, segments: int, pieces: int, events: int) -> int:
+    body = segment_size(axes) * segments + (PIECE_SIZE + STOP_SIZE) * pieces
+    return header_size(axes) + body + EVENT.itemsize * events
 
 
 def open_fault(image: bytes) -> ProgramError | None:
@@ -302,7 +308,7 @@ def open_fault(image: bytes) -> ProgramError | None:
         return ProgramError.AXES
     if head[2] != header_size(axes):
         return ProgramError.VERSION
-    size = _size(axes, head[6], head[7])
+    size = _size(axes, head[6], head[7], head[17])
     if head[3] != size or len(image) < size:
         return ProgramError.SIZE
     if head[6] == 0 or head[7] == 0:
@@ -314,7 +320,7 @@ def open_fault(image: bytes) -> ProgramError | None:
 
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
-    """What an image says beside a `Program`: whether flags and reserved bytes of the header and the padding of the
+    """What an image says beside a `Program`: whether flags of the header and the padding of the
     name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
     """
 
@@ -330,7 +336,7 @@ def reserved_fields(image: bytes) -> ReservedFields:
     after = header_size(head[9]) + segment_size(head[9]) * head[6]
     stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
-        flags=not (head[8] & ~(FLAG_CLOSED | FLAG_MOVING) or head[17]),
+        flags=not head[8] & ~(FLAG_CLOSED | FLAG_MOVING),
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         stops=stops != 0,
     )

@@ -6,31 +6,30 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
-from .image import PIECE_SIZE, RECORD_BYTES, STOP_SIZE, VERSION, Program, record_bytes, segment_size
+from .image import PIECE_SIZE, RECORD_BYTES, STOP_SIZE, VERSION, Program, header_size, record_bytes, segment_size
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
-
-_ROWS = 12
 
 RING_BYTES = 48 * 1024
 """Memory for chunks of the small controllers (0x2060 sub 14)."""
+
+_ROWS = 12
 
 
 def inspect_dict(program: Program) -> dict[str, Any]:
     """What a program holds, as plain numbers in mm and s, for JSON."""
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
-    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
-    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
-    end = [int(last) + way for last, way in zip(program.point_q40[:, -1], ways, strict=True)]
     return {
         "name": program.name,
         "version": VERSION,
         "image_bytes": program.image_size,
-        "memory": _memory(program),
+        "record_bytes": _bytes(program),
         "period_us": program.period_us,
         "closed": program.closed,
         "segments": program.segment_count,
@@ -40,7 +39,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "length_mm": program.length_mm,
         "offset_mm": [one * 2.0**-40 for one in program.offset_q40],
         "start_mm": (program.point_q40[:, 0] * 2.0**-40).tolist(),
-        "end_mm": [one * 2.0**-40 for one in end],
+        "end_mm": (end_point_q40(program) * 2.0**-40).tolist(),
         "feed_limit_mm_s": program.feed_limit_um_s / 1000 or None,
         "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
         "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
@@ -51,27 +50,30 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "override_rate_least_per_s": float(pieces.override_rate_per_s().min()),
         "override_second_least_per_s2": float(pieces.override_second_per_s2().min()),
         "stops": stops_dict(program.stops, program.piece_starts_mm),
+        "events": [_event_dict(Event(*event)) for event in program.events.tolist()],
     }
 
 
-def _records(program: Program, kernel: str) -> dict[str, int]:
-    of_segment, of_piece = record_bytes(RECORD_BYTES[kernel], program.axis_count)
-    return {"segment_bytes": of_segment, "piece_bytes": of_piece}
-
-
-def _memory(program: Program) -> dict[str, Any]:
-    """Bytes of a segment and a piece in the image and of their records, and what 48 KiB of images hold at least."""
-    segment, piece = segment_size(program.axis_count), PIECE_SIZE + STOP_SIZE
+def _bytes(program: Program) -> dict[str, Any]:
+    """Of an image, of each of its parts and of the coefficients of each; what a ring for chunks has room for."""
     segments, pieces, seconds = ring_holds(program, RING_BYTES)
     return {
-        "segment_bytes": segment,
-        "piece_bytes": piece,
-        "records": {kernel: _records(program, kernel) for kernel in RECORD_BYTES},
-        "ring_bytes": RING_BYTES,
-        "ring_segments": segments,
-        "ring_pieces": pieces,
-        "ring_s": seconds,
+        "header": header_size(program.axis_count),
+        "segment": segment_size(program.axis_count),
+        "piece": PIECE_SIZE,
+        "stop": STOP_SIZE,
+        "coefficients": {kernel: _coefficients(program, kernel) for kernel in RECORD_BYTES},
+        "image_per_s": program.image_size / program.duration_s,
+        "ring": RING_BYTES,
+        "segments_in_ring": segments,
+        "pieces_in_ring": pieces,
+        "seconds_in_ring": seconds,
     }
+
+
+def _coefficients(program: Program, kernel: str) -> dict[str, int]:
+    of_segment, of_piece = record_bytes(RECORD_BYTES[kernel], program.axis_count)
+    return {"segment": of_segment, "piece": of_piece}
 
 
 def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
@@ -101,16 +103,25 @@ def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
     return int(begun[end] - begun[least]), int(end - least), float(times[end] - times[least])
 
 
-def _memory_text(memory: dict[str, Any]) -> str:
-    records = "; ".join(
-        f"{kernel} {one['segment_bytes']} and {one['piece_bytes']}"
-        for kernel, one in memory["records"].items()
+def _bytes_text(found: dict[str, Any]) -> str:
+    coefficients = "; ".join(
+        f"{kernel} {one['segment']} and {one['piece']}"
+        for kernel, one in found["coefficients"].items()
     )
     return (
-        f"memory    {memory['segment_bytes']} bytes a segment, {memory['piece_bytes']} a piece; records: {records}\n"
-        f"stream    {memory['ring_bytes'] // 1024} KiB hold {memory['ring_segments']} segments and "
-        f"{memory['ring_pieces']} pieces, {memory['ring_s']:.3f} s, where they are densest"
+        f"bytes     header {found['header']}, segment {found['segment']}, piece {found['piece']} with stop "
+        f"{found['stop']}; {found['image_per_s']:.0f} a second of motion\n"
+        f"          coefficients of a segment and a piece: {coefficients}\n"
+        f"ring      {found['ring'] // 1024} KiB hold {found['segments_in_ring']} segments and "
+        f"{found['pieces_in_ring']} pieces, {found['seconds_in_ring']:.3g} s, where they are densest"
     )
+
+
+def end_point_q40(program: Program) -> NDArray[np.int64]:
+    """Where it ends, (A,) in 2^-40 mm or degrees."""
+    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
+    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
+    return np.asarray(program.point_q40[:, -1] + np.array(ways, dtype=np.int64))
 
 
 def inspect_text(program: Program, *, full: bool = False) -> str:
@@ -128,6 +139,7 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
     names = AXES[: program.axis_count]
     lines = [
         f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
+        _bytes_text(d["record_bytes"]),
         f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
         f"from      ({', '.join(f'{mm:.9f}' for mm in d['start_mm'])}) mm",
         f"to        ({', '.join(f'{mm:.9f}' for mm in d['end_mm'])}) mm",
@@ -138,7 +150,6 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         f"mm/s^2, jerk {d['peak_jerk_mm_s3']:.6g} mm/s^3 (bounds of the pieces)",
         f"override  factor {d['override_factor_least']:.4g}, rate {d['override_rate_least_per_s']:.4g} /s, "
         f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
-        _memory_text(d["memory"]),
         *stops_text(program.stops, program.piece_starts_mm),
         "",
         " segment       start mm"
@@ -151,8 +162,37 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         "",
         "   piece     hold: mm/s^3   mm/s^2   mm/s^3  bound s    fault: mm/s^3   mm/s^2   mm/s^3  bound s",
         *_rows(_stop_rows(program), full),
+        *_event_lines(program, full),
     ]
     return "\n".join(lines) + "\n"
+
+
+_EVENT_KINDS = {DIGITAL: "digital", ANALOGUE: "analogue", PROPORTIONAL: "proportional"}
+
+
+def _event_dict(event: Event) -> dict[str, Any]:
+    return {
+        "place_mm": event.place_q40 * 2.0**-40,
+        "kind": _EVENT_KINDS.get(event.kind, f"{event.kind}"),
+        "channel": event.channel,
+        "mask": event.mask,
+        "value": event.value / 65536 if event.kind == PROPORTIONAL else event.value,
+    }
+
+
+def _event_lines(program: Program, full: bool) -> list[str]:
+    """The table of events; nothing where there is none."""
+    if not len(program.events):
+        return []
+    rows = [
+        f"{i:8d} {d['place_mm']:14.9f} {d['kind']:>13} {d['channel']:8d}   0x{d['mask']:04X} {d['value']:12g}"
+        for i, d in enumerate(_event_dict(Event(*event)) for event in program.events.tolist())
+    ]
+    return [
+        "",
+        "   event       place mm          kind  channel     mask        value",
+        *_rows(rows, full),
+    ]
 
 
 def _segment_rows(program: Program) -> list[str]:

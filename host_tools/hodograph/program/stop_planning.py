@@ -82,12 +82,24 @@ def stop_codes(
     """Codes (M, 2, 3) of the wanted (M,) pieces, 0 elsewhere. No piece is halved; the program may begin in motion."""
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
-        own.raised(search.used(own))
+        replace(own.raised(search.used(own)), quick=terms.quick)
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)
     _search_round(program, limits, codes, np.repeat(~wanted[:, None], 2, axis=1))
     return codes
+
+
+def without_long_stops(program: Program) -> Program:
+    """The program without stop parameters whose brakes take longer than the way on to where the next ones may begin, or
+    to its end.
+    """
+    codes = program.stops.codes.copy()
+    for kind in (HOLD, FAULT):
+        codes[
+            _better_without(_with_codes(program, codes), kind, range(program.piece_count)), kind
+        ] = 0
+    return with_bounds(_with_codes(program, codes))
 
 
 def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
@@ -127,7 +139,7 @@ def _search_round(
     codes[:, FAULT] = search.codes(limits[FAULT], codes[:, FAULT], given, codes[:, HOLD])
 
 
-def _better_without(program: Program, kind: int, pieces: list[int]) -> NDArray[np.bool_]:
+def _better_without(program: Program, kind: int, pieces: Sequence[int]) -> NDArray[np.bool_]:
     """Parts (M,) that had better have no numbers of a kind: those whose numbers give a bound that is longer by a tenth
     than the way on into the next part, and all of a piece (`pieces`, (M,)) where numbers that differ between its parts
     make no bound shorter by that.

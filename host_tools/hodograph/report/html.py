@@ -124,7 +124,7 @@ def _space_run(pipeline: Pipeline, motion: Motion, source: str) -> list[Figure]:
     figures = [Figure("contour", caption, space_contour_figure(pipeline, motion))]
     if motion.extra_names:
         caption = (
-            "The axes behind x, y, z over arc length; and how far they are from where the curve has them beside the "
+            "The axes after x, y, z over arc length; and how far they are from where the curve has them beside the "
             f"point nearest to the tool, {source}."
         )
         figures.append(Figure("axes", caption, extra_axes_figure(pipeline, motion)))
@@ -196,7 +196,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
 
 
 def _orientation(cases: Sequence[Case], motion: Motion) -> dict[str, str]:
-    """A row for the axes behind x, y, z, where one of the cases has such."""
+    """A row for the axes after x, y, z, where one of the cases has such."""
     if not any(one.extra_names for _, one, _ in cases):
         return {}
     every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a path in space: the curve with its given points, a run from four sides, and the axes behind x, y, z."""
+"""Figures of a path in space: the curve with its given points, a run from four sides, and the axes after x, y, z."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def space_contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
 
 
 def extra_axes_figure(pipeline: Pipeline, motion: Motion) -> bytes:
-    """The axes behind x, y, z over arc length, with their given points, and their distance from it in the run."""
+    """The axes after x, y, z over arc length, with their given points, and their distance from it in the run."""
     spline, given = pipeline.curve, pipeline.file.given_path
     assert isinstance(spline, SpatialPHSpline)
     s_mm = np.linspace(0.0, spline.length_mm, _SAMPLES)

@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config.outputs import Outputs
+from ..events import Events, no_events
 from ..names import AXES
 from ..native.contour import Contour
 from ..native.program import Counts, counts_by_axis
+from .acted import ActedOutput, acted_outputs
 
 SETTLING_S = 0.2
 """Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
@@ -36,10 +39,10 @@ class Motion:
     did not keep them. Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian
     x, y (…) of the program's ticks. The following error
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
-    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not tell their volts.
+    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not report their volts.
 
     `units`, `counts_per_unit` by axis. An axis that turns has degrees where names say mm, and thousandths of a degree
-    where they say um; the greatest following error is that of the axes in mm. Axes behind x, y, z have an orientation
+    where they say um; the greatest following error is that of the axes in mm. Axes after x, y, z have an orientation
     error: how far they are from where the curve has them beside the point nearest to the tool.
     """
 
@@ -59,14 +62,38 @@ class Motion:
     orientation_error: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     """(n, A - 3), actual less exact, in mm or degrees."""
     max_orientation_error: tuple[float, ...] = ()
-    """Of each axis behind x, y, z, in mm or degrees."""
+    """Of each axis after x, y, z, in mm or degrees."""
     max_following_error_mdeg: float | None = None
     """Of the axes that turn; None: there is none."""
+    event_ticks: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """(E,) the tick in which each event of the program acted; -1: in none."""
+    events: Events = field(default_factory=no_events)
+    """Of the program."""
+    outputs: Outputs | None = None
+    """The machine's outputs, which name what the events switch; None: it has none."""
 
     @property
     def extra_names(self) -> tuple[str, ...]:
-        """The axes behind x, y, z."""
+        """The axes after x, y, z."""
         return self.names[3:]
+
+    @property
+    def acted_outputs(self) -> list[ActedOutput]:
+        """What became of the outputs, in the order of their places."""
+        return acted_outputs(self.outputs, self.events, self.event_ticks, self.period_us)
+
+    @property
+    def output_columns(self) -> dict[str, NDArray[Any]]:
+        """By name of an output its value in each row, (n,): 0 and 1 of a digital one, that of an analogue one in its
+        unit.
+        """
+        rows, channels = self.rows, self.outputs.channels if self.outputs is not None else ()
+        return {
+            one.name: rows["digital"] >> one.number & 1
+            if one.digital
+            else rows["analogue"][:, one.number] / one.scale
+            for one in channels
+        }
 
     @property
     def _counts(self) -> NDArray[np.int64]:
@@ -84,6 +111,8 @@ class Motion:
             self.extra_names, self.units[3:], self.max_orientation_error, strict=True
         ):
             extra[f"{name}_max_error_{unit}"] = error
+        if self.outputs is not None:
+            extra["outputs"] = [one.summary() for one in self.acted_outputs]
         return {
             "ticks": self.ticks,
             "setpoints_sha256": self.setpoints_sha256,
@@ -167,11 +196,13 @@ class Tally:
         names: tuple[str, ...] = AXES[:2],
         units: Sequence[str] | None = None,
         contour: Contour | None = None,
+        events: Events | None = None,
     ) -> None:
         """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling.
 
         units    of the axes (default mm)
         contour  of a program with axes behind x, y, z; None: it has none
+        events   of the program; None: it has none
         """
         self._left = ticks
         self._names = names
@@ -187,6 +218,8 @@ class Tally:
         self._rows = 0
         self._following_counts = np.zeros(len(names), dtype=np.int64)
         self._volts_mv = 0
+        self._events = no_events() if events is None else events
+        self._event_ticks = np.full(self._events.shape, -1, dtype=np.int64)
 
     def add(self, rows: NDArray[np.void]) -> None:
         """The next rows, of `native.ROW`."""
@@ -197,6 +230,7 @@ class Tally:
         self._encoders.update(counted["act_counts"][path].tobytes())
         if rows.size == 0:
             return
+        self._note_events(rows)
         behind = np.abs(rows["set_counts"][path].astype(np.int64) - rows["act_counts"][path])
         self._following_counts = np.maximum(self._following_counts, behind.max(axis=0))
         if self._contour is not None:
@@ -214,6 +248,17 @@ class Tally:
         self._volts_mv = max(
             self._volts_mv, int(np.abs(rows["volts_mv"][path].astype(np.int32)).max())
         )
+
+    def _note_events(self, rows: NDArray[np.void]) -> None:
+        """An event acts with the first setpoint at or past its place."""
+        arc_q40 = rows["arc_length_q40_mm"]
+        waiting = self._event_ticks < 0
+        if not waiting.any():
+            return
+        highest = np.maximum.accumulate(arc_q40)
+        due = waiting & (self._events["place"] <= highest[-1])
+        found = np.searchsorted(highest, self._events["place"][due], side="left")
+        self._event_ticks[due] = rows["tick"][found]
 
     def _greatest_following(self, unit: str) -> float | None:
         """In thousandths of the unit, of the axes that have it; None: there is none."""
@@ -241,4 +286,6 @@ class Tally:
             orientation_error=error,
             max_orientation_error=tuple(self._max_orientation.tolist()),
             max_following_error_mdeg=self._greatest_following("deg"),
+            event_ticks=self._event_ticks,
+            events=self._events,
         )

@@ -4,10 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config.outputs import Outputs
 from ..errors import RunError
 from ..names import AXES
 from ..native import ROW, Contour, NativeProgram
@@ -26,6 +28,8 @@ def analyse(
     counts_per_mm: Counts = 1_000_000,
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
+    outputs: Outputs | None = None,
+    latched: NDArray[np.void] | None = None,
 ) -> Motion:
     """The `Motion` of a recording, as `simulate` gives it.
 
@@ -33,7 +37,10 @@ def analyse(
     the drives reported for SYNC k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The
     commanded points are computed again by the kernel that the controller used, and compared with the setpoints.
 
-    Raises RunError when rows are missing or a setpoint is not the kernel's, InputError for a bad image.
+    outputs  of the machine; `latched`: what its I/O module had at SYNC k+2, records with "digital", "analogue"
+
+    Raises RunError when rows are missing, an output is not the program's or a setpoint is not the kernel's, InputError
+    for a bad image.
     """
     program = NativeProgram(image)
     wanted = program.ticks + settling_ticks(program.period_us)
@@ -54,14 +61,47 @@ def analyse(
     rows["contour_error_um"] = Contour(program).errors_um(
         rows["arc_length_q40_mm"], act_counts[:wanted], counts_by_axis(counts_per_mm, axes)[0]
     )
+    if outputs is not None and latched is not None:
+        _put_outputs(rows, program, outputs, latched)
     tally = make_tally(program, counts_per_mm, tuple(names or AXES[:axes]), units)
     tally.add(rows)
-    return tally.motion(
+    motion = tally.motion(
         kernel=kernel,
         period_us=program.period_us,
         ticks=program.ticks,
         rows=rows,
     )
+    return replace(motion, outputs=outputs)
+
+
+def _put_outputs(
+    rows: NDArray[np.void], program: NativeProgram, outputs: Outputs, latched: NDArray[np.void]
+) -> None:
+    """The outputs in the rows. Raises RunError: they are not those of the program, held back by the machine's delay.
+
+    An output that is held back by one tick is latched when the setpoint is reached, which is row k.
+    """
+    if len(latched) < len(rows):
+        raise RunError(f"recording: holds {len(latched)} of {len(rows)} ticks: run again")
+    rows["digital"], rows["analogue"] = (
+        latched["digital"][: len(rows)],
+        latched["analogue"][: len(rows)],
+    )
+    digital, analogue = program.outputs(rows["arc_length_q40_mm"], rows["feed_q32_mm_s"])
+    ticks = program.ticks
+    shift = outputs.delay_ticks - 1
+    # Before the first tick the outputs may be those of the program before this one; after the last one they may go off.
+    found = slice(max(shift, 0), ticks - 1 + min(shift, 0))
+    wanted = slice(max(-shift, 0), max(-shift, 0) + found.stop - found.start)
+    wrong = (rows["digital"][found] != digital[wanted]) | np.any(
+        rows["analogue"][found] != analogue[wanted], axis=1
+    )
+    if wrong.any():
+        tick = found.start + int(wrong.argmax())
+        raise RunError(
+            f"recording: the outputs at tick {tick} are {rows['digital'][tick]:#x} {rows['analogue'][tick].tolist()}, "
+            "not those of the program: was it stopped or overridden?"
+        )
 
 
 def _compare(recorded: NDArray[np.int32], expected: NDArray[np.int32]) -> None:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,8 @@ def make_tally(
 ) -> Tally:
     """The tally of a run of a program, or of its first ticks."""
     contour = Contour(program) if program.axis_count > 3 else None
-    return Tally(program.ticks if ticks is None else ticks, counts_per_mm, names, units, contour)
+    own_ticks = program.ticks if ticks is None else ticks
+    return Tally(own_ticks, counts_per_mm, names, units, contour, program.events)
 
 
 def simulate(
@@ -97,7 +99,7 @@ def simulate_on(
 
     Raises InputError as `simulate` does, and for an axis without a drive file.
     """
-    return simulate(
+    motion = simulate(
         image,
         machine.models(machine.path_axes),
         kernel=kernel or machine.kernel,
@@ -108,3 +110,4 @@ def simulate_on(
         names=machine.path_names,
         units=machine.path_units,
     )
+    return replace(motion, outputs=machine.outputs)

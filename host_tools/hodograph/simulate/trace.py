@@ -11,15 +11,18 @@ from ..names import AXES
 from .motion import Motion
 
 
-def trace_header(names: Sequence[str], units: Sequence[str] | None = None) -> str:
-    """The first line of a trace of axes with these names and units (default mm)."""
+def trace_header(
+    names: Sequence[str], units: Sequence[str] | None = None, outputs: Sequence[str] = ()
+) -> str:
+    """The first line of a trace of axes with these names and units (default mm), and of outputs."""
     of = ("mm",) * len(names) if units is None else units
     columns = ["tick", "t_s", "arc_length_mm", "feed_mm_s"]
     columns += [f"{name}_cmd_{unit}" for name, unit in zip(names, of, strict=True)]
     columns += [f"{name}_set_counts" for name in names]
     columns += [f"{name}_act_{unit}" for name, unit in zip(names, of, strict=True)]
     errors = [f"{name}_error_{unit}" for name, unit in zip(names[3:], of[3:], strict=True)]
-    return ",".join([*columns, "contour_error_um", *errors, *(f"{name}_volts" for name in names)])
+    columns += ["contour_error_um", *errors, *(f"{name}_volts" for name in names)]
+    return ",".join([*columns, *(f"{name}_out" for name in outputs)])
 
 
 TRACE_HEADER = trace_header(AXES[:2])
@@ -35,6 +38,7 @@ def write_trace(motion: Motion, file: Path) -> None:
     the file cannot
     be written.
     """
+    outputs = motion.output_columns
     columns = [
         motion.rows["tick"],
         motion.t_s,
@@ -46,10 +50,11 @@ def write_trace(motion: Motion, file: Path) -> None:
         motion.contour_error_um,
         *motion.orientation_error.T,
         *motion.volts.T,
+        *outputs.values(),
     ]
     try:
         with file.open("w", encoding="ascii", newline="\n") as out:
-            out.write(trace_header(motion.names, motion.units) + "\n")
+            out.write(trace_header(motion.names, motion.units, tuple(outputs)) + "\n")
             for first in range(0, motion.ticks, _CHUNK):
                 part = slice(first, min(first + _CHUNK, motion.ticks))
                 texts = [map(repr, column[part].tolist()) for column in columns]

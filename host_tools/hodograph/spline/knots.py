@@ -26,7 +26,7 @@ class KnotSpans:
 
     length  (M,) h_i, mean 1
     before  (M,) h_i / (h_(i-1) + h_i): share of the coefficient before, in the value at the start of the span
-    after   (M,) h_i / (h_i + h_(i+1)): share of the coefficient behind, in the value at its end
+    after   (M,) h_i / (h_i + h_(i+1)): share of the coefficient after, in the value at its end
 
     Beyond the ends of an open path, the end span is repeated.
     """

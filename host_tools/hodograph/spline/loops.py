@@ -2,9 +2,9 @@
 """Getting rid of loops: the other side of a near-cusp; docs/theory/numerics.md 3.3.
 
 Where the guide all but stops, the continuous square root is a matter of luck: the tangent may
-turn by a or by a - 2 pi. The two choices differ in the sign of all z behind that place, and the
+turn by a or by a - 2 pi. The two choices differ in the sign of all z after that place, and the
 influence of either dies out within a few spans. So each sharply turning span is solved again on a
-window of neighbours with the sign changed before it or behind it, and the choice with the least
+window of neighbours with the sign changed before it or after it, and the choice with the least
 bending energy is kept.
 """
 
@@ -41,7 +41,7 @@ class Unlooped:
 
 
 def suspects(w: Complex, guide_turning: Real) -> list[int]:
-    """Spans that turn so sharply that the other side is worth a look, the sharpest first.
+    """Spans that turn so sharply that the other side has to be tried, the sharpest first.
 
     Those are spans that turn by more than 225 degrees, and spans with a root of w close by that
     turn by 90 degrees more or less than the guide or whose bending energy times length exceeds

@@ -152,7 +152,7 @@ class System:
         return solve_tridiagonal(lower, diagonal, upper, -residual)
 
     def _derivatives(self, x: Complex) -> tuple[Complex, Complex, Complex]:
-        """Of each row by the value before, its own and the one behind."""
+        """Of each row by the value before, its own and the one after."""
         before, z, after = x[:-2], x[1:-1], x[2:]
         if self.knots is None:
             lower = 6.0 * before + after + 13.0 * z

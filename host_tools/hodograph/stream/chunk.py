@@ -19,13 +19,35 @@ from ..program.image import Program, decode, encode
 MAGIC = b"HDGC"
 VERSION = 1
 HEADER_SIZE = 80
-FLAG_FIRST, FLAG_LAST = 1, 2
+FLAG_FIRST, FLAG_LAST, FLAG_REST, FLAG_JOINED = 1, 2, 4, 8
+_FLAGS = FLAG_FIRST | FLAG_LAST | FLAG_REST | FLAG_JOINED
+REST_STOP, REST_OPTIONAL = 1, 2
+REST_TICKS = 8
+"""The shortest rest before a chunk that begins at rest."""
 TIME_UNKNOWN = 0xFFFFFFFF
 LEAST_SHARED_PIECES = 16
 """The largest look-ahead window of the controller: so many pieces before a joint are in both chunks."""
 
 _HEADER = struct.Struct("<4sHH I I I I I I I I q Q q I I II".replace(" ", ""))
 _CRC_FROM = 16
+
+
+@dataclass(frozen=True)
+class Rest:
+    """What happens at rest before a chunk that begins where its predecessor ends.
+
+    dwell_ms       standstill
+    stop           it waits until it is resumed
+    optional_stop  the same where the controller makes optional stops
+    """
+
+    dwell_ms: int = 0
+    stop: bool = False
+    optional_stop: bool = False
+
+    def ticks(self, period_us: int) -> int:
+        """Setpoints that repeat the end of the predecessor."""
+        return max(-(-self.dwell_ms * 1000 // period_us), REST_TICKS)
 
 
 @dataclass(frozen=True)
@@ -43,6 +65,8 @@ class ChunkHeader:
     job_start_q40     arc length of the job at arc length 0 here
     line              source line at its start; 0: none
     remaining_ms      of the job, from the joint to its end; None: not known yet
+    rest              it begins at rest, after this; None: it does not, or is the first
+    joined            its end is no tail: the next chunk begins there, at rest
     """
 
     first: bool
@@ -58,6 +82,18 @@ class ChunkHeader:
     job_start_q40: int = 0
     line: int = 0
     remaining_ms: int | None = None
+    rest: Rest | None = None
+    joined: bool = False
+
+    @property
+    def flags(self) -> int:
+        """As bits."""
+        return (
+            FLAG_FIRST * self.first
+            | FLAG_LAST * self.last
+            | FLAG_REST * (self.rest is not None)
+            | FLAG_JOINED * self.joined
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,12 +120,12 @@ class Chunk:
 
     def encode(self) -> bytes:
         """The bytes. Raises InputError for values that the fields cannot hold."""
-        one = self.header
+        one, rest = self.header, self.header.rest or Rest()
         try:
             body = _HEADER.pack(
                 MAGIC,
                 VERSION,
-                FLAG_FIRST * one.first | FLAG_LAST * one.last,
+                one.flags,
                 self.size,
                 0,
                 one.job,
@@ -103,8 +139,8 @@ class Chunk:
                 one.job_start_q40,
                 one.line,
                 TIME_UNKNOWN if one.remaining_ms is None else one.remaining_ms,
-                0,
-                0,
+                rest.dwell_ms,
+                REST_STOP * rest.stop | REST_OPTIONAL * rest.optional_stop,
             )
         except struct.error as error:
             raise InputError(f"chunk: a header field does not fit the format: {error}") from None
@@ -123,13 +159,13 @@ def parse(data: bytes) -> Chunk:
     if len(data) < HEADER_SIZE:
         raise InputError(f"chunk: {len(data)} bytes are less than a header")
     (magic, version, flags, size, crc, *rest) = _HEADER.unpack_from(data)
-    if magic != MAGIC or version != VERSION or flags & ~(FLAG_FIRST | FLAG_LAST) or any(rest[-2:]):
+    if magic != MAGIC or version != VERSION or not _flags_fit(flags, rest[-2], rest[-1]):
         raise InputError("chunk: wrong magic, version or flag, or a reserved field is not 0")
     if not HEADER_SIZE <= size <= len(data):
         raise InputError(f"chunk: says {size} bytes, and there are {len(data)}")
     if _crc_of(data[:size]) != crc:
         raise InputError("chunk: CRC-32 is wrong")
-    job, sequence, *shared, arc, time, start, line, remaining, _, _ = rest
+    job, sequence, *shared, arc, time, start, line, remaining, dwell_ms, stops = rest
     header = ChunkHeader(
         bool(flags & FLAG_FIRST),
         bool(flags & FLAG_LAST),
@@ -144,8 +180,21 @@ def parse(data: bytes) -> Chunk:
         start,
         line,
         None if remaining == TIME_UNKNOWN else remaining,
+        Rest(dwell_ms, bool(stops & REST_STOP), bool(stops & REST_OPTIONAL))
+        if flags & FLAG_REST
+        else None,
+        bool(flags & FLAG_JOINED),
     )
     return Chunk(header, bytes(data[HEADER_SIZE:size]))
+
+
+def _flags_fit(flags: int, dwell_ms: int, stops: int) -> bool:
+    """As the controller has them."""
+    if flags & ~_FLAGS or stops & ~(REST_STOP | REST_OPTIONAL):
+        return False
+    return bool(flags & FLAG_REST or not (dwell_ms or stops)) and not (
+        flags & FLAG_JOINED and flags & FLAG_LAST
+    )
 
 
 def make(header: ChunkHeader, program: Program) -> Chunk:
@@ -162,11 +211,26 @@ def shared_fault(chunk: Chunk, before: Chunk | None) -> str | None:
     if before is None:
         alone = one.first and one.sequence == 0 and not (one.shared_pieces or one.shared_segments)
         return None if alone else "it is no first chunk"
+    if one.rest is not None:
+        return _rest_fault(one, before)
+    if before.header.joined:
+        return "its predecessor is followed by a rest"
     if one.first or one.job != before.header.job or one.sequence != before.header.sequence + 1:
         return "it is not the next chunk of the job"
     if one.job_start_q40 != before.header.job_start_q40 + one.arc_shift_q40:
         return "the arc length of the job does not go on"
     return _shared_fault(one, chunk.program, before.program)
+
+
+def _rest_fault(one: ChunkHeader, before: Chunk) -> str | None:
+    """The same of one that begins at rest."""
+    if one.first or one.job != before.header.job or one.sequence != before.header.sequence + 1:
+        return "it is not the next chunk of the job"
+    shared = (one.piece_shift, one.segment_shift, one.shared_pieces, one.shared_segments)
+    if any(shared) or one.arc_shift_q40 or one.time_shift_q32_s:
+        return "it begins at rest and shares something"
+    end_q40 = before.header.job_start_q40 + before.program.length_q40
+    return None if one.job_start_q40 == end_q40 else "the arc length of the job does not go on"
 
 
 def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
+from itertools import tee
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +17,16 @@ from ..feed.pieces import FeedPieces
 from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
 from ..program.codes import ProgramError
-from ..program.image import Program, encode
-from ..program.stop_planning import stop_codes, with_bounds
+from ..program.image import Program, encode, segment_size
+from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
-from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader
+from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
-from .windows import JOINTS, SectionFeed, Spacing, Stretch, Window, chained, taken
+from .windows import JOINTS, PIECE_BYTES, SectionFeed, Spacing, Stretch, Window, chained, taken
 
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 CHUNK_S = 0.7
 """New motion of a chunk."""
@@ -41,6 +43,9 @@ LATENESS_S, LEAST_LATENESS_S = 0.1, 0.02
 SEARCH_S, GAP_S = 0.02, 0.06
 """Stops may begin about so often, and all pieces are searched where they may not for so long."""
 
+_TAIL_SHARE = 0.8
+"""Of the last tail: a chunk for whose tail there is less room is not planned."""
+
 _LONGEST_NAME = 32
 _MOVING_FAULTS = frozenset(
     (
@@ -55,6 +60,22 @@ _MOVING_FAULTS = frozenset(
     )
 )
 """What a slower feed at a piece avoids."""
+
+
+@dataclass(frozen=True, eq=False)
+class JobPlace:
+    """Where a section stands in its job, when others are before it.
+
+    rest       what happens at rest before it
+    sequence   of its first chunk
+    way_q40    arc length of the job at its start
+    point_q40  (A,) where the section before it ends
+    """
+
+    rest: Rest
+    sequence: int
+    way_q40: int
+    point_q40: NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +134,35 @@ class _Kept:
         return kept, shift, int(times[shift])
 
 
+@dataclass
+class _Searched:
+    """Stop codes (M, 2, 3) of the pieces of a window."""
+
+    window: Window
+
+    def __post_init__(self) -> None:
+        self.codes = _no_codes(len(self.window.stretch.pieces))
+
+
+class _Tails:
+    """Tails of a window, each planned once."""
+
+    def __init__(self, feed: SectionFeed, window: Window) -> None:
+        self._feed, self.window = feed, window
+        self._made: dict[int, Iterator[Stretch]] = {}
+        self._refused: list[Stretch] = []
+
+    def behind(self, joint: int, least_q40: int) -> Iterator[Stretch]:
+        """As SectionFeed.tails; `least_q40` is that of the first call for a joint."""
+        made = self._made.get(joint) or self._feed.tails(self.window, joint, least_q40)
+        self._made[joint], own = tee(made)
+        return (tail for tail in own if not any(tail is one for one in self._refused))
+
+    def refuse(self, tail: Stretch) -> None:
+        """The controller would refuse the motion of a tail: it is not given again."""
+        self._refused.append(tail)
+
+
 class SectionChunks:
     """Makes the chunks of one section."""
 
@@ -124,10 +174,15 @@ class SectionChunks:
         job: int,
         most_bytes: int = CHUNK_BYTES,
         begin_q40: int = 0,
+        place: JobPlace | None = None,
+        goes_on: Callable[[NDArray[np.int64]], bool] = lambda _: False,
     ) -> None:
         """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for; `begin_q40`:
-        arc length of the section where the path of the blocks begins.
+        arc length of the section where the path of the blocks begins; `place`: None for the first section of a job;
+        `goes_on`: whether the job goes on, after a rest, from this point (A,) in 2^-40 mm, the end of the section. It
+        is asked when all blocks have been read.
         """
+        self._place, self._goes_on = place, goes_on
         self.machine = machine
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
@@ -137,10 +192,13 @@ class SectionChunks:
             Spacing(CHUNK_S, round(_NEW_SHARE * most_bytes)),
             self._exceeded,
             begin_q40,
+            None if place is None else place.point_q40,
         )
         self._most = most_bytes
         self._kept = _Kept()
         self._last: _Made | None = None
+        self._searched: _Searched | None = None
+        self._tail_bytes = 0
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -157,23 +215,28 @@ class SectionChunks:
         """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
         for, and which this is.
         """
-        codes = self._stop_codes(window, first, joints[-1])
-        before = self._kept
+        searched, before, tails = self._searched_in(window), self._kept, _Tails(self._feed, window)
+        program, fault = None, None
         for lateness_s, used in [
             *((LATENESS_S, count) for count in range(len(joints), 0, -1)),
             (LEAST_LATENESS_S, 1),
         ]:
             kept, piece_shift, time_shift = before.repeated(lateness_s)
-            joint = joints[used - 1]
-            new = taken(window.stretch.pieces, slice(first, joint))
-            self._kept = kept.with_new(new, codes[: joint - first])
-            program, fault = self._with_tail(window, joint)
-            if fault is not None and fault.code == ProgramError.STOP_LONG:
-                codes = self._all_codes(window, first, joints[-1])
-                self._kept = kept.with_new(new, codes[: joint - first])
-                program, fault = self._with_tail(window, joint, search_tail=True)
+            joint, new = joints[used - 1], slice(first, joints[used - 1])
+            pieces = taken(window.stretch.pieces, new)
+            self._kept = kept.with_new(pieces, searched.codes[new])
+            kept_bytes = self._size_kept(window, joint)
+            if used > 1 and kept_bytes + _TAIL_SHARE * self._tail_bytes > self._most:
+                continue
+            program, fault = self._with_tail(tails, joint, None)
+            for thorough in (False, True):
+                if fault is None or fault.code != ProgramError.STOP_LONG:
+                    break
+                self._search_kept(window, joint, fault.index if thorough else None)
+                program, fault = self._with_tail(tails, joint, thorough)
             if fault is None and program.image_size + HEADER_SIZE <= self._most:
                 break
+        assert program is not None
         header = self._header(window, joint, program)
         if self._last is not None:
             # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
@@ -188,10 +251,45 @@ class SectionChunks:
                 f"(code {fault.code}): lower the feed there, and please report this file"
             )
         self._last = self._made(header, program)
+        self._tail_bytes = program.image_size + HEADER_SIZE - kept_bytes
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
-        new_s = float(new.duration_q32_s.sum()) * 2.0**-32
-        return PlannedChunk(Chunk(header, encode(program)), new_s, line, joint_q40), used
+        new_s = float(pieces.duration_q32_s.sum()) * 2.0**-32
+        return PlannedChunk(
+            Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
+        ), used
+
+    @property
+    def end(self) -> JobPlace:
+        """The place of the next section of the job, behind all chunks, without a rest."""
+        last = self._last
+        assert last is not None
+        header = self._in_job(last.header)
+        way_q40 = header.job_start_q40 - last.header.job_start_q40 + last.end_q40
+        return JobPlace(Rest(), header.sequence + 1, way_q40, self._feed.path.end_point_q40)
+
+    def _in_job(self, header: ChunkHeader) -> ChunkHeader:
+        """A header that counts from the start of the section, as it is in the job."""
+        place = self._place
+        if header.last and self._goes_on(self._feed.path.end_point_q40):
+            header = replace(header, last=False, joined=True)
+        if place is None:
+            return header
+        return replace(
+            header,
+            first=False,
+            rest=place.rest if header.first else None,
+            sequence=header.sequence + place.sequence,
+            job_start_q40=header.job_start_q40 + place.way_q40,
+        )
+
+    def _size_kept(self, window: Window, joint: int) -> int:
+        """Bytes of a chunk of the kept pieces, without its tail."""
+        path, pieces = self._feed.path, self._kept.pieces
+        assert pieces is not None
+        first = path.segment_at(int(pieces.start_q40[0]))
+        segments = path.segment_at(window.joint_q40(joint)) + 1 - first
+        return HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
 
     def _require_room(self, program: Program, line: int) -> None:
         size = program.image_size + HEADER_SIZE
@@ -233,27 +331,34 @@ class SectionChunks:
         return _Made(header, first, end, end_q40, program.piece_count)
 
     def _with_tail(
-        self, window: Window, joint: int, *, search_tail: bool = False
+        self, tails: _Tails, joint: int, thorough: bool | None
     ) -> tuple[Program, NativeFault | None]:
         """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
 
-        `search_tail`: stops may begin in the tail too. It is at rest soon anyway.
+        `thorough`: how stops are searched that begin in the tail; None: none are. It is at rest soon anyway.
         """
-        kept, codes = self._kept.pieces, self._kept.codes
+        kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
         if window.rests and joint == window.count:
             program = self._program(Stretch(kept, window.stretch.end_q40), codes)
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
-        for tail in self._feed.tails(window, joint, least_q40):
+        for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
-            own = self._tail_codes(window, tail) if search_tail else _no_codes(len(tail.pieces))
-            program = self._program(whole, np.concatenate((codes, own)))
-            fault = self._fault(program)
+            own = self._tail_codes(window, tail, thorough)
+            program, fault = self._program(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 break
+            fault = self._fault(program)
+            if fault is not None and fault.code == ProgramError.STOP_LONG:
+                program = without_long_stops(program)
+                fault = self._fault(program)
             if fault is None:
                 break
+            if fault.code in _MOVING_FAULTS:
+                tails.refuse(tail)
+            if fault.code == ProgramError.STOP_LONG and not thorough:
+                break  # more codes are the better remedy; with them, a longer tail has more room for brakes
         return program, fault
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
@@ -295,41 +400,63 @@ class SectionChunks:
                 bad[fault.index] = True
         return bad
 
-    def _stop_codes(self, window: Window, first: int, joint: int) -> Codes:
-        """Codes of the pieces between two knots, good for all of the path that the window knows behind them.
+    def _searched_in(self, window: Window) -> _Searched:
+        """Codes of the pieces of a window that are kept, good for all of the path that the window knows behind them.
 
         Of brief pieces only some are searched: a stop that is commanded in another one begins in the next that has
         codes, a little later.
         """
-        stretch = window.stretch
-        seconds = np.ldexp(stretch.pieces.duration_q32_s[first:joint].astype(np.float64), -32)
-        codes = _no_codes(len(stretch.pieces))
+        if self._searched is not None and self._searched.window is window:
+            return self._searched
+        searched, count = _Searched(window), window.count
+        durations = window.stretch.pieces.duration_q32_s[:count]
+        seconds = np.ldexp(durations.astype(np.float64), -32)
         for spacing_s in (SEARCH_S, 0.0):
-            found = np.asarray(codes[first:joint, :, DECELERATION].all(axis=1))
-            wanted = np.zeros(len(stretch.pieces), dtype=np.bool_)
-            wanted[first:joint] = _spaced(seconds, spacing_s, found)
-            if wanted.any():
-                codes = np.where(wanted[:, None, None], self._codes(window, stretch, wanted), codes)
-        return codes[first:joint]
+            found = np.asarray(searched.codes[:count, :, DECELERATION].all(axis=1))
+            self._add_codes(searched, _spaced(seconds, spacing_s, found))
+        self._searched = searched
+        return searched
 
-    def _all_codes(self, window: Window, first: int, joint: int) -> Codes:
-        """The same with every piece searched."""
-        wanted = np.zeros(len(window.stretch.pieces), dtype=np.bool_)
-        wanted[first:joint] = True
-        return self._codes(window, window.stretch, wanted)[first:joint]
+    def _add_codes(self, searched: _Searched, wanted: NDArray[np.bool_]) -> None:
+        """Searches the wanted ones of the kept pieces (count,)."""
+        if wanted.any():
+            window, mask = searched.window, np.zeros(len(searched.codes), dtype=np.bool_)
+            mask[: wanted.size] = wanted
+            searched.codes[mask] = self._codes(window, window.stretch, mask, False)[mask]
 
-    def _tail_codes(self, window: Window, tail: Stretch) -> Codes:
+    def _search_kept(self, window: Window, joint: int, late: int | None) -> None:
+        """Searches all kept pieces that have no codes, before the path of the window behind their joint; thoroughly
+        those from piece `late` on, whether they have codes or not.
+        """
+        kept, codes = self._kept.pieces, self._kept.codes
+        assert kept is not None
+        rest = taken(window.stretch.pieces, slice(joint, None))
+        whole = Stretch(chained([kept, rest]), window.stretch.end_q40)
+        count = _kinds(codes)
+        wanted = count < codes.shape[1] if late is None else np.arange(len(codes)) >= late
+        mask = np.concatenate((wanted, np.zeros(len(rest), dtype=np.bool_)))
+        found = self._codes(window, whole, mask, late is not None)[: len(codes)]
+        better = wanted & (_kinds(found) >= count)
+        self._kept.codes = np.where(better[:, None, None], found, codes)
+
+    def _tail_codes(self, window: Window, tail: Stretch, thorough: bool | None) -> Codes:
         """Codes of a tail that takes longer than a fault stop may."""
-        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_))
+        if thorough is None:
+            return _no_codes(len(tail.pieces))
+        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_), thorough)
 
-    def _codes(self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_]) -> Codes:
+    def _codes(
+        self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_], thorough: bool
+    ) -> Codes:
         path = self._feed.path
         program = self._program(stretch, _no_codes(len(stretch.pieces)))
         begin = path.segment_at(int(stretch.pieces.start_q40[0]))
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
-        plan = replace(window.plan, limits=replace(limits, zones=_moved(limits.zones, base_mm)))
-        return stop_codes(program, plan, stop_terms(self.machine, limits), wanted)
+        zones = zones_behind(limits.zones, base_mm)
+        plan = replace(window.plan, limits=replace(limits, zones=zones))
+        terms = replace(stop_terms(self.machine, limits), quick=not thorough)
+        return stop_codes(program, plan, terms, wanted)
 
 
 def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -342,12 +469,17 @@ def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArra
     return np.asarray((after - before > GAP_S) & ~found)
 
 
+def _kinds(codes: Codes) -> Index:
+    """Of how many kinds of stops each piece (M,) has codes."""
+    return np.asarray(np.count_nonzero(codes[:, :, DECELERATION], axis=1))
+
+
 def _no_codes(count: int) -> Codes:
     return np.zeros((count, 2, 3), dtype=np.uint8)
 
 
-def _moved(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """Zones of a path that begins at `base_mm`."""
+def zones_behind(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """Zones of the part of a path that begins at `base_mm`, as arc lengths of that part."""
     return tuple(
         FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
         for zone in zones

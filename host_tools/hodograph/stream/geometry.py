@@ -35,6 +35,8 @@ _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
 _BESIDE_MM = 1e-6
+LEAST_REST_MM = 0.002
+"""A section of which less is left is done."""
 _FARTHEST_Q40 = 1 << 62
 
 
@@ -87,7 +89,10 @@ def joined(curves: Sequence[Curve]) -> Curve:
 
 
 def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
-    """The blocks of a section from an arc length on. Raises InputError: it is not that long."""
+    """The blocks of a section from an arc length on; none where less than LEAST_REST_MM of it is left. Raises
+    InputError: it is not that long.
+    """
+    short: Block | None = None
     for block in blocks:
         length = block.curve.length_mm
         if begin_mm >= length:
@@ -95,6 +100,12 @@ def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
             continue
         if begin_mm > 0.0:
             block, begin_mm = _behind(block, begin_mm), 0.0
+            if block.curve.length_mm < LEAST_REST_MM:
+                short = block
+                continue
+        if short is not None:
+            yield short
+            short = None
         yield block
     if begin_mm > _BESIDE_MM:
         raise InputError(f"the section ends {begin_mm:g} mm before the place where it shall go on")
@@ -102,18 +113,41 @@ def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
 
 def _behind(block: Block, begin_mm: float) -> Block:
     """A block without its first part."""
-    segment, xi = block.curve.locate(begin_mm)
-    first, x = int(segment), float(xi)
-    made: Curve
-    if isinstance(block.curve, PHSpline):
-        planar = block.curve
-        start = np.append(planar.position(first, x), planar.origin[first + 1 :])
-        made = PHSpline(start, _behind_at(planar.w[first:], x), False)
-    else:
-        curve = block.curve
-        origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
-        made = SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
+    first, made = curve_behind(block.curve, begin_mm)
     return Block(made, block.feed_mm_s[first:], block.line[first:])
+
+
+def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
+    """A curve without its first part, and how many whole segments that has. Without extra axes."""
+    segment, xi = curve.locate(begin_mm)
+    first, x = int(segment), float(xi)
+    if isinstance(curve, PHSpline):
+        start = np.append(curve.position(first, x), curve.origin[first + 1 :])
+        return first, PHSpline(start, _behind_at(curve.w[first:], x), False)
+    origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
+    return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
+
+
+def cut_segments(curve: Curve, at_mm: Real) -> Curve:
+    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint."""
+    if not at_mm.size:
+        return curve
+    segment, xi = curve.locate(at_mm)
+    w = curve.w if isinstance(curve, PHSpline) else curve.preimage
+    parts, begin, done = [], 0, 0.0
+    for first, x in zip(segment.tolist(), xi.tolist(), strict=True):
+        if first >= begin:
+            parts.append(w[begin:first])
+            rest, begin, done = w[first : first + 1], first + 1, 0.0
+        else:
+            rest = parts.pop()
+        at = (x - done) / (1.0 - done)
+        # The part before is the one behind of the segment the other way round.
+        parts += [_behind_at(rest[..., ::-1], 1.0 - at)[..., ::-1], _behind_at(rest, at)]
+        done = x
+    origin: Any = np.insert(curve.origin, segment + 1, curve.position(segment, xi), axis=0)
+    made = PHSpline if isinstance(curve, PHSpline) else SpatialPHSpline
+    return made(origin, np.concatenate([*parts, w[begin:]]), False)
 
 
 def _behind_at(w: Any, x: float) -> Any:
@@ -133,17 +167,31 @@ class StreamPath:
     point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
     """
 
-    def __init__(self, offset_mm: Sequence[float], period_us: int, begin_q40: int = 0) -> None:
-        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start."""
+    def __init__(
+        self,
+        offset_mm: Sequence[float],
+        period_us: int,
+        begin_q40: int = 0,
+        begin_point_q40: Int | None = None,
+    ) -> None:
+        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start;
+        `begin_point_q40`: where the path begins to the last bit, None: where its first block does.
+        """
         self._offset_mm = tuple(offset_mm)
         self._period_s = 1e-6 * period_us
         self._curve: Curve | None = None
-        self._end_point: Int | None = None
+        self._end_point = begin_point_q40
         self.start_q40: Int = np.array([begin_q40], dtype=np.int64)
         self.feed_mm_s: Real = np.zeros(0)
         self.line: Int = np.zeros(0, dtype=np.int64)
         self.complete = False
         self.passed = 0
+
+    @property
+    def end_point_q40(self) -> Int:
+        """Where the path ends, in machine coordinates (A,)."""
+        assert self._end_point is not None, "a block comes first"
+        return self._end_point
 
     @property
     def curve(self) -> Curve:
@@ -161,12 +209,12 @@ class StreamPath:
         block = short_segments(block)
         made = quantise(block.curve, self._offset_mm)
         point = made.point_q40
+        if self._end_point is not None:
+            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
+            point = point + (self._end_point - point[:, 0])[:, None]
         if self._curve is None:
             self._curve, self.point_q40, self.a_q44 = block.curve, point, made.a_q44
         else:
-            assert self._end_point is not None
-            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
-            point = point + (self._end_point - point[:, 0])[:, None]
             self._curve = joined((self._curve, block.curve))
             self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
             self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)

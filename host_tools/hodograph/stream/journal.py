@@ -14,7 +14,10 @@ from typing import Any
 
 from ..errors import InputError
 
-VERSION = 1
+VERSION = 2
+
+_BESIDE_Q40 = 1 << 20
+"""2^-20 mm: so near before the start of a section the machine rests at it."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +35,11 @@ class Entry:
 
     files, machine, options  as on the command line
     section, way_q40         the section in motion, and arc length in it that was reported last
-    committed_q40            arc length up to which chunks of it were sent: the machine rests before it or there
-    job                      number of this section's job in the controller
-    job0                     number of the first section's job
+    committed_q40            arc length of the job in the controller up to which chunks were sent
+    job                      number of the job in the controller
+    job0                     number that it would have if it began with section 0
+    first                    the section that it begins with
+    starts                   sections of it from the one in motion to the last one sent, each with its start in the job
     done                     the job came to its end
     """
 
@@ -46,11 +51,21 @@ class Entry:
     way_q40: int = 0
     committed_q40: int = 0
     done: bool = False
+    first: int = 0
+    starts: tuple[tuple[int, int], ...] = ()
 
     @property
     def job(self) -> int:
-        """Number of the present section's job in the controller."""
-        return self.job0 + self.section
+        """Number of the job in the controller."""
+        return self.job0 + self.first
+
+    def place_at(self, way_q40: int) -> tuple[int, int]:
+        """Section, and arc length in it, at an arc length of the controller's job."""
+        section, start_q40 = self.section, 0
+        for number, begin_q40 in self.starts:
+            if begin_q40 <= way_q40 + _BESIDE_Q40:
+                section, start_q40 = number, begin_q40
+        return section, max(way_q40 - start_q40, 0)
 
 
 def mark(file: Path) -> FileMark:
@@ -102,6 +117,7 @@ def load(file: Path) -> Entry:
                 f"{file}: is of another version of hodograph: stream the job from its start"
             )
         found["files"] = tuple(FileMark(**one) for one in found["files"])
+        found["starts"] = tuple((int(number), int(start)) for number, start in found["starts"])
         entry = Entry(**found)
     except FileNotFoundError:
         raise InputError(

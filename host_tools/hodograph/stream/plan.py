@@ -7,16 +7,27 @@ import tempfile
 import threading
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
+from math import ceil
 from pathlib import Path
 
-from ..config import Machine
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import Machine, load_paths
+from ..names import is_toolpath
 from ..toolpath.files import ReadOptions
-from ..toolpath.moves import Command, Dwell
-from .chunk import Chunk, parse
-from .chunks import SectionChunks
+from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
+from .chunk import Chunk, Rest, parse
+from .chunks import JobPlace, SectionChunks
 from .geometry import blocks_from
-from .reading import StreamReader
+from .paths import PathsJob
+from .reading import StreamReader, StreamSection
+
+_MEETS_MM = 1e-6
+"""A section that begins so near to the end of the one before goes on from there."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +50,18 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class PlannedSection:
-    """A section: number in the job, file, what happens at rest before it."""
+    """A section: number in the job, file, what happens at rest before it.
+
+    start_q40  arc length at its start of the job that the controller has
+    rest       what the controller does before it; None: a job of the controller begins with it
+    """
 
     number: int
     file: Path
     first_line: int
     before: tuple[Command, ...]
+    start_q40: int = 0
+    rest: Rest | None = None
 
 
 class JobPlan:
@@ -53,8 +70,13 @@ class JobPlan:
     notes  of reading and fitting; grows
     """
 
-    def __init__(self, job: JobFiles, most_bytes: int, number: int, begin: Place) -> None:
-        """`number`: of the first section's job in the controller, the next ones count on; `begin`: where it begins."""
+    def __init__(
+        self, job: JobFiles, most_bytes: int, number: int, begin: Place, *, stops: bool = True
+    ) -> None:
+        """`number`: of the job in the controller that begins with section 0, others have it plus the number of their
+        first section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator.
+        """
+        self.stops = stops
         self._job, self._most, self._number, self._begin = job, most_bytes, number, begin
         self.notes: list[str] = []
         self.after: tuple[Command, ...] = ()
@@ -97,8 +119,8 @@ class JobPlan:
                 raise IndexError(index)
             return None
 
-    def by_section(self) -> Iterator[Iterator[Chunk]]:
-        """The chunks of each section, as they are planned; each section is to be read to its end first."""
+    def by_job(self) -> Iterator[Iterator[Chunk]]:
+        """The chunks of each job of the controller, as they are planned; each is to be read to its end first."""
         at = [0]
 
         def chunks() -> Iterator[Chunk]:
@@ -138,8 +160,15 @@ class JobPlan:
                 return None
             at = min(index + 1, self._planned)
             own = self._section_of[at - 1] if at else -1
-            waits_s = sum(dwell_s(section.before) for section in self.sections[own + 1 :])
+            waits_s = sum(self._waits_s(section) for section in self.sections[own + 1 :])
             return self._motion_s[-1] - self._motion_s[at] + waits_s + dwell_s(self.after)
+
+    def _waits_s(self, section: PlannedSection) -> float:
+        """Standstill before a section, program stops aside."""
+        if section.rest is None:
+            return dwell_s(section.before)
+        period_us = self._job.machine.period_us
+        return 1e-6 * period_us * section.rest.ticks(period_us)
 
     @property
     def planned_s(self) -> float:
@@ -183,25 +212,46 @@ class JobPlan:
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         number = 0
         for file in self._job.files:
+            if not is_toolpath(file):
+                carried, self.after = self.after, ()
+                yield from self._paths(file, number, carried)
+                number += len(load_paths(file))
+                continue
+            place: JobPlace | None = None
+            first = number
             reader = StreamReader(
                 file, self._job.machine, self._job.tolerance_mm, self._job.reading, self.notes
             )
             carried = self.after
             for section in reader.sections():
                 begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
-                if number >= self._begin.section:
+                blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40)
+                block = next(blocks, None) if number >= self._begin.section else None
+                if block is not None:
                     before = () if begin_q40 else (*carried, *section.before)
-                    made = PlannedSection(number, file, section.first_line, before)
+                    if place is None:
+                        made = PlannedSection(number, file, section.first_line, before)
+                        first = number
+                    else:
+                        place = replace(place, rest=rest_of(before, stops=self.stops))
+                        made = PlannedSection(
+                            number, file, section.first_line, before, place.way_q40, place.rest
+                        )
                     chunks = SectionChunks(
                         self._job.machine,
                         file.stem,
-                        blocks_from(section.blocks, begin_q40 * 2.0**-40),
-                        self._number + number,
+                        chain([block], blocks),
+                        self._number + first,
                         self._most,
                         begin_q40,
+                        place,
+                        partial(self._goes_on, section),
                     )
+                    last = False
                     for planned in chunks.chunks():
+                        last = planned.chunk.header.last
                         yield made, planned.chunk, planned.new_s
+                    place = None if last else chunks.end
                 else:
                     for _ in section.blocks:
                         if self._ending:
@@ -210,8 +260,42 @@ class JobPlan:
                 number += 1
             self.after = reader.after
 
+    def _paths(
+        self, file: Path, number: int, carried: tuple[Command, ...]
+    ) -> Iterator[tuple[PlannedSection, Chunk, float]]:
+        """The paths of a path file, the first of which is section `number`."""
+        begin = self._begin
+        first = max(begin.section - number, 0)
+        begin_q40 = begin.way_q40 if begin.section >= number else 0
+        job = PathsJob(file, self._job.machine, self._number + number, self._most, self.stops)
+        for made in job.chunks(first, begin_q40):
+            header = made.chunk.header
+            before, start_q40 = made.before, header.job_start_q40
+            if header.rest is None:
+                before, start_q40 = () if header.job_start_q40 else (*carried, *before), 0
+            section = PlannedSection(
+                number + header.line - 1, file, header.line, before, start_q40, header.rest
+            )
+            yield section, made.chunk, made.duration_s
+
+    def _goes_on(self, section: StreamSection, end_q40: NDArray[np.int64]) -> bool:
+        """Whether another section of the file begins where this one ends, at this point."""
+        start = section.next_start()
+        if start is None:
+            return False
+        axes = end_q40.size
+        machine_mm = start[:axes] + np.array(self._job.machine.offset_mm[:axes])
+        return bool(np.abs(machine_mm - end_q40 * 2.0**-40).max() < _MEETS_MM)
+
 
 _RATE_S, _FOR_EVER_S = 3.0, 1e6
+
+
+def rest_of(commands: Sequence[Command], *, stops: bool) -> Rest:
+    """What the controller does at rest for these commands."""
+    made = [one for one in commands if isinstance(one, (ProgramStop, ToolChange))] if stops else []
+    optional = [isinstance(one, ProgramStop) and one.optional for one in made]
+    return Rest(ceil(1e3 * dwell_s(commands) - 1e-9), not all(optional), any(optional))
 
 
 def dwell_s(commands: Sequence[Command]) -> float:

@@ -3,19 +3,23 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from ..bus.capture.bus_recording import BusRecording
 from ..bus.goto import goto
 from ..bus.run import RunSession
 from ..bus.sdo.controller import READY
 from ..bus.sdo.follow import Follower
-from ..bus.sdo.objects import MOVING
+from ..bus.sdo.objects import MOVING, RESUME
 from ..bus.sdo.stream_channel import (
     ENDED,
+    PROGRAM_STOP,
     STOPPED,
     StreamStatus,
     close_stream,
@@ -24,7 +28,7 @@ from ..bus.sdo.stream_channel import (
 )
 from ..config import Machine
 from ..errors import RunError
-from ..job_run import Operator, at_rest
+from ..job_run import Operator, at_rest, say, stops
 from ..native import NativeProgram
 from .chunk import Chunk
 from .journal import Journal
@@ -36,9 +40,16 @@ AHEAD_S = 20.0
 _POLL_S = 0.05
 _PLAN_WAIT_S = 0.05
 _JOURNAL_S = 1.0
+_RECORD_S = 0.5
 _START_COUNTS = 2
+_PASSED_Q40 = 1 << 20
+"""A section is in motion when the way is so far behind its start, 2^-20 mm."""
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
 """A section starts when so much motion is sent, or so long after its first chunk."""
+
+
+class _GoesOnError(Exception):
+    """A program stop is over."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +85,8 @@ class StreamedJob:
 class Sender:
     """Sends a job. `progress` is called a few times a second while it moves.
 
-    slow  bytes a second that the bus has for chunks; None: as many as it takes
+    recording  what records the bus meanwhile
+    slow       bytes a second that the bus has for chunks; None: as many as it takes
     """
 
     at: RunSession
@@ -86,30 +98,38 @@ class Sender:
     kernel: str = "fixed"
     unhomed: bool = False
     slow: float | None = None
+    recording: BusRecording | None = None
     _next: int = 0
     _bytes: int = 0
     _motion_s: float = 0.0
     _underruns: int = 0
     _journal_s: float = field(default=-1e9)
+    _kept_s: float = field(default=-1e9)
     _percent: int = 100
+    _ahead: deque[PlannedSection] = field(default_factory=deque)
 
     def run(self) -> StreamedJob:
         """Raises RefusedError, BusError, RunError, and what planning raises, when the motion rests."""
         begun_s = self.at.controller.clock.now_s()
         close_stream(self.at.controller)
-        sections = 0
         item = self._wait_item()
         while item is not None:
-            section = item[0]
-            self._section(section, item[1])
-            sections += 1
+            self._job(item[0], item[1])
             item = self._wait_item()
-        at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
+        if self.plan.sections:
+            at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
+        else:
+            self.at.note("nothing of the job is left")
         if self.journal is not None:
             self.journal.update(done=True)
         took_s = self.at.controller.clock.now_s() - begun_s
         return StreamedJob(
-            sections, self._next, self._bytes, self._motion_s, took_s, self._underruns
+            len(self.plan.sections),
+            self._next,
+            self._bytes,
+            self._motion_s,
+            took_s,
+            self._underruns,
         )
 
     def _file_of_last(self) -> Path:
@@ -130,20 +150,32 @@ class Sender:
         """Raises what has gone wrong on the bus meanwhile."""
         if self.at.rig is not None:
             self.at.rig.check()
+        now_s = self.at.controller.clock.now_s()
+        if self.recording is not None and now_s - self._kept_s >= _RECORD_S:
+            self._kept_s = now_s
+            self.recording.keep()
 
-    def _section(self, section: PlannedSection, chunk: Chunk) -> None:
+    def _job(self, section: PlannedSection, chunk: Chunk) -> None:
+        """Sections that the controller runs as one job, from the one that begins with this chunk."""
         self._to_start(chunk)
         at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(chunk)
-        if self.journal is not None:
-            header = chunk.header
-            self.journal.update(
-                section=section.number,
-                way_q40=header.job_start_q40,
-                committed_q40=header.job_start_q40,
-            )
+        begin_q40 = chunk.header.job_start_q40
+        self._ahead = deque([section])
+        self._note_place(first=section.number, way_q40=begin_q40, committed_q40=begin_q40)
         close_stream(self.at.controller)
-        self._stream(section)
+        self._stream()
+
+    @property
+    def _section(self) -> PlannedSection:
+        """The one in motion."""
+        return self._ahead[0]
+
+    def _note_place(self, **changes: int) -> None:
+        """Writes to the journal where the job is."""
+        if self.journal is not None:
+            starts = tuple((one.number, one.start_q40) for one in self._ahead)
+            self.journal.update(section=self._section.number, starts=starts, **changes)
 
     def _to_start(self, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
@@ -156,8 +188,8 @@ class Sender:
             close_stream(self.at.controller)
             goto(self.at.controller, self.machine, start, unhomed=self.unhomed)
 
-    def _stream(self, section: PlannedSection) -> None:
-        """Sends the chunks of a section and waits for its end."""
+    def _stream(self) -> None:
+        """Sends the chunks of a job and waits for its end."""
         controller = self.at.controller
         follower = Follower(controller, self.at.note)
         started = all_sent = False
@@ -166,13 +198,16 @@ class Sender:
             self._look()
             status = stream_status(controller) if sent else None
             if started and status is not None:
-                self._report(section, status)
-                if self._over(section, status, all_sent=all_sent):
+                self._pass_sections(status)
+                self._report(status)
+                if self._over(status, all_sent=all_sent):
                     return
+                if status.state == PROGRAM_STOP:
+                    self._at_program_stop()
                 follower()
             last = None
             if not all_sent and (status is None or status.committed_s < AHEAD_S):
-                last = self._send_one(section, status)
+                last = self._send_one(status)
             if last is not None:
                 sent, all_sent = sent + 1, last
                 first_s = first_s or controller.clock.now_s()
@@ -191,12 +226,38 @@ class Sender:
             or stream_status(self.at.controller).committed_s > _START_AHEAD_S
         )
 
-    def _send_one(self, section: PlannedSection, status: StreamStatus | None) -> bool | None:
-        """Sends the next chunk, if it is planned and there is room: whether it is the last one of the section."""
+    def _pass_sections(self, status: StreamStatus) -> None:
+        """Goes on to the section in motion, and says what is to be said before it."""
+        way_q40 = round(status.way_mm * 2**40)
+        while len(self._ahead) > 1 and way_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
+            self._ahead.popleft()
+            section = self._section
+            say(self.at, section.file, section.before)
+            for line, code in () if self.plan.stops else stops(section.before):
+                self.at.note(f"{section.file}:{line}: {code}: passed without waiting (--no-stops)")
+
+    def _at_program_stop(self) -> None:
+        """Waits for the operator and resumes; returns as well when somebody else has resumed or stopped."""
+        controller = self.at.controller
+        section = self._ahead[1] if len(self._ahead) > 1 else self._section
+
+        def look() -> None:
+            self._look()
+            controller.clock.sleep(_POLL_S)
+            if stream_status(controller).state != PROGRAM_STOP:
+                raise _GoesOnError
+
+        with suppress(_GoesOnError):
+            for line, code in stops(section.before):
+                self.operator(f"{section.file}:{line}: {code}", look)
+            controller.command(RESUME)
+
+    def _send_one(self, status: StreamStatus | None) -> bool | None:
+        """Sends the next chunk, if it is planned and there is room: whether it is the last one of the job."""
         item = self.plan.item(self._next, 0.0)
         if item is None:
             return None
-        _, chunk, new_s = item
+        section, chunk, new_s = item
         behind_s = self.plan.behind_s(self._next)
         header = chunk.header
         data = chunk.with_remaining(None if behind_s is None else behind_s + new_s).encode()
@@ -208,8 +269,9 @@ class Sender:
         self._next += 1
         self._bytes += len(data)
         self._motion_s += new_s
-        if self.journal is not None:
-            self.journal.update(committed_q40=header.job_start_q40 + chunk.program.length_q40)
+        if header.rest is not None:
+            self._ahead.append(section)
+        self._note_place(committed_q40=header.job_start_q40 + chunk.program.length_q40)
         return header.last
 
     def _slow_down(self) -> None:
@@ -225,11 +287,12 @@ class Sender:
             f"feed override set to {percent} %"
         )
 
-    def _report(self, section: PlannedSection, status: StreamStatus) -> None:
+    def _report(self, status: StreamStatus) -> None:
+        section = self._section
         now_s = self.at.controller.clock.now_s()
         if self.journal is not None and now_s - self._journal_s >= _JOURNAL_S:
             self._journal_s = now_s
-            self.journal.update(way_q40=round(status.way_mm * 2**40))
+            self._note_place(way_q40=round(status.way_mm * 2**40) - section.start_q40)
         if status.underruns > self._underruns:
             self._underruns = status.underruns
             self.at.note(
@@ -251,8 +314,8 @@ class Sender:
                 )
             )
 
-    def _over(self, section: PlannedSection, status: StreamStatus, *, all_sent: bool) -> bool:
-        """Whether the section came to its end. Raises RunError: it was stopped, or there is a fault."""
+    def _over(self, status: StreamStatus, *, all_sent: bool) -> bool:
+        """Whether the job came to its end. Raises RunError: it was stopped, or there is a fault."""
         controller = self.at.controller
         if status.state == ENDED and all_sent:
             controller.wait_for((READY,), 10.0)
@@ -260,7 +323,7 @@ class Sender:
         if status.state == STOPPED:
             controller.wait_for((READY,), 10.0)
             raise RunError(
-                f"{section.file}:{status.line}: stopped before its end: the job ends here; "
+                f"{self._section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
         controller.wait_for((*MOVING, READY), 0.0)

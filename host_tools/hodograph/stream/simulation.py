@@ -27,27 +27,29 @@ _SLICE_TICKS = 50
 
 @dataclass(frozen=True)
 class StreamedMotion:
-    """A simulated section.
+    """A simulated job of the controller: sections with their rests.
 
     ticks              setpoints, from the first to the exact end
     setpoints_sha256   over them, as docs/reference/protocol.md section 2 has it
     takeovers          in motion, and at rest
+    sections           paths with rests between them
     """
 
     ticks: int
     setpoints_sha256: str
     takeovers: tuple[int, int]
+    sections: int = 1
 
 
 def simulate_chunks(
     chunks: Iterable[Chunk], limits: NativeLimits, kernel: str, counts_per_mm: int
 ) -> StreamedMotion:
-    """Runs the chunks of a section through the controller's core: each is given when its predecessor is under way.
+    """Runs the chunks of a job through the controller's core: each is given when its predecessor is under way.
 
     Raises RunError: a chunk is refused.
     """
     stream, digest, ticks = OfflineStream(kernel, limits), hashlib.sha256(), 0
-    axes = 0
+    axes, sections = 0, 1
 
     def run(points: NDArray[np.void]) -> int:
         counts = counts_from_q40_mm(points["position_q40"][:, :axes], counts_per_mm)
@@ -62,13 +64,14 @@ def simulate_chunks(
                 f"(code {fault.code}, number {fault.index}): please report this file"
             )
         axes = axes or chunk.program.axis_count
+        sections += chunk.header.rest is not None
         while stream.sequence != chunk.header.sequence:
-            if stream.waits:
+            if stream.waits and chunk.header.rest is None:
                 raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
             ticks += run(stream.run(_SLICE_TICKS, until_rest=True))
     while stream.state is not State.ENDED:
         ticks += run(stream.run(_SLICE_TICKS))
-    return StreamedMotion(ticks, digest.hexdigest(), stream.takeovers)
+    return StreamedMotion(ticks, digest.hexdigest(), stream.takeovers, sections)
 
 
 class Concatenation:

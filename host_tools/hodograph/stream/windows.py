@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..config import Machine
 from ..errors import PlanError
-from ..feed import FeedPlan, FeedRequest, Limits
+from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
 from ..feed.limits import Plants
 from ..feed.optimal.feasible import check_feasible, within_reach
@@ -54,13 +54,17 @@ RESERVE = 0.01
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
 
-_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3)
-"""Ways of tails that are tried, in times the way that braking takes at least."""
+_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
+"""Ways of tails that are tried, in times the way that braking takes at least: some, and then those between them."""
 
 _MOST_LOWERED, _LOWERED = 8, 1.01
 """How often, and by which share, the limits of an interval are lowered that the controller would refuse."""
 
-_TAIL_EXCESS = 1.003
+_TAIL_LOWERED = (2, 1.04)
+"""The same of a tail, which need not be the fastest."""
+
+_TAIL_EXCESS = 1.0075
+"""What a tail may use of the limits less RESERVE; whether the controller takes it is found by its own check."""
 _DRIFT_Q40 = 1024
 
 
@@ -122,12 +126,14 @@ class SectionFeed:
         joint: Spacing,
         exceeded: Callable[[Stretch], NDArray[np.bool_]],
         begin_q40: int = 0,
+        begin_point_q40: NDArray[np.int64] | None = None,
     ) -> None:
         """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
-        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin.
+        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin; `begin_point_q40`: the
+        very point of that, None: that of the first block.
         """
         self.machine = machine
-        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40)
+        self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40, begin_point_q40)
         self.begin_q40 = begin_q40
         self._blocks = blocks
         self._joint = joint
@@ -197,16 +203,17 @@ class SectionFeed:
         found: Solution,
         made: Callable[[Solution], _Made],
         stretch_of: Callable[[_Made], Stretch],
+        steps: tuple[int, float] = (_MOST_LOWERED, _LOWERED),
     ) -> tuple[_Made, NDArray[np.bool_]]:
         """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
         pieces that it still would refuse.
         """
         tight, out = np.ones(found.grid.size), made(found)
-        for _ in range(_MOST_LOWERED):
+        for _ in range(steps[0]):
             bad = self._exceeded(stretch_of(out))
             if not bad.any():
                 return out, bad
-            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= _LOWERED
+            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= steps[1]
             lower = tightened(found, tight)
             if lower is None:
                 break
@@ -313,6 +320,7 @@ class SectionFeed:
         if moving is None:
             check_feasible(curve, limits, LONGEST_S)
             limits = within_reach(curve, limits)
+        limits = replace(limits, zones=_touched(limits.zones, low, high))
         known_to = 0.0 if held is None else trusted_to(held, stop_s)
         for share in (0.0, *_EASED):
             tried = limits if share == 0.0 else limits.eased(max(self._period_s, share * stop_s))
@@ -352,28 +360,32 @@ class SectionFeed:
         starts[0] = start_q40 - base
         c = round_pieces(track.t_q32, starts, track.shape)
         raw = RawPieces(np.diff(track.t_q32), starts[:-1], c, 0.0, 0.0)
-        own = with_override(raw, plan.controller, plan.limits, plan.paths)
+        zones = _touched(plan.limits.zones, float(track.s[0]), float(track.s[-1]))
+        limits = replace(plan.limits, zones=zones)
+        paths = [replace(one, limits=replace(one.limits, zones=zones)) for one in plan.paths]
+        own = with_override(raw, plan.controller, limits, paths)
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
 
     def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """Ways to rest from a joint of a window, the shortest first, each to the end of a segment at arc length
-        `least_q40` of the section or behind it. The last one is the rest of the window.
+        """Ways to rest from a joint of a window, as _TAIL_WAYS has them, each to the end of a segment at arc length
+        `least_q40` of the section or behind it; each as it is planned, and then slower where the controller would
+        refuse that. The last one is the rest of the window.
         """
         found, curve = window.solution, self.path.curve
         low = float(found.grid.s[joint])
         state = State(float(found.q[joint]), float(found.slope[joint]))
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
-        tried = -1
+        tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
             at = int(np.searchsorted(ends, wanted))
-            if at == tried:
+            if at in tried or at >= ends.size or ends[at] >= found.grid.s[-1]:
                 continue
-            if at >= ends.size or ends[at] >= found.grid.s[-1]:
-                break
-            tried = at
-            one = plan_window(curve, window.limits, low, float(ends[at]), state, self._period_s)
+            tried.add(at)
+            high = float(ends[at])
+            limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
+            one = plan_window(curve, limits, low, high, state, self._period_s)
             one = None if one is None else measured(curve, one)
             if one is None or one.excess > _TAIL_EXCESS - 1.0:
                 continue
@@ -383,9 +395,15 @@ class SectionFeed:
                 own = _begun(ends_of(found, found.grid.size), state)
                 return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
 
-            yield self._lowered(one, made, lambda tail: tail)[0]
+            yield made(one)
+            yield self._lowered(one, made, lambda tail: tail, _TAIL_LOWERED)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
+
+
+def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:
+    """The zones that a stretch of the path touches."""
+    return tuple(zone for zone in zones if zone.from_mm <= high and zone.to_mm >= low)
 
 
 def _begun(ends: Ends, state: State | None) -> Ends:

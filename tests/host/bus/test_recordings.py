@@ -209,9 +209,9 @@ def test_a_broken_blf_is_told(tmp_path: Path) -> None:
     whole = file.read_bytes()
     for wrong, words in [
         (whole[:200], f"cut off: 200 of {len(whole)} bytes"),
-        (b"nonsense" * 30, "not as BLF has it behind frame 0"),
-        (b"", "not as BLF has it behind frame 0"),
-        (whole[:190] + b"\0" * (len(whole) - 190), "not as BLF has it behind frame 0"),
+        (b"nonsense" * 30, "not as BLF has it after frame 0"),
+        (b"", "not as BLF has it after frame 0"),
+        (whole[:190] + b"\0" * (len(whole) - 190), "not as BLF has it after frame 0"),
     ]:
         file.write_bytes(wrong)
         with pytest.raises(InputError, match=words):

@@ -58,6 +58,15 @@ def failed(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, st
 USAGE = [
     ((), r"COMMAND"),
     (("simulat",), r'no command "simulat"; did you mean "simulate"\?'),
+    (
+        ("simulate", ALPHA, "--kernal", "fixed"),
+        r'--kernal fixed; did you mean "--kernel"\? .*simulate',
+    ),
+    (
+        ("--quite", "simulate", ALPHA),
+        r'unknown: --quite; did you mean "--quiet"\? \(see hodograph --help',
+    ),
+    (("simulate", ALPHA, "other.toml"), r"unknown: other.toml \(see hodograph simulate --help\)"),
     (("quik-stop",), r'did you mean "quick-stop"\?'),
     (("spline",), r"FILE"),
     (("spline", ALPHA, "--jsn"), r"--jsn"),
@@ -106,6 +115,25 @@ def test_paths(
     found, line = failed(capsys, "compile", path_file(tmp_path, **change), "-o", str(output))
     assert (found, bool(re.search(message, line))) == (status, True), line
     assert list(tmp_path.iterdir()) == [tmp_path / "path.toml"]
+
+
+def test_a_bend_without_headroom_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two points 0.7 um apart in a bend that turns back: its plan leaves nothing for a changing override."""
+    file = tmp_path / "needle.toml"
+    file.write_text(
+        "[path]\nclosed = false\n"
+        "through = [[0, 0], [10, 0], [10.0005, 0.0005], [10, 0.001], [0, 0.001]]\n"
+        "[feed]\nprofile = 'optimal'\nnominal_mm_s = 100\n"
+        f"[machine]\nfile = '{EXAMPLES / 'machines/paper_alpha.toml'}'\n"
+    )
+    status, line = failed(capsys, "compile", str(file))
+    assert status == 3
+    assert re.search(r"piece at 10\.47\d* mm, where the curvature is up to .* no headroom", line), (
+        line
+    )
+    assert "smooth the path" in line
 
 
 def test_only_a_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

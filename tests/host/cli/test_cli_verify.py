@@ -39,8 +39,16 @@ def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(found) == KEYS
     assert set(found["setpoints"]) == {"fixed", "float", "double"}
     assert found["kept"]
-    assert found["stops"]["hold"] == {"pieces": 35, "proved": 35, "not_proved_at_mm": []}
-    assert 0 < found["stops"]["fault"]["proved"] <= found["stops"]["fault"]["pieces"]
+    assert found["stops"]["hold"] == {
+        "pieces": 35,
+        "proved": 35,
+        "proved_time_share": 1.0,
+        "not_proved_at_mm": [],
+    }
+    fault = found["stops"]["fault"]
+    assert 0 < fault["proved"] < fault["pieces"]
+    # what is open is the long piece of constant feed: few pieces, much of the time
+    assert fault["proved_time_share"] < 0.5 < fault["proved"] / fault["pieces"]
     assert not found["excesses"]
     for peak in found["peak"].values():
         assert set(peak) == PEAK_KEYS

@@ -9,6 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from hodograph.bus import processes
+from hodograph.errors import BusError
+
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 LIKE_WINDOWS = """
 import os, socket, sys
@@ -57,3 +60,13 @@ def test_adapters_are_asked_and_socketcan_is_refused_by_name(tmp_path: Path) -> 
     refused = called(tmp_path, "scan", "--bus", "socketcan:can0")
     assert refused.returncode == 4
     assert "only Linux has SocketCAN" in refused.stderr
+
+
+def test_programs_are_for_linux(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Elsewhere the installation leaves them out, and commands that need them say so."""
+    monkeypatch.setattr(processes.platform, "system", lambda: "Darwin")
+    monkeypatch.setattr(processes, "_PACKAGE", Path("/nowhere"))
+    monkeypatch.setattr(processes, "_REPOSITORY", Path("/nowhere"))
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(BusError, match=r"hodograph-hub runs on Linux only: .*container"):
+        processes.find_program("hodograph-hub")

@@ -16,7 +16,7 @@ import pytest
 from jsonschema import Draft7Validator
 
 from hodograph.campaign.definition import load_campaign
-from hodograph.config import load_drive, load_machine, load_path_file
+from hodograph.config import load_drive, load_machine, load_paths
 from hodograph.errors import InputError
 from hodograph.faults.scenario import load_scenario
 from hodograph.schemas import NAMES, schema
@@ -24,7 +24,7 @@ from hodograph.schemas import NAMES, schema
 ROOT = Path(__file__).resolve().parents[3]
 EXAMPLES = ROOT / "examples"
 READERS: dict[str, Callable[[Path], object]] = {
-    "path": load_path_file,
+    "path": load_paths,
     "machine": load_machine,
     "drive": load_drive,
     "campaign": load_campaign,
@@ -101,10 +101,44 @@ MACHINE: Document = {
     },
     "supervision": {"answer_wait_ms": 2, "missed_max": 1, "setpoint_timeout_ms": 50},
     "work": {"offset_mm": [1, 2]},
+    "outputs": {
+        "node": 16,
+        "delay_ticks": 2,
+        "keep_at_stop": True,
+        "keep_at_fault": True,
+        "off_at_end": True,
+        "off_in_hold": True,
+        "vendor": 1,
+        "product": 2,
+        "channel": {
+            "valve": {"digital": 0},
+            "power": {"analogue": 0, "scale": 2.5, "unit": "%"},
+        },
+        "gcode": {
+            "spindle": "valve",
+            "spindle_reverse": "valve",
+            "speed": "power",
+            "mist": "valve",
+            "flood": "valve",
+        },
+    },
     "axis": [AXIS, AXIS | {"name": "y", "node": 3}, TURNING],
 }
+CHANNELS = ("outputs", "channel")
+
 COMPLETE: dict[str, list[Document]] = {
     "path": [
+        {
+            "path": [
+                {"closed": False, "through": [[0, 0], [10, 5], [20, 0]]},
+                {
+                    "closed": True,
+                    "control_points": [[20, 0], [10, 10], [0, 20], [20, 20]],
+                    "dwell_ms": 100,
+                    "stop": "optional",
+                },
+            ],
+        },
         {
             "path": {
                 "closed": False,
@@ -137,6 +171,11 @@ COMPLETE: dict[str, list[Document]] = {
                 "cap": [ZONE],
             },
             "machine": {"file": str(EXAMPLES / "machines/paper_alpha.toml")},
+            "output": [
+                {"name": "valve", "at_mm": 1.5, "on": True},
+                {"name": "power", "at_point": 1, "value": 50},
+                {"name": "power", "at_fraction": 0.5, "per_mm_s": 0.1},
+            ],
         },
         {
             "path": {"closed": True, "control_points": [[0, 0], [9, 0], [9, 9], [0, 9]]},
@@ -356,8 +395,12 @@ def at(document: Any, way: Way) -> Any:
 def part_of_schema(kind: str, way: Way) -> Document:
     """The schema of what lies there."""
     found: Document = schema(kind)
-    for step in way:
+    for k, step in enumerate(way):
         found = found["items"] if isinstance(step, int) else found["properties"][step]
+        is_list = isinstance((*way, "")[k + 1], int)
+        for one in found.get("anyOf", []):  # a table, or a list of tables
+            if ("items" if is_list else "properties") in one:
+                found = one
     return found
 
 
@@ -367,7 +410,7 @@ def test_keys_of_every_table_are_those_of_the_reader(kind: str, tmp_path: Path) 
     compared = 0
     for document in COMPLETE[kind]:
         for way, _ in tables(document):
-            if way[-1:] == ("random",):  # names that the user makes up
+            if way[-1:] == ("random",) or way[:2] == CHANNELS:  # names that the user makes up
                 continue
             changed = copy.deepcopy(document)
             at(changed, way)["qqqqqqqqqqqq"] = 1
@@ -450,7 +493,7 @@ def changes(kind: str) -> Iterator[Change]:
     """Every value of the complete documents, changed."""
     for document in COMPLETE[kind]:
         for way, table in tables(document):
-            if way[:2] == ("axis", 1):  # as the one before
+            if way[:2] in (("axis", 1), CHANNELS):  # as the one before; names of the user's own
                 continue
             part = part_of_schema(kind, way)
             for key in table:
@@ -470,6 +513,9 @@ BEYOND_SCHEMAS = (
     r"homing\] offset_\w+ must be from",
     r"slow_\w+ is .*, above speed",
     r"both or none",
+    r"which the controller or a drive has",
+    r"gcode\] \w+ (cannot be|is )",
+    r"at_point must be from",
     r"makes \d+ runs|is drawn: say how often",
     r'rules ".*": a needs a bus',
     r"rules\]? name what \[random\] does not give",

@@ -23,7 +23,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
             '"optimal"',
             "[[limits.cap]]\nfrom_mm = 0\nto_mm = 500\nfeed_mm_s = 90\n"
             "[[limits.cap]]\nfrom_mm = 400\nto_mm = 500\nfeed_mm_s = 9",
-            ["cap 2 begins at 400 mm, behind the end"],
+            ["cap 2 begins at 400 mm, after the end"],
         ),
     ],
 )

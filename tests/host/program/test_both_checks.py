@@ -48,7 +48,10 @@ def verdicts(image: bytes) -> tuple[tuple[int, int], tuple[int, int]]:
 
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(
-    st.integers(28, len(BASE) - 1).filter(lambda place: place not in (30, 31)), st.integers(0, 255)
+    st.integers(28, len(BASE) - 1).filter(
+        lambda place: place not in (30, 31, *range(76, 80))
+    ),  # axes and the count of events: other sizes
+    st.integers(0, 255),
 )
 def test_one_byte_changed(place: int, value: int) -> None:
     image = with_crc(BASE[:place] + bytes([value]) + BASE[place + 1 :])

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""Examples as images, drives, splines and simulated runs, for the tests of the simulation."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""The contour error: known distances from the curve, crossings, joints and ends."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""The native module: what is said where it is missing, the layout of its rows, counts."""
+
 from __future__ import annotations
 
 import sys
@@ -33,7 +35,8 @@ def test_records_have_the_size_of_the_c_structs() -> None:
     assert ffi.sizeof("struct offline_row") == ROW.itemsize
     assert ffi.sizeof("struct interpolator_point") == POINT.itemsize
     for name, field in ROW.fields.items():  # type: ignore[union-attr]
-        assert ffi.offsetof("struct offline_row", name) == field[1]
+        place = ("outputs", name) if name in ("digital", "analogue") else (name,)
+        assert ffi.offsetof("struct offline_row", *place) == field[1]
 
 
 @given(st.lists(st.integers(-(2**52), 2**52), min_size=1), st.sampled_from([1, 1000, 10**6, 10**7]))

@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""A recording gives the motion of the simulation, and differences are named."""
+
 from __future__ import annotations
 
 import csv

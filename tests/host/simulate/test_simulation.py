@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""A run without a bus: hashes, settling, refusals, and every kernel."""
+
 from __future__ import annotations
 
 import hashlib

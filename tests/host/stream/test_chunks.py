@@ -4,6 +4,9 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -20,9 +23,10 @@ from hodograph.native.stream import OfflineStream
 from hodograph.pipeline import program_limits
 from hodograph.program import encode
 from hodograph.program.check import check, check_image
+from hodograph.spline import from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
 from hodograph.stream.chunks import SectionChunks
-from hodograph.stream.geometry import blocks_from
+from hodograph.stream.geometry import blocks_from, cut_segments
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.toolpath.files import ReadOptions
@@ -135,6 +139,39 @@ def test_the_time_is_that_of_the_whole_plan(
     (section,) = load_job(file, machine).sections
     streamed_s = concatenated(short).duration_s
     assert streamed_s < 1.01 * section.pipeline.plan.duration_s
+
+
+def test_a_plunge_behind_a_rapid_move_in_its_direction_takes_its_time(
+    tmp_path: Path, machine: Machine
+) -> None:
+    file = tmp_path / "drill.ngc"
+    file.write_text("G21 G90\nG0 Z-4\nG1 Z-6.5 F200\nM2\n")
+    (section,) = load_job(file, machine).sections
+    (chunks,) = _sections(file, machine)
+    streamed_s = concatenated(chunks).duration_q32_s * 2.0**-32
+    assert streamed_s < 1.005 * section.pipeline.plan.duration_s
+
+
+def test_segments_are_cut_at_arc_lengths() -> None:
+    curve = from_control_polygon(np.array([0, 10 + 5j, 20 - 3j, 33 + 4j, 50 - 7j]), False).spline
+    at_mm = np.array([1.0, 2.0, 2.5, 0.6 * curve.length_mm])
+    cut = cut_segments(curve, at_mm)
+    assert np.allclose(np.setdiff1d(np.round(at_mm, 9), np.round(cut.segment_starts_mm, 9)), [])
+    s_mm = np.linspace(0.0, curve.length_mm, 200)
+    assert cut.segment_count == curve.segment_count + at_mm.size
+    points = [one.position(*one.locate(s_mm)) for one in (curve, cut)]
+    assert np.abs(points[1] - points[0]).max() < 1e-11
+
+
+@pytest.mark.long
+@pytest.mark.timeout(7200)
+def test_a_million_lines_take_little_memory(tmp_path: Path) -> None:
+    script, figures = ROOT / "benchmarks" / "streaming.py", tmp_path / "figures.json"
+    lines = ["--lines", "100000", "--fit-lines", "1000000"]
+    subprocess.run([sys.executable, script, *lines, "--json", figures], check=True)
+    planned, fitted = json.loads(figures.read_text())
+    assert (planned["lines"], fitted["lines"]) == (100_000, 1_000_000)
+    assert max(planned["memory_mb"], fitted["memory_mb"]) < 250.0
 
 
 def test_a_late_chunk_rests_on_the_path_and_goes_on(short: list[Chunk], machine: Machine) -> None:

@@ -12,13 +12,18 @@ from typing import Any
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
+from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
 from hodograph.bus.sdo.objects import STREAM
 from hodograph.bus.sdo.stream_channel import ABORT_NO_ROOM, close_stream, send_chunk, stream_status
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
+from hodograph.cli.stream_command import _free_rate
+from hodograph.config import load_machine
 from hodograph.errors import BusError, InputError, RefusedError
 from hodograph.stream.journal import Entry, Journal, load, mark
+from hodograph.stream.sender import Sender
 
+ROOT = Path(__file__).resolve().parents[3]
 JOB = 7
 
 
@@ -132,10 +137,10 @@ def test_the_journal_comes_back(tmp_path: Path) -> None:
     part = tmp_path / "part.ngc"
     part.write_text("G1 X1 F100\n")
     journal = Journal(tmp_path / "state" / "stream.json", _entry(part))
-    journal.update(section=3, way_q40=5 << 40)
+    journal.update(section=3, first=2, way_q40=5 << 40, starts=((3, 1 << 40), (4, 9 << 40)))
     found = load(journal.file)
     assert found == journal.entry
-    assert found.job == 103
+    assert found.job == 102
     assert not list(journal.file.parent.glob("*.new"))
 
 
@@ -168,3 +173,48 @@ def test_a_damaged_journal_is_refused(tmp_path: Path, text: str) -> None:
 def test_no_journal(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nothing to continue"):
         load(tmp_path / "none.json")
+
+
+class Overridden:
+    """A controller that takes an override, and what was said."""
+
+    def __init__(self) -> None:
+        self.percents: list[int] = []
+        self.said: list[str] = []
+        self.controller = SimpleNamespace(override=self.percents.append)
+        self.note = self.said.append
+
+
+@pytest.mark.parametrize(
+    ("rates", "slow", "percents"),
+    [
+        ([20_000.0], 5_000.0, [25]),
+        ([4_000.0], 5_000.0, []),
+        ([20_000.0], None, []),
+        ([6_000.0, 6_001.0, 12_000.0], 5_000.0, [83, 41]),
+        ([1e9], 5_000.0, [1]),
+    ],
+)
+def test_feed_is_lowered_to_what_the_bus_carries(
+    rates: list[float], slow: float | None, percents: list[int]
+) -> None:
+    """And never raised again: what was planned first may need less than what comes."""
+    at, rate = Overridden(), iter(rates)
+    plan: Any = SimpleNamespace(greatest_rate=lambda: next(rate))
+    machine: Any = None
+    known: Any = at
+    sender = Sender(known, machine, plan, lambda *_: None, slow=slow)
+    for _ in rates:
+        sender._slow_down()
+    assert at.percents == percents
+    assert len(at.said) == len(percents)
+    assert all("the bus has 5.0 for it: feed override set to" in text for text in at.said)
+
+
+def test_the_free_part_of_a_bus() -> None:
+    """A virtual bus has no bit rate; of a real one the chunks get what setpoints leave, less pauses."""
+    machine = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
+    assert _free_rate(machine, parse_address("socketcan:vcan0")) is None
+    rate = _free_rate(machine, parse_address("socketcan:can0"))
+    assert rate is not None
+    assert 10_000 < rate < 30_000

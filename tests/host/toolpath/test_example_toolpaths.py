@@ -27,6 +27,7 @@ KINDS: dict[str, tuple[type[Command], ...]] = {
     "engraving": (ArcMove, StraightMove, SplineMove),
     "dispensing": (ArcMove, DigitalOutput, AnalogOutput),
     "surface": (StraightMove,),
+    "five_axes": (StraightMove,),
 }
 
 

@@ -89,5 +89,10 @@ def test_verify_goes_through_all_sections(
     assert [(one["first_line"], one["last_line"]) for one in found["section"]] == [(1, 4), (6, 6)]
     for one in found["section"]:
         assert 0.9 < one["peak"]["x_jerk_mm_s3"]["ratio"] < 1.001
+        assert one["controller"] == {
+            "accepted": True, "code": 0, "piece": None, "text": "accepted",
+        }  # fmt: skip
+        for stops in (one["stops"]["hold"], one["stops"]["fault"]):
+            assert 0 < stops["pieces"] == stops["proved"] + len(stops["not_proved_at_mm"])
     assert main(["verify", str(file), "--machine", str(MILL), "--program", "x.hdgp"]) == 2
     assert "--program" in capsys.readouterr().err

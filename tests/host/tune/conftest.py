@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+"""The machine of the alpha and its drives, for the tests of `hodograph tune`."""
+
 from __future__ import annotations
 
 from pathlib import Path

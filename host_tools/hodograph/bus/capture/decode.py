@@ -15,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...config.outputs import Outputs
 from ...errors import RunError
+from ...events import ANALOGUES
 from .recorder import Frames
 
 SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
@@ -97,6 +99,27 @@ def decode_offsets(frames: Frames, node: int, count: int) -> tuple[Int32, NDArra
         data = _by_sync(frames, sync_at, RPDO2 + node, f"velocity offsets of node {node}")[:count]
         velocity[: len(data)] = _integers(data, 0, "<i4")
     return velocity, torque
+
+
+def decode_outputs(frames: Frames, outputs: Outputs) -> NDArray[np.void]:
+    """What the I/O module's outputs are from each SYNC on: the last frame before it; records of "digital" and
+    "analogue" as `native.ROW` has them. All off before the first frame.
+    """
+    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+    found = np.zeros(sync_at.size, dtype=[("digital", "<u2"), ("analogue", "<i2", (ANALOGUES,))])
+    at = np.flatnonzero(frames["id"] == RPDO1 + outputs.node)
+    at = at[frames["length"][at] >= outputs.frame_bytes]
+    if not at.size:
+        return found
+    data = frames["data"][at]
+    last = np.searchsorted(at, sync_at) - 1
+    known = last >= 0
+    first_analogue = outputs.digital_count // 8
+    for byte in range(first_analogue):
+        found["digital"][known] |= data[last[known], byte].astype(np.uint16) << (8 * byte)
+    for i in range(outputs.analogue_count):
+        found["analogue"][known, i] = _integers(data, first_analogue + 2 * i, "<i2")[last[known]]
+    return found
 
 
 def _check_counters(counters: NDArray[np.int64]) -> None:

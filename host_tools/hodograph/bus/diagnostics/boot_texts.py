@@ -39,6 +39,9 @@ _OBJECTS = {
     0x1019: ("SYNC counter", "the drive must accept a SYNC with counter"),
     0x1029: ("error behaviour", "see the drive's manual"),
     0x2005: ("axis node", "correct the node numbers in the machine file"),
+    0x2035: ("I/O module", "correct the node numbers in the machine file"),
+    0x6200: ("digital outputs", "the I/O module has too few digital outputs: correct [outputs]"),
+    0x6411: ("analogue outputs", "the I/O module has too few analogue outputs: correct [outputs]"),
     0x6007: ("reaction to lost communication", "see the drive's manual"),
     0x605A: ("quick stop reaction", "see the drive's manual"),
     0x605E: ("fault reaction", "see the drive's manual"),
@@ -115,6 +118,8 @@ def boot_trouble(
         remedy = f"is it powered and connected, is its node number {node}, is its bit rate that of the bus? {_RETRY}"
     elif index == 0x2005:
         text = f"axis {sub} has node {node}, which another axis or the controller has too"
+    elif index == 0x2035:
+        text = f"the I/O module has node {node}, which an axis or the controller has too"
     elif abort_code == 0:
         wanted = "which was not expected" if expected is None else f"expected is 0x{expected:X}"
         text = f"the drive at node {node} has 0x{value:X} in {where}, {wanted}"

@@ -2,8 +2,9 @@
 """Taking turns at the one SDO channel of a controller, among the connections of one computer.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` beside `hodograph run` is two; a
-lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the turn from another is told so,
-to let pass what was still on its way to the other: two connections of one process are strangers to each other too.
+lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the lock from
+another is informed, to let pass what was still on its way to the other. Two connections of one process count as
+different clients too.
 """
 
 from __future__ import annotations
@@ -78,7 +79,7 @@ class Turns:
         if not got:
             raise BusyError(
                 f"another hodograph command is using {self._who}: no turn in {wait_s:g} s, "
-                "try again when it is done"
+                "try again when it is done (one that Ctrl-Z has stopped goes on with fg)"
             )
 
     def _lock(self, file: int, deadline: float) -> bool:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from canopen import ObjectDictionary
 
     from ...config import Axis, Machine
+    from ...config.outputs import Outputs
     from .node import Node
 
 WINDOW_OFF = 2**32 - 1
@@ -38,6 +39,7 @@ def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
         ((CONFIGURATION, 10), supervision.setpoint_timeout_ms),
         ((CONFIGURATION, 12), machine.stop_time_ms),
         ((CONFIGURATION, 11), feedforward_bits(machine)),
+        *(((objects.OUTPUT_MODULE, sub), value) for sub, value in _outputs(machine.outputs)),
     ]
     for sub, axis in enumerate(machine.axes, start=1):
         wanted += [((index, sub), value) for index, value in _axis(axis)]
@@ -94,6 +96,22 @@ def configured_counts(controller: Node, axes: int) -> tuple[int, ...]:
     return tuple(
         controller.read(objects.COUNTS_PER_UNIT, axis) or common for axis in range(1, axes + 1)
     )
+
+
+def _outputs(outputs: Outputs | None) -> Iterator[tuple[int, int]]:
+    """Sub-indices of the I/O module's object; without a module, what a controller has by default."""
+    values = (0, 0, 0, 0, 1, 0, 0)
+    if outputs is not None:
+        values = (
+            outputs.node,
+            outputs.digital_count,
+            outputs.analogue_count,
+            outputs.behaviour,
+            outputs.delay_ticks,
+            outputs.vendor,
+            outputs.product,
+        )
+    yield from enumerate(values, start=1)
 
 
 def _axis(axis: Axis) -> Iterator[tuple[int, int]]:

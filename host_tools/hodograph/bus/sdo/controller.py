@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from ...data import CONTROLLER_EDS
+from ...data import CONTROLLER_EDS, object_dictionary
 from ...errors import BusError, RefusedError, RunError, one_line
 from ..address import BusAddress
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
@@ -336,7 +336,7 @@ class Controller(Node):
 
 
 _GOES_ON = {
-    HOLDING: "it goes on braking; hodograph status tells when it is held",
+    HOLDING: "it goes on braking; hodograph status shows when it is held",
     RUNNING: "the program goes on; hodograph stop ends it",
 }
 _STATISTICS = (
@@ -383,7 +383,7 @@ def connect(
     eds = eds or CONTROLLER_EDS
     with open_network(address, node, bitrate) as network:
         try:
-            remote = network.add_node(node, str(eds))
+            remote = network.add_node(node, object_dictionary(eds, node))
         except Exception as error:
             raise BusError(f"{eds}: not a usable EDS file: {one_line(error)}") from error
         controller = Controller(address, node, remote, network.clock)

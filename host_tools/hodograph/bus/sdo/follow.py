@@ -13,7 +13,7 @@ LOOK_S = 0.5
 
 
 class Follower:
-    """Call it again and again; it looks twice a second, and tells `note` when nothing moves and why."""
+    """To be called repeatedly: reads the state twice a second, and calls `note` with the reason when nothing moves."""
 
     def __init__(self, controller: Controller, note: Callable[[str], None]) -> None:
         self._controller = controller

@@ -68,7 +68,7 @@ class Network(canopen.Network):
         self._frames = bus
         self.clock: Clock = bus.clock if isinstance(bus, LocalBus) else REAL_CLOCK
         if not self.clock.is_virtual:
-            # The end of a bus is told to whoever sends or waits; its thread would print a traceback besides.
+            # The end of a bus is reported to whoever sends or waits; its thread would print a traceback besides.
             listeners: list[Any] = self.listeners
             listeners.insert(0, _Ended())
             self.connect()

@@ -84,6 +84,8 @@ class Node:
         self.node_id = node_id
         self.clock = clock
         self._turns = Turns(address, node_id, clock)
+        self.turn_wait_s = TURN_WAIT_S
+        """Patience for a turn at the channel where nothing else is given."""
         self._under_way = False
         self._left_s: float | None = None
         """The rest of the time that a question may take, None: no limit of its own."""
@@ -97,14 +99,14 @@ class Node:
         self._turns.close()
 
     @contextmanager
-    def turn(self, wait_s: float = TURN_WAIT_S, busy_s: float | None = None) -> Iterator[None]:
+    def turn(self, wait_s: float | None = None, busy_s: float | None = None) -> Iterator[None]:
         """The node's SDO channel is ours inside; what was sent to others, or came too late to us, is thrown away.
 
-        Raises BusyError when there is no turn in `wait_s`, or the node serves another client for more than `busy_s`
-        (None: BUSY_S); BusError when the node does not answer, or when what is inside can't send.
+        Raises BusyError when there is no turn in `wait_s` (None: turn_wait_s), or the node serves another client for
+        more than `busy_s` (None: BUSY_S); BusError when the node does not answer, or when what is inside can't send.
         """
         try:
-            with self._turns.turn(wait_s) as handed_over:
+            with self._turns.turn(self.turn_wait_s if wait_s is None else wait_s) as handed_over:
                 self._under_way |= handed_over
                 if self._under_way:
                     self._let_pass(BUSY_S if busy_s is None else busy_s)

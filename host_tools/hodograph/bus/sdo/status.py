@@ -41,6 +41,7 @@ from .objects import (
     MOTION,
     OVERRIDE,
     STATUSWORD,
+    STREAM,
     TARGET,
     TIMING,
     UNHOMED_START,
@@ -251,6 +252,13 @@ def snapshot(controller: Controller) -> Status:
 def read_status(controller: Controller) -> dict[str, Any]:
     """`snapshot`, ready for JSON."""
     return snapshot(controller).json()
+
+
+def stream_dict(controller: Controller) -> dict[str, Any] | None:
+    """The job in chunks, as in `read_status`; None: there is none."""
+    if controller.read(STREAM, 2) == NONE:
+        return None
+    return asdict(stream_status(controller))
 
 
 def _fault(controller: Controller) -> Fault | None:

@@ -13,7 +13,7 @@ from .objects import STREAM
 from .upload import ABORT_VALUE_RANGE, block_download, program_fault_text
 
 ABORT_NO_ROOM = 0x05040005
-NONE, OPEN, UNDERRUN, ENDED, STOPPED = range(5)
+NONE, OPEN, UNDERRUN, ENDED, STOPPED, PROGRAM_STOP = range(6)
 """Values of sub 2."""
 UNKNOWN_MS = 0xFFFFFFFF
 _TRIES = 4
@@ -28,7 +28,7 @@ class StreamStatus:
 
     committed_s   motion from here to the rest at the end of the newest accepted chunk
     line, way_mm  where the motion is: source line of the executed chunk, arc length of the job
-    remaining_s   from the newest accepted chunk to the end of the job; None: not known
+    remaining_s   from here to the end of the job, as the newest accepted chunk says; None: not known
     """
 
     state: int

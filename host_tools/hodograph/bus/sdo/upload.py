@@ -70,7 +70,7 @@ def _fate(node: Node, before: tuple[int, int]) -> str:
     try:
         now = _active(node)
     except (BusError, RefusedError):
-        return "whether the old program is still there is not known (hodograph status tells)"
+        return "whether the old program is still there is not known (hodograph status shows it)"
     if now[1] != before[1]:
         return "the controller has another program now"
     return "the old program is unharmed" if before[1] else "there is no program yet"

@@ -84,7 +84,7 @@ export class Panel {
     $("override-now").textContent = saturated ? `${now}, all that is allowed here` : now;
   }
 
-  program({ program, motion, statistics }) {
+  program({ program, motion, statistics, stream }) {
     const rows = [["program", program.state]];
     if (program.state === "ready") {
       const length = program.length_mm;
@@ -92,6 +92,7 @@ export class Panel {
       rows[0] = ["program", `${this.name ? `${this.name}, ` : ""}${text(length, 2)} mm, ${text(program.duration_s, 2)} s`];
       rows.push(["arc length", `${text(motion.arc_length_mm, 3)} mm`]);
     }
+    if (stream) rows.splice(0, rows.length, ...streamRows(stream));
     rows.push(
       ["feed", `${text(motion.feed_mm_s, 2)} mm/s`],
       ["missed ticks", String(statistics.deadline_misses)],
@@ -133,6 +134,23 @@ function faultWords(fault) {
   const code = `0x${fault.code.toString(16).toUpperCase().padStart(4, "0")}`;
   const detail = fault.detail_text ? `, ${fault.detail_text}` : "";
   return `Fault: ${fault.text} (${code}, node ${fault.node}${detail}). What to do: ${fault.remedy}, then reset the fault.`;
+}
+
+const STREAM = ["", "open", "waits for its next part", "ended", "stopped", "waits at a program stop: resume goes on"];
+
+/** A job in chunks: line of its source, motion ahead in the controller, time left. */
+function streamRows(stream) {
+  const left = stream.remaining_s === null ? "not known yet" : clock(stream.remaining_s);
+  return [
+    ["job", STREAM[stream.state] ?? ""], ["source line", String(stream.line)],
+    ["arc length", `${text(stream.way_mm, 3)} mm`], ["ahead", `${text(stream.committed_s, 1)} s`], ["time left", left],
+    ["rests for want of data", String(stream.underruns)],
+  ];
+}
+
+function clock(seconds) {
+  const whole = Math.round(seconds), two = (n) => String(n).padStart(2, "0");
+  return `${Math.floor(whole / 3600)}:${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
 }
 
 function facts(rows) {

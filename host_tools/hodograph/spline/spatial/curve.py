@@ -19,7 +19,7 @@ from ..splitting import Image, split_segments
 from .quaternion import polar
 
 _GREATEST_COMPONENT = 8.0 - 2.0**-40
-"""Of A in a program: it has 48 bits for one, 44 of them behind the point (docs/reference/protocol.md 1.2)."""
+"""Of A in a program: it has 48 bits for one, 44 of them after the point (docs/reference/protocol.md 1.2)."""
 
 _STRAIGHT = 1e-12
 """Curvature times the length of its segment below which a segment counts as straight: it has no torsion there."""

@@ -30,10 +30,17 @@ def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
     """
     value = np.vstack((values, values[:1])) if curve.closed else np.asarray(values)
     slope, bend = _by_arc_length(curve.segment_starts_mm, value, curve.closed)
+    return replace(curve, extra=quintics_by_arc_length(curve, value, slope, bend))
+
+
+def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, bend: Real) -> Real:
+    """Bezier coefficients (N, E, 6) of axes with values, slopes and second derivatives (N + 1, E) by arc length at the
+    joints of a curve.
+    """
     c = curve.speed_coefficients
     begin = _by_parameter(slope[:-1], bend[:-1], c[:, 0], 4.0 * (c[:, 1] - c[:, 0]))
     end = _by_parameter(slope[1:], bend[1:], c[:, 4], 4.0 * (c[:, 4] - c[:, 3]))
-    return replace(curve, extra=_hermite(value[:-1], value[1:], begin, end))
+    return _hermite(value[:-1], value[1:], begin, end)
 
 
 def with_standing_axes(curve: SpatialPHSpline, count: int) -> SpatialPHSpline:
@@ -56,7 +63,7 @@ def nodal_values(values: Real, closed: bool) -> Real:
 def without_tail(values: Real, count: int, what: str) -> Real:
     """The first `count` rows of extra axes: those of points that a closed path keeps.
 
-    The points behind repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
+    The points after repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
     """
     tail = len(values) - count
     apart = np.abs(values[count:] - values[:tail])

@@ -26,7 +26,7 @@ from .stations import Outline, Places, outline, stations, tightened
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_CORNER_SHARE, _ROOM_SHARE = 0.985, 0.94
+_CORNER_SHARE, _ROOM_SHARE = 0.985, 0.97
 """Of the tolerance: for corner curves, and for stations of smoothed stretches."""
 
 _LEG_SHARE = 0.98
@@ -35,9 +35,10 @@ _BARRIER = 1e-6
 _POWER = 5
 _ROUNDS = 4
 _REPAIRS = 12
-_MOST_FOR_TWO = 20_000
-_SLOW_SHARE = 0.5
-_SAMPLES = 3
+_MOST_FOR_CHOICE = 20_000
+_SLOW_SHARES = (0.5, 0.25)
+"""Of the speed at which full acceleration is reached within a length that jerk allows: caps of further estimates."""
+
 _LESS_ROOM = 0.75
 _THIN_SHARE = 0.01
 _THIN_ROUNDS = 4
@@ -89,42 +90,11 @@ def fit(
     Where start or end is `tied`, it is straight there, in the direction of the chord: curves of both halves of a chord
     join with continuous curvature.
 
-    Smoothing weighs its cost with estimated speeds. Of a path that is not very long, two curves are made, for estimates
-    with the programmed feeds and with lower ones; the one that should take less time is taken.
+    Smoothing weighs its cost with estimated speeds. Of a path that is not very long, each stretch is smoothed for
+    estimates with the programmed feeds and with lower ones; what should take the least time is taken.
     """
-    limits = how.limits
-    slow = _SLOW_SHARE * limits.acceleration_mm_s2**2 / limits.jerk_mm_s3
-    caps = [limits.feed_mm_s]
-    if reference.count <= _MOST_FOR_TWO and slow < min(caps[0], float(reference.feed_mm_s.max())):
-        caps.append(slow)
-    found = [_fit(reference, how, cap, tied) for cap in caps]
-    good = [one for one in found if isinstance(one, FittedPath)]
-    return min(good, key=lambda one: _estimated_s(one, limits)) if good else found[0]
-
-
-def _estimated_s(path: FittedPath, limits: MotionLimits) -> float:
-    """The time that a path should take, roughly."""
-    curve = path.curve
-    segment = np.repeat(np.arange(curve.segment_count), _SAMPLES)
-    xi = np.tile(np.arange(_SAMPLES) / _SAMPLES, curve.segment_count)
-    point = np.concatenate((curve.position(segment, xi), curve.nodal_points[-1:]))
-    place = curve.segment_starts_mm[segment] + curve.arc_length(segment, xi)
-    place = np.append(place, curve.length_mm)
-    reference = path.reference
-    chord = np.searchsorted(path.arc_length_at(reference.place_mm), place, side="right") - 1
-    feed = reference.feed_mm_s[np.clip(chord, 0, reference.count - 1)]
-    speed = speeds(point, place, np.minimum(feed, limits.feed_mm_s), limits)
-    return float(np.sum(2.0 * np.diff(place) / (speed[1:] + speed[:-1])))
-
-
-def _fit(
-    reference: Reference, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]
-) -> FittedPath | Unfit:
-    """A curve for estimated speeds of at most `cap_mm_s`."""
     path = outline(reference, how.tolerance_mm, tied)
-    plan = _Plan.of(path, how, cap_mm_s, tied)
-    room = _ROOM_SHARE
-    plan = plan.with_stretches(room)
+    plan = _Plan.of(path, how, tied).with_stretches(_ROOM_SHARE).with_choice(_caps(reference, how))
     bad = np.zeros(0, dtype=np.intp)
     for _ in range(_REPAIRS):
         segments, failed = plan.segments()
@@ -146,6 +116,17 @@ def _fit(
     return Unfit(bad)
 
 
+def _caps(reference: Reference, how: Tolerance) -> list[float]:
+    """Greatest speeds for which the stretches are smoothed."""
+    limits = how.limits
+    caps = [limits.feed_mm_s]
+    if reference.count <= _MOST_FOR_CHOICE:
+        slow = limits.acceleration_mm_s2**2 / limits.jerk_mm_s3
+        fastest = min(caps[0], float(reference.feed_mm_s.max()))
+        caps += [share * slow for share in _SLOW_SHARES if share * slow < fastest]
+    return caps
+
+
 def _chords(reference: Reference, spans: Real) -> Index:
     """The chords that lie in one of the spans (n, 2) of places."""
     low = np.searchsorted(reference.place_mm, spans[:, 0], side="right") - 1
@@ -157,22 +138,32 @@ def _chords(reference: Reference, spans: Real) -> Index:
 
 
 @dataclass(frozen=True, eq=False)
+class _Smoothed:
+    """Points (n, 3) through which the curve of a stretch leads, their places (n,), and about how long it takes."""
+
+    point: Real
+    place_mm: Real
+    time_s: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Plan:
     """What a section is made of: corners at single vertices, and stretches of stations between long legs."""
 
     path: Outline
     how: Tolerance
-    cap_mm_s: float
     tied: tuple[bool, bool]
     corner: Index
     shape: Index
     size: Real
     spans: tuple[tuple[int, int, float, float], ...]
     stretches: list[Places] = field(default_factory=list)
+    cap_mm_s: tuple[float, ...] = ()
+    shaped: list[_Smoothed | None] = field(default_factory=list)
     known: list[Segments | None] = field(default_factory=list)
 
     @classmethod
-    def of(cls, path: Outline, how: Tolerance, cap_mm_s: float, tied: tuple[bool, bool]) -> _Plan:
+    def of(cls, path: Outline, how: Tolerance, tied: tuple[bool, bool]) -> _Plan:
         long, reach = path.anchored, path.reach_mm
         leg, count = path.leg_mm, path.leg_mm.size
         both = reach[:-1] + reach[1:]
@@ -200,7 +191,7 @@ class _Plan:
                 after = min(near[last + 1], _ENDS * reach[last + 1])
                 last += 1
             spans.append((first, last, float(before), float(after)))
-        return cls(path, how, cap_mm_s, tied, alone, shape, size, tuple(spans))
+        return cls(path, how, tied, alone, shape, size, tuple(spans))
 
     def with_stretches(self, share: float) -> _Plan:
         """With stations on the stretches, which have `share` of the tolerance as room."""
@@ -209,30 +200,46 @@ class _Plan:
             stations(self.path, first, last, (before, after), room)
             for first, last, before, after in self.spans
         ]
-        return replace(self, stretches=made, known=[None] * len(made))
+        return replace(self, stretches=made, shaped=[None] * len(made), known=[None] * len(made))
+
+    def with_choice(self, caps: list[float]) -> _Plan:
+        """With stretches smoothed for the one of these greatest speeds that should take the least time."""
+        which = list(range(len(self.stretches)))
+        if not which:
+            return self
+        found = [replace(self, cap_mm_s=(cap,) * len(which))._smoothed(which) for cap in caps]
+        best = [min(range(len(caps)), key=lambda k: found[k][index].time_s) for index in which]
+        return replace(
+            self,
+            cap_mm_s=tuple(caps[k] for k in best),
+            shaped=[found[k][index] for index, k in enumerate(best)],
+        )
 
     def tightened(self, low: Real, high: Real) -> _Plan:
         """With less room, and more stations, in stretches that reach between places low (n,) and high (n,)."""
         made = [
             tightened(one, low, high, _LESS_ROOM, self.how.tolerance_mm) for one in self.stretches
         ]
-        known = [
-            segments if one is old else None
-            for one, old, segments in zip(made, self.stretches, self.known, strict=True)
-        ]
-        return replace(self, stretches=made, known=known)
+        kept = [one is old for one, old in zip(made, self.stretches, strict=True)]
+        known = [own if keep else None for own, keep in zip(self.known, kept, strict=True)]
+        shaped = [own if keep else None for own, keep in zip(self.shaped, kept, strict=True)]
+        return replace(self, stretches=made, shaped=shaped, known=known)
 
     def segments(self) -> tuple[Segments, Real]:
         """The curves between the straight lines, and the places (n, 2) of stretches for which there is none."""
         parts = [self._corners(k) for k in range(len(SHAPES)) if (self.shape == k).any()]
         new = [index for index, known in enumerate(self.known) if known is None]
+        moved = [index for index in new if self.shaped[index] is None]
+        for index, shape in zip(moved, self._smoothed(moved) if moved else (), strict=True):
+            self.shaped[index] = shape
         failed = []
-        if new:
-            for index, (points, place) in zip(new, self._smoothed(new), strict=True):
-                try:
-                    self.known[index] = self._stretch(index, points, place)
-                except HodographError:
-                    failed.append((float(place[0]), float(place[-1])))
+        for index in new:
+            one = self.shaped[index]
+            assert one is not None, "smoothed above"
+            try:
+                self.known[index] = self._stretch(index, one.point, one.place_mm)
+            except HodographError:
+                failed.append((float(one.place_mm[0]), float(one.place_mm[-1])))
         none = Segments(
             *(np.zeros(shape) for shape in ((0, 3), (0, 3), (0, 4, 3), (0,), (0,))),
         )
@@ -252,8 +259,8 @@ class _Plan:
             self.size[own],
         )
 
-    def _smoothed(self, which: list[int]) -> list[tuple[Real, Real]]:
-        """Points (n, 3) and places (n,) of these stretches."""
+    def _smoothed(self, which: list[int]) -> list[_Smoothed]:
+        """Points of these stretches, each for its greatest speed."""
         stretches = [self.stretches[index] for index in which]
         place = np.concatenate([one.place_mm for one in stretches])
         count = [one.place_mm.size for one in stretches]
@@ -264,7 +271,8 @@ class _Plan:
             np.concatenate([one.room_mm for one in stretches]),
         )
         limits = self.how.limits
-        feed = np.minimum(self.path.feed_at(place), self.cap_mm_s)
+        programmed = np.minimum(self.path.feed_at(place), limits.feed_mm_s)
+        feed = np.minimum(programmed, np.repeat([self.cap_mm_s[index] for index in which], count))
         shift = np.zeros((place.size, own.normal.shape[2]))
         moved, at = own.point, place
         speed = speeds(moved, at, feed, limits)
@@ -274,8 +282,13 @@ class _Plan:
             moved = own.moved(shift)
             at = _arc_places(moved, place, group)
             speed = speeds(moved, at, feed, limits)
+        speed = speeds(moved, at, programmed, limits)
+        passed_s = 2.0 * np.diff(at) / (speed[1:] + speed[:-1])
         edges = np.cumsum([0, *count])
-        return [(moved[a:b], place[a:b]) for a, b in itertools.pairwise(edges)]
+        return [
+            _Smoothed(moved[a:b], place[a:b], float(passed_s[a : b - 1].sum()))
+            for a, b in itertools.pairwise(edges)
+        ]
 
     def _stretch(self, index: int, points: Real, place: Real) -> Segments:
         first, last, before, after = self.spans[index]

@@ -31,12 +31,14 @@ class Reference:
     line       (n,) source line of each chord
     feed_mm_s  (n,) programmed feed along it; inf: as fast as the machine can
     sag_mm     (n,) the programmed path between the ends of a chord and the chord are nowhere farther apart
+    turn_deg   (n + 1, 3) a, b and c at the points, linear between them; None: they stay at 0
     """
 
     point: Real
     line: Int
     feed_mm_s: Real
     sag_mm: Real
+    turn_deg: Real | None = None
 
     @property
     def count(self) -> int:
@@ -61,6 +63,7 @@ class Reference:
             self.line[chords],
             self.feed_mm_s[chords],
             self.sag_mm[chords],
+            None if self.turn_deg is None else self.turn_deg[first : last + 1],
         )
 
 
@@ -74,6 +77,7 @@ class ReferenceBuilder:
         self._at = start
         self._sag = sag_mm
         self._points: list[tuple[float, float, float]] = [start[:3]]
+        self._turns: dict[int, tuple[float, float, float]] = {0: start[3:]}
         self._rows: list[tuple[int, float, float]] = []
 
     @property
@@ -82,7 +86,8 @@ class ReferenceBuilder:
         return self._at
 
     def add(self, move: Move) -> None:
-        """The next move, which keeps a, b and c."""
+        """The next move. One that turns a, b or c has to change x, y or z too."""
+        first = len(self._points) - 1
         if isinstance(move, StraightMove):
             end = move.end[:3]
             before = self._points[-1]
@@ -102,6 +107,10 @@ class ReferenceBuilder:
             feed = feed_of(move.feed, length)
             self._points.extend(tuple(row) for row in points[1:].tolist())
             self._rows.extend([(move.line, feed, sag)] * (points.shape[0] - 1))
+        if move.end[3:] != self._at[3:]:
+            # Between these points the angles are linear, between those of two such moves they stay.
+            self._turns[first] = self._at[3:]
+            self._turns[len(self._points) - 1] = move.end[3:]
         self._at = move.end
 
     @property
@@ -114,13 +123,17 @@ class ReferenceBuilder:
         return np.array(self._points[max(first, 0) : end], dtype=np.float64)
 
     def cut(self, chord: int) -> Reference:
-        """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
+        """The chords of all moves so far up to the middle of this one; the other half and what follows stays.
+
+        No move may have turned a, b or c.
+        """
         a, b = self._points[chord : chord + 2]
         middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]))
         points, rows = self._points, self._rows
         self._points, self._rows = [*points[: chord + 1], middle], rows[: chord + 1]
         part = self.reference()
         self._points, self._rows = [middle, *points[chord + 1 :]], rows[chord:]
+        self._turns = {0: self._at[3:]}
         self.start = (*middle, self._at[3], self._at[4], self._at[5])
         self.length_mm -= float(part.place_mm[-1])
         return part
@@ -135,7 +148,18 @@ class ReferenceBuilder:
             rows[kept, 0].astype(np.int64),
             rows[kept, 1].copy(),
             rows[kept, 2].copy(),
+            self._angles(point, np.append(True, kept)),
         )
+
+    def _angles(self, point: Real, kept: NDArray[np.bool_]) -> Real | None:
+        """a, b and c at the kept points; None: they stay at 0."""
+        angle = np.array(list(self._turns.values()))
+        if not angle.any():
+            return None
+        step = np.linalg.norm(np.diff(point, axis=0), axis=1)
+        place = np.concatenate((np.zeros(1), np.cumsum(step)))
+        at = place[list(self._turns)]
+        return np.stack([np.interp(place[kept], at, column) for column in angle.T], axis=1)
 
 
 def feed_of(feed: Feed | None, length_mm: float) -> float:

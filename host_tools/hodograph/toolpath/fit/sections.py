@@ -125,17 +125,24 @@ class Divider:
             self.before.append(command)
 
     def _move(self, move: Move) -> None:
-        for name, begin, end in zip(AXES[3:], self.builder.position[3:], move.end[3:], strict=True):
-            if begin != end:
-                raise InputError(
-                    f"{self.file}:{move.line}: the move turns {name.upper()}: "
-                    "moves of A, B and C have no path yet: leave them out"
-                )
+        if move.end[3:] != self.builder.position[3:] and isinstance(move, StraightMove):
+            self._check_way(move)
         if self.blending is Blending.EXACT_PATH and not self._goes_straight_on(move):
             self.stop()
         self._add(move)
         if self.blending is Blending.EXACT_STOP or self.tolerance_mm == 0.0:
             self.stop()
+
+    def _check_way(self, move: StraightMove) -> None:
+        """Raises InputError: the move turns axes without a way of x, y and z."""
+        here = self.builder.position
+        way = np.linalg.norm(np.subtract(move.end[:3], here[:3]))
+        if way < _SHORTEST_MM:
+            turned = [n.upper() for n, p, q in zip(AXES, here, move.end, strict=True) if p != q]
+            raise InputError(
+                f"{self.file}:{move.line}: the move turns {', '.join(turned)} alone: axes turn along a path of X, Y "
+                "and Z: turn them in a move that goes at least 2 um, or write the part for each angle as a program"
+            )
 
     def _add(self, move: Move) -> None:
         before = self.builder.position

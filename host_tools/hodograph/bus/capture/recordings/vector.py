@@ -73,7 +73,7 @@ def read_blf(file: Path, channel: str | None) -> Frames:
                 columns.add(message)
         except (BLFParseError, struct.error, zlib.error, ValueError, OverflowError) as error:
             raise InputError(
-                f"{file}: not as BLF has it behind frame {len(columns.times_us)}: {one_line(error)}"
+                f"{file}: not as BLF has it after frame {len(columns.times_us)}: {one_line(error)}"
             ) from error
     return columns.frames(file, channel)
 

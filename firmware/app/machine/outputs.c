@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: MIT */
+#include "app/machine/outputs.h"
+
+#include <string.h>
+
+#include "canopen/pdo.h"
+
+void outputs_init(struct outputs *outputs)
+{
+    memset(outputs, 0, sizeof *outputs);
+}
+
+/* ---- What the state of the machine leaves of them ---- */
+
+enum outputs_mode {
+    OUTPUTS_FOLLOW,  /* those of the path */
+    OUTPUTS_MASKED,  /* off until the motion goes on */
+    OUTPUTS_CLEARED, /* off; the motion switches none any more */
+};
+
+static enum outputs_mode unless(bool kept, enum outputs_mode mode)
+{
+    return kept ? OUTPUTS_FOLLOW : mode;
+}
+
+static enum outputs_mode mode_of(const struct machine *machine)
+{
+    const uint32_t behaviour = machine->config.outputs.behaviour;
+    switch (machine->state) {
+    case MACHINE_RUNNING:
+        return OUTPUTS_FOLLOW;
+    case MACHINE_HOLDING:
+    case MACHINE_HELD:
+        return unless((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u, OUTPUTS_MASKED);
+    case MACHINE_STOPPING:
+        return unless((behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) != 0u, OUTPUTS_CLEARED);
+    case MACHINE_READY:
+        return unless((behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u, OUTPUTS_CLEARED);
+    case MACHINE_BOOT: /* a module that is configured anew begins with its outputs off */
+        return OUTPUTS_CLEARED;
+    default:
+        return unless((behaviour & CONFIG_OUTPUTS_KEEP_AT_FAULT) != 0u, OUTPUTS_CLEARED);
+    }
+}
+
+/* ---- Held back ---- */
+
+static void put(struct outputs *outputs, const struct path_outputs_values *values)
+{
+    outputs->newest = (outputs->newest + 1u) % CONFIG_OUTPUTS_DELAY_MAX;
+    outputs->held_back[outputs->newest] = *values;
+}
+
+/* Those of `delay_ticks` SYNCs ago. */
+static void hold_back(struct outputs *outputs, const struct path_outputs_values *values,
+                      uint32_t delay_ticks)
+{
+    if (delay_ticks == 0u) {
+        outputs->present = *values;
+        return;
+    }
+    const uint32_t from = outputs->newest + CONFIG_OUTPUTS_DELAY_MAX + 1u - delay_ticks;
+    outputs->present = outputs->held_back[from % CONFIG_OUTPUTS_DELAY_MAX];
+    put(outputs, values);
+}
+
+static void switch_off(struct outputs *outputs)
+{
+    memset(outputs->held_back, 0, sizeof outputs->held_back);
+    memset(&outputs->present, 0, sizeof outputs->present);
+}
+
+/* At the last setpoint; without a new one it changes nothing. During a rest before a program the setpoint is not yet the program's:
+ * an event at its start acts with its first one. */
+static void follow_path(struct motion *motion)
+{
+    if (motion->setpoints > 0u && !motion->precedes && path_outputs_active(&motion->outputs) != 0) {
+        path_outputs_step(&motion->outputs, motion->point.arc_length_q40_mm,
+                          feed_override_feed_q32(&motion->feed));
+    }
+}
+
+void outputs_step(struct outputs *outputs, struct machine *machine, bool synced)
+{
+    const enum outputs_mode mode = mode_of(machine);
+    if (mode != OUTPUTS_CLEARED) {
+        follow_path(&machine->motion);
+    }
+    if (mode != OUTPUTS_FOLLOW) {
+        switch_off(outputs);
+    } else if (synced) {
+        hold_back(outputs, &machine->motion.outputs.values, machine->config.outputs.delay_ticks);
+    }
+    if (mode == OUTPUTS_CLEARED) {
+        path_outputs_clear(&machine->motion.outputs);
+    }
+    if (machine->state == MACHINE_BOOT) {
+        outputs->refresh_ticks = 0;
+    } else if (outputs->refresh_ticks > 0u) {
+        outputs->refresh_ticks--;
+    }
+}
+
+/* ---- The frame ---- */
+
+static bool same(const struct path_outputs_values *a, const struct path_outputs_values *b)
+{
+    bool equal = a->digital == b->digital;
+    for (uint32_t i = 0; i < PROGRAM_ANALOGUES; ++i) {
+        equal = equal && a->analogue[i] == b->analogue[i];
+    }
+    return equal;
+}
+
+bool outputs_due(const struct outputs *outputs, const struct config_outputs *config,
+                 struct can_msg *out)
+{
+    if (outputs->refresh_ticks > 0u && same(&outputs->present, &outputs->sent)) {
+        return false;
+    }
+    const struct pdo_outputs outputs_pdo = {
+        .digital = outputs->present.digital,
+        .analogue = outputs->present.analogue,
+        .digital_bytes = config->digital_count / 8u,
+        .analogue_count = config->analogue_count,
+    };
+    pdo_encode_outputs(config->node, &outputs_pdo, out);
+    return true;
+}
+
+void outputs_sent(struct outputs *outputs)
+{
+    outputs->sent = outputs->present;
+    outputs->refresh_ticks = OUTPUTS_REFRESH_TICKS;
+}

@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: MIT */
+/* The rules of docs/reference/protocol.md 1.8: events on the path. Used by program_check. Main loop. */
+#ifndef HODOGRAPH_CORE_EVENT_CHECK_H
+#define HODOGRAPH_CORE_EVENT_CHECK_H
+
+#include "core/program_check.h"
+
+/* All events of a program whose segments and pieces have passed their own checks. Linear: pieces and events advance
+ * together. Returns 0 or PROGRAM_ERR_EVENT_... with the index of the event. */
+int event_check_all(const struct program *p, uint32_t *index);
+
+#endif

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: MIT
+"""Outputs on the path: from the places that a path file gives to events of a program."""
+
+from __future__ import annotations
+
+from .config.machine_file import Machine
+from .config.outputs import PathOutput
+from .config.path_file import PathFile
+from .errors import InputError
+from .events import Event, Events, events_of, no_events
+from .spline.frames import Curve
+
+
+def events_on_path(file: PathFile, machine: Machine, curve: Curve) -> Events:
+    """The events of a path file on its curve. Raises InputError: no such output or place, or a value that is wrong."""
+    if not file.outputs:
+        return no_events()
+    if machine.outputs is None:
+        raise InputError(
+            f"{file.file}: has [[output]], but the machine {machine.file} has no outputs: add [outputs] to it"
+        )
+    points = len(file.given_path.points)
+    found: list[Event] = []
+    for one in file.outputs:
+        channel = machine.outputs.channel(one.name, one.where)
+        found.append(one.event(channel, _place_q40(one, curve, points)))
+    return events_of(found)
+
+
+def _place_q40(output: PathOutput, curve: Curve, points: int) -> int:
+    place_mm, length_mm = _place_mm(output, curve, points), curve.length_mm
+    if place_mm > length_mm:
+        raise InputError(
+            f"{output.where}: at_mm = {place_mm:.9g} is beyond the end of the path, {length_mm:.9g} mm"
+        )
+    return round(place_mm * 2**40)
+
+
+def _place_mm(output: PathOutput, curve: Curve, points: int) -> float:
+    if output.at_mm is not None:
+        return output.at_mm
+    if output.at_fraction is not None:
+        return output.at_fraction * curve.length_mm
+    starts = curve.segment_starts_mm
+    if len(starts) != points + curve.closed:
+        raise InputError(
+            f"{output.where}: at_point cannot be used, since points of the path repeat: give each once, or at_mm"
+        )
+    return float(starts[output.at_point or 0])

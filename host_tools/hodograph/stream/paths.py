@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""Path files with several paths as one job: each path is a program, with what happens at rest before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import ListedPath, Machine, load_paths
+from ..errors import InputError, PlanError
+from ..pipeline import Pipeline
+from ..program.image import Program
+from ..program.inspection import end_point_q40
+from ..spline import PHSpline
+from ..spline.build import FoundSpline
+from ..spline.spatial.curve import SpatialPHSpline
+from ..toolpath.moves import Command, Dwell, ProgramStop
+from .chunk import Chunk, ChunkHeader, Rest
+from .chunks import JobPlace, zones_behind
+from .geometry import LEAST_REST_MM, curve_behind
+
+_MEETS_Q40 = 1 << 16
+"""2^-24 mm: how far a path may begin from the end of the one before (docs/reference/protocol.md 1.7)."""
+
+
+@dataclass(frozen=True, eq=False)
+class _RestPipeline(Pipeline):
+    """The pipeline of a path from an arc length on."""
+
+    begin_mm: float = 0.0
+
+    @cached_property
+    def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
+        """The curve behind that place."""
+        found = super().found_spline
+        if found.spline.axes > 3:
+            raise PlanError(
+                f"{self.file.file}: a path with extra axes cannot go on in its middle: stream the job from its start"
+            )
+        curve = curve_behind(found.spline, self.begin_mm)[1]
+        if isinstance(curve, PHSpline):
+            return FoundSpline(curve, 0)
+        return FoundSpline(curve, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class PathChunk:
+    """A path as a chunk of its job, and what is at rest before it."""
+
+    chunk: Chunk
+    before: tuple[Command, ...]
+    duration_s: float
+
+
+@dataclass(frozen=True)
+class PathsJob:
+    """The paths of a file as a job. Raises InputError and PlanError, which name the file and the path.
+
+    job         number of the job in the controller, plus the number of the path that it begins with
+    most_bytes  of a chunk
+    """
+
+    file: Path
+    machine: Machine
+    job: int
+    most_bytes: int
+    stops: bool
+
+    def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
+        """From path number `first` on, from this arc length of it."""
+        paths = load_paths(self.file)
+        if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
+            first, begin_q40 = first + 1, 0
+        place: JobPlace | None = None
+        for number, listed in enumerate(paths):
+            if number < first:
+                continue
+            last = number + 1 == len(paths)
+            begin = begin_q40 if number == first else 0
+            made = self._chunk(listed, number, place, begin, job=self.job + first, last=last)
+            yield made
+            header = made.chunk.header
+            program = made.chunk.program
+            way_q40 = header.job_start_q40 + program.length_q40
+            place = JobPlace(Rest(), header.sequence + 1, way_q40, end_point_q40(program))
+
+    def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
+        length_mm = Pipeline(listed.file, self.machine).curve.length_mm
+        return begin_q40 * 2.0**-40 > length_mm - LEAST_REST_MM
+
+    def _chunk(
+        self,
+        listed: ListedPath,
+        number: int,
+        place: JobPlace | None,
+        begin_q40: int,
+        *,
+        job: int,
+        last: bool,
+    ) -> PathChunk:
+        pipeline = self._pipeline(listed, begin_q40 * 2.0**-40)
+        program = pipeline.program
+        rest = Rest(listed.dwell_ms, listed.stop == "program", listed.stop == "optional")
+        header = ChunkHeader(
+            first=place is None,
+            last=last,
+            job=job,
+            sequence=0 if place is None else place.sequence,
+            job_start_q40=begin_q40 if place is None else place.way_q40,
+            line=number + 1,
+            rest=None if place is None else (rest if self.stops else Rest(listed.dwell_ms)),
+            joined=not last,
+        )
+        if place is not None:
+            self._require_meeting(number, program, place)
+        chunk = Chunk(header, pipeline.image)
+        if chunk.size > self.most_bytes:
+            raise PlanError(
+                f"{self.file}: path {number + 1} takes {chunk.size} bytes with its header, and the controller takes "
+                f"{self.most_bytes} at once (object 0x2060): divide the path"
+            )
+        return PathChunk(chunk, _commands(rest, number + 1), program.duration_q32_s * 2.0**-32)
+
+    def _pipeline(self, listed: ListedPath, begin_mm: float) -> Pipeline:
+        if begin_mm <= 0.0:
+            return Pipeline(listed.file, self.machine)
+        limits = listed.file.limits
+        file = replace(
+            listed.file, limits=replace(limits, zones=zones_behind(limits.zones, begin_mm))
+        )
+        return _RestPipeline(file, self.machine, begin_mm)
+
+    def _require_meeting(self, number: int, program: Program, place: JobPlace) -> None:
+        start = start_point_q40(program)
+        off = np.abs(start - place.point_q40)
+        if off.max() > _MEETS_Q40:
+            raise InputError(
+                f"{self.file}: path {number + 1} begins {off.max() * 2.0**-40:.6g} mm from the end of path {number}: "
+                "let it begin there; moves between paths are paths of their own"
+            )
+
+
+def _commands(rest: Rest, number: int) -> tuple[Command, ...]:
+    """What a rest before a path is, as commands of a toolpath; their line is the number of the path."""
+    made: list[Command] = []
+    if rest.stop or rest.optional_stop:
+        made.append(ProgramStop(number, rest.optional_stop))
+    if rest.dwell_ms:
+        made.append(Dwell(number, 1e-3 * rest.dwell_ms))
+    return tuple(made)
+
+
+def start_point_q40(program: Program) -> NDArray[np.int64]:
+    """(A,) of all axes, mm or degrees."""
+    return np.asarray(program.point_q40[:, 0])

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: MIT
+"""Where a job goes on when the controller has forgotten it: the place of its path that is nearest to the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..config import SPACE_AXES, load_paths
+from ..errors import InputError
+from ..names import is_toolpath
+from ..pipeline import Pipeline
+from ..spline import PHSpline
+from .geometry import Block, Curve
+from .journal import Entry
+from .plan import JobFiles, Place
+from .reading import StreamReader
+
+_STEP_MM = 0.05
+_MOST_SAMPLES = 200_000
+_REFINED = (41, 3)
+"""Samples of a refinement, and how many refinements: each is finer by half of the samples."""
+_BESIDE_MM = 0.01
+"""The part of the job that is searched is longer by this at both ends."""
+_ALIKE_MM = 2e-6
+"""Of two places that are so much farther the one that comes first: a part is cut twice rather than left out."""
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """A place of a job, its source line, where it is in machine coordinates, and how far the axes are from it."""
+
+    place: Place
+    line: int
+    point_mm: tuple[float, ...]
+    distance_mm: float
+
+
+def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Nearest:
+    """The place nearest to the axes between the one that the journal has last and the end of what had been sent.
+
+    at_mm  (A,) of the axes that the path moves, machine coordinates; those behind x, y, z do not count
+    Raises InputError and PlanError as reading the job does.
+    """
+    starts = dict(entry.starts) or {entry.section: 0}
+    low_q40 = starts.get(entry.section, 0) + entry.way_q40
+    drawn = min(len(at_mm), SPACE_AXES)
+    offset_mm = np.array(job.machine.offset_mm[:drawn])
+    target = np.array(at_mm[:drawn]) - offset_mm
+    found: list[Nearest] = []
+    for number, blocks in _sections(job):
+        if number > max(starts):
+            break
+        start_q40 = starts.get(number)
+        begin_mm = 0.0
+        for block in blocks:
+            length_mm = block.curve.length_mm
+            if start_q40 is not None:
+                low = (low_q40 - start_q40) * 2.0**-40 - _BESIDE_MM - begin_mm
+                high = (entry.committed_q40 - start_q40) * 2.0**-40 + _BESIDE_MM - begin_mm
+                if high > 0.0 and low < length_mm:
+                    ways = _nearest_ways(block.curve, target, max(low, 0.0), min(high, length_mm))
+                    found += [
+                        _found(block, way, begin_mm, number, target, offset_mm) for way in ways
+                    ]
+            begin_mm += length_mm
+    if not found:
+        raise InputError(
+            "the journal names a place that the job does not have: stream it from its start"
+        )
+    least = min(one.distance_mm for one in found) + _ALIKE_MM
+    return next(one for one in found if one.distance_mm <= least)
+
+
+def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
+    """The sections of all files, with the path of each; it may be left unread."""
+    number = 0
+    for file in job.files:
+        if is_toolpath(file):
+            reader = StreamReader(file, job.machine, job.tolerance_mm, job.reading)
+            for section in reader.sections():
+                blocks = section.blocks
+                yield number, blocks
+                for _ in blocks:
+                    pass
+                number += 1
+        else:
+            for line, listed in enumerate(load_paths(file), 1):
+                curve = Pipeline(listed.file, job.machine).curve
+                count = curve.segment_count
+                yield number, iter([Block(curve, np.full(count, np.inf), np.full(count, line))])
+                number += 1
+
+
+def _found(
+    block: Block, way_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
+) -> Nearest:
+    point = _points(block.curve, np.array([way_mm]), target.size)[0]
+    segment, _ = block.curve.locate(way_mm)
+    return Nearest(
+        Place(number, round((begin_mm + way_mm) * 2.0**40)),
+        int(block.line[int(segment)]),
+        tuple((point + offset_mm).tolist()),
+        float(np.linalg.norm(point - target)),
+    )
+
+
+def _nearest_ways(curve: Curve, target: Real, low: float, high: float) -> list[float]:
+    """Arc lengths of the places nearest to a point, of several about as near, in their order."""
+    count = int(np.clip(np.ceil((high - low) / _STEP_MM) + 1, 2, _MOST_SAMPLES))
+    s = np.linspace(low, high, count)
+    d = _distances(curve, s, target)
+    padded = np.concatenate(([np.inf], d, [np.inf]))
+    lowest = (d <= padded[:-2]) & (d <= padded[2:]) & (d <= d.min() + (s[1] - s[0]))
+    return [_refined(curve, target, s, int(k)) for k in np.flatnonzero(lowest)]
+
+
+def _refined(curve: Curve, target: Real, s: Real, k: int) -> float:
+    count, times = _REFINED
+    for _ in range(times):
+        s = np.linspace(s[max(k - 1, 0)], s[min(k + 1, s.size - 1)], count)
+        k = int(np.argmin(_distances(curve, s, target)))
+    return float(s[k])
+
+
+def _distances(curve: Curve, s: Real, target: Real) -> Real:
+    return np.asarray(np.linalg.norm(_points(curve, s, target.size) - target, axis=1))
+
+
+def _points(curve: Curve, s: Real, axes: int) -> Real:
+    """Points (n, A) at arc lengths (n,)."""
+    if isinstance(curve, PHSpline):
+        planar = curve.point(s)
+        return np.stack((planar.real, planar.imag), axis=-1)
+    point = curve.point(s)
+    return np.asarray(point, dtype=np.float64)[:, :axes]

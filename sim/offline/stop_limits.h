@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * The limits that a brake along a path keeps: those of the path file and the machine for a feed hold, those of the machine
+ * for a fault stop. Data only; offline/stop_path.h and offline/stop_strain.h use them.
+ */
+#ifndef HODOGRAPH_OFFLINE_STOP_LIMITS_H
+#define HODOGRAPH_OFFLINE_STOP_LIMITS_H
+
+#include <stdint.h>
+
+#include "core/program.h"
+
+#define STOP_MARGIN                                                                                \
+    0.003 /* share of each limit that is left for what lies between the instants that are looked at */
+
+/* A greatest feed on a stretch of the path. */
+struct stop_cap {
+    double from_mm;
+    double to_mm;
+    double feed_mm_s;
+};
+
+/* What a brake has to keep; HUGE_VAL: no limit. The numbers never ask for more than `acceleration` and `jerk`. */
+struct stop_limits {
+    double feed;         /* along the path: mm/s, */
+    double acceleration; /* mm/s^2, */
+    double jerk;         /* mm/s^3 */
+    double centripetal;
+    double axis_velocity[PROGRAM_AXES]; /* of the program's path axes */
+    double axis_acceleration[PROGRAM_AXES];
+    double axis_jerk[PROGRAM_AXES];
+    double reach
+        [PROGRAM_AXES]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
+    double time_constant[PROGRAM_AXES]; /* s */
+    const struct stop_cap *caps;
+    uint32_t cap_count;
+    uint32_t
+        reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
+    uint32_t
+        rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+    uint32_t quick; /* 1: few codes are tried, about 0.1 ms a piece, for long programs */
+};
+
+#endif

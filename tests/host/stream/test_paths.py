@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""Path files with several paths: what they may say, and the job that they become."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.cli.main import main
+from hodograph.config import Machine, load_machine, load_path_file, load_paths
+from hodograph.errors import InputError, PlanError
+from hodograph.native.program import NativeLimits
+from hodograph.pipeline import program_limits
+from hodograph.program.inspection import end_point_q40
+from hodograph.stream.chunk import Chunk, Rest
+from hodograph.stream.chunks import CHUNK_BYTES
+from hodograph.stream.paths import PathsJob, start_point_q40
+from hodograph.stream.plan import JobFiles, JobPlan, Place
+from hodograph.stream.simulation import simulate_chunks
+from hodograph.toolpath.files import ReadOptions
+from hodograph.toolpath.moves import Dwell, ProgramStop
+
+ROOT = Path(__file__).resolve().parents[3]
+PATHS = ROOT / "examples" / "paths.toml"
+MACHINE = ROOT / "examples" / "machines" / "paper_alpha.toml"
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """Two axes."""
+    return load_machine(MACHINE)
+
+
+def _planned(machine: Machine, begin: Place) -> list[tuple[int, Chunk, tuple[object, ...]]]:
+    job = JobFiles((PATHS,), machine, 0.01, ReadOptions())
+    with JobPlan(job, CHUNK_BYTES, 7, begin) as plan:
+        chunks = [chunk for chunks in plan.by_job() for chunk in chunks]
+        assert len(plan.sections) == len(chunks)
+        return [
+            (section.number, chunk, section.before)
+            for section, chunk in zip(plan.sections, chunks, strict=True)
+        ]
+
+
+def test_paths_are_one_job(machine: Machine) -> None:
+    found = _planned(machine, Place())
+    headers = [chunk.header for _, chunk, _ in found]
+    assert [one.rest for one in headers] == [None, Rest(500), Rest(stop=True)]
+    assert [one.joined for one in headers] == [True, True, False]
+    assert [one.line for one in headers] == [1, 2, 3]
+    assert {one.job for one in headers} == {7}
+    assert [before for _, _, before in found] == [(), (Dwell(2, 0.5),), (ProgramStop(3, False),)]
+    limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
+    chunks = [chunk for _, chunk, _ in found]
+    run = simulate_chunks(chunks, limits, "fixed", machine.counts_per_mm)
+    own = sum(-(-chunk.program.duration_q32_s * 1000 // 2**32) + 1 for chunk in chunks)
+    assert (run.ticks, run.sections) == (own + 500 + 8, 3)
+
+
+def test_a_job_of_paths_goes_on_inside_a_path(machine: Machine) -> None:
+    whole = _planned(machine, Place())[1][1]
+    at_q40 = whole.program.length_q40 // 3
+    found = _planned(machine, Place(1, at_q40))
+    assert [number for number, _, _ in found] == [1, 2]
+    first = found[0][1]
+    assert found[0][2] == ()
+    assert (first.header.first, first.header.job, first.header.job_start_q40) == (True, 8, at_q40)
+    rest = whole.program.length_q40 - at_q40
+    assert abs(first.program.length_q40 - rest) < 2**14
+    near = np.abs(end_point_q40(first.program) - end_point_q40(whole.program))
+    assert near.max() < 2**14
+    assert found[1][1].header.job_start_q40 == at_q40 + first.program.length_q40
+
+
+def test_ends_of_programs(machine: Machine) -> None:
+    for _, chunk, _ in _planned(machine, Place(2)):
+        program = chunk.program
+        assert np.allclose(start_point_q40(program) * 2.0**-40, [40, 40], atol=1e-9)
+        assert np.allclose(end_point_q40(program) * 2.0**-40, [0, 0], atol=1e-9)
+
+
+def _changed(folder: Path, old: str, new: str) -> Path:
+    text = PATHS.read_text().replace('"machines/', f'"{MACHINE.parent}/')
+    assert old in text
+    file = folder / "paths.toml"
+    file.write_text(text.replace(old, new, 1))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("dwell_ms = 500", "dwell_ms = -1", r"\[path 2\] dwell_ms"),
+        ('stop = "program"', 'stop = "maybe"', r"\[path 3\] stop"),
+        ("dwell_ms = 500", "pause_ms = 500", r"\[path 2\] pause_ms"),
+        ("closed = false", "dwell_ms = 5\nclosed = false", "first path has none"),
+        ("[[40, 0], [52, 20], [40, 40]]", "[[40, 0, 1], [5, 2, 0], [4, 4, 4]]", "one kind"),
+    ],
+)
+def test_files_with_errors(tmp_path: Path, old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        load_paths(_changed(tmp_path, old, new))
+
+
+def test_a_path_begins_where_the_one_before_ends(tmp_path: Path, machine: Machine) -> None:
+    file = _changed(tmp_path, "[[40, 0], [52", "[[40, 0.5], [52")
+    with pytest.raises(InputError, match=r"path 2 begins 0\.5 mm from the end of path 1"):
+        list(PathsJob(file, machine, 1, CHUNK_BYTES, True).chunks(0, 0))
+
+
+def test_a_path_that_is_too_long(machine: Machine) -> None:
+    with pytest.raises(PlanError, match=r"path 1 takes .* divide the path"):
+        list(PathsJob(PATHS, machine, 1, 4000, True).chunks(0, 0))
+
+
+def test_other_commands_name_the_way(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(InputError, match="only stream and run take it"):
+        load_path_file(PATHS)
+    assert main(["stream", str(PATHS), "--simulate", "--tolerance", "0.1"]) == 2
+    assert "--tolerance is for toolpaths" in capsys.readouterr().err
+    assert main(["stream", "job.pdf", "--simulate"]) == 2
+    assert "no toolpath" in capsys.readouterr().err

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""The place at which a job goes on that the controller has lost: on its path, nearest to the axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.config import Machine, load_machine
+from hodograph.errors import InputError
+from hodograph.stream.journal import Entry
+from hodograph.stream.plan import JobFiles
+from hodograph.stream.resuming import nearest_place
+from hodograph.toolpath.files import ReadOptions
+
+ROOT = Path(__file__).resolve().parents[3]
+PART = "G61\nF600\nG1 X10\nG1 Y10\nG1 X0\nG1 Y0\nG1 X10\n"
+"""Sections of 10 mm, the last one as the first."""
+Q40 = 1 << 40
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """The mill of the examples."""
+    return load_machine(ROOT / "examples" / "machines" / "mill.toml")
+
+
+@pytest.fixture
+def job(tmp_path: Path, machine: Machine) -> JobFiles:
+    file = tmp_path / "part.ngc"
+    file.write_text(PART)
+    return JobFiles((file,), machine, 0.01, ReadOptions())
+
+
+def _entry(section: int, way_mm: float, to_mm: float) -> Entry:
+    """A job of the controller that began with section 0."""
+    starts = tuple((k, 10 * k * Q40) for k in range(section, 5))
+    return Entry((), "", {}, 1, section, round(way_mm * Q40), round(to_mm * Q40), starts=starts)
+
+
+@pytest.mark.parametrize(
+    ("entry", "at", "section", "way", "distance"),
+    [
+        (_entry(0, 2.0, 15.0), (7.0, 0.001, 0.0), 0, 7.0, 0.001),
+        (_entry(0, 2.0, 15.0), (10.0, 3.5, 0.0), 1, 3.5, 0.0),
+        (_entry(0, 2.0, 50.0), (7.0, 0.0, 0.0), 0, 7.0, 0.0),
+        (_entry(2, 2.0, 50.0), (7.0, 0.0, 0.0), 4, 7.0, 0.0),
+        (_entry(0, 2.0, 15.0), (1.0, 0.0, 0.0), 0, 1.99, 0.99),
+        (_entry(0, 2.0, 12.0), (10.0, 8.0, 0.0), 1, 2.01, 5.99),
+        (_entry(0, 2.0, 15.0), (10.0, 0.0, 0.0), 0, 10.0, 0.0),
+    ],
+)
+def test_nearest_places(
+    job: JobFiles,
+    entry: Entry,
+    at: tuple[float, float, float],
+    section: int,
+    way: float,
+    distance: float,
+) -> None:
+    """Only between the last place of the journal and the end of what was sent; of equal places the first."""
+    found = nearest_place(job, entry, at)
+    assert found.place.section == section
+    assert abs(found.place.way_q40 / Q40 - way) < 1e-5
+    assert abs(found.distance_mm - distance) < 1e-5
+    assert found.line == 3 + section
+    off = np.linalg.norm(np.subtract(found.point_mm, at))
+    assert abs(off - found.distance_mm) < 1e-9
+
+
+def test_work_offset(job: JobFiles, machine: Machine) -> None:
+    moved = replace(job, machine=replace(machine, offset_mm=(5.0, -3.0, 1.0)))
+    found = nearest_place(moved, _entry(0, 1.0, 10.0), (9.0, -3.0, 1.0))
+    assert abs(found.place.way_q40 / Q40 - 4.0) < 1e-5
+    assert found.distance_mm < 2e-6
+
+
+def test_a_path_file(machine: Machine) -> None:
+    two = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
+    job = JobFiles((ROOT / "examples" / "paths.toml",), two, 0.01, ReadOptions())
+    entry = Entry((), "", {}, 1, 0, 0, 100 * Q40, starts=((0, 0), (1, 50 * Q40)))
+    found = nearest_place(job, entry, (52.0, 20.0))
+    assert (found.place.section, found.line) == (1, 2)
+    assert found.distance_mm < 1e-6
+
+
+def test_a_journal_of_another_job(job: JobFiles) -> None:
+    with pytest.raises(InputError, match="does not have"):
+        nearest_place(job, _entry(0, 80.0, 90.0), (0.0, 0.0, 0.0))

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Outputs of G-code become events of the sections' programs."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.config import Machine, load_machine
+from hodograph.errors import InputError
+from hodograph.job import Job, load_job
+
+ROOT = Path(__file__).parents[3]
+MACHINES = ROOT / "examples" / "machines"
+MM = 1 << 40
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    return load_machine(MACHINES / "dispenser.toml")
+
+
+def job(tmp_path: Path, machine: Machine, text: str) -> Job:
+    file = tmp_path / "job.ngc"
+    file.write_text(f"G21 G17 G90 G94 G64 P0.02\nG1 F600\n{text}\nM30\n")
+    return load_job(file, machine)
+
+
+def events(found: Job) -> list[list[tuple[float, int, int, int, int]]]:
+    """By section: place in mm, kind, channel, mask, value."""
+    return [
+        [(round(place / MM, 6), *rest) for place, *rest in one.pipeline.events.tolist()]
+        for one in found.sections
+    ]
+
+
+def test_synchronised_outputs_stand_at_their_place_on_the_smoothed_path(
+    tmp_path: Path, machine: Machine
+) -> None:
+    found = job(
+        tmp_path,
+        machine,
+        "M62 P0\nG1 X20\nM63 P0\nM67 E0 Q50\nG1 X20 Y20\nM62 P1\nG1 X0",
+    )
+    (section,) = found.sections
+    on, off, power, needle = section.pipeline.events.tolist()
+    assert on == (0, 1, 0, 1, 1)
+    assert (*off[1:], *power[1:]) == (1, 0, 1, 0, 2, 0, 0, 16384)
+    assert off[0] == power[0]
+    for event, corner in ((off, (20.0, 0.0)), (needle, (20.0, 20.0))):
+        at = section.pipeline.curve.point(np.array([event[0] / MM]))[0]
+        assert abs(at - complex(*corner)) <= 0.02 + 1e-9
+    assert not found.notes
+
+
+def test_each_section_repeats_what_is_on(tmp_path: Path, machine: Machine) -> None:
+    text = "M64 P1\nM68 E0 Q10\nG1 X10\nM64 P0\nG1 X20\nM65 P1\nM68 E0 Q0\nG1 X30\nM65 P0"
+    assert events(job(tmp_path, machine, text)) == [
+        [(0.0, 1, 0, 2, 2), (0.0, 2, 0, 0, 3277)],
+        [(0.0, 1, 0, 2, 2), (0.0, 2, 0, 0, 3277), (0.0, 1, 0, 1, 1)],
+        [
+            (0.0, 1, 0, 3, 3),
+            (0.0, 2, 0, 0, 3277),
+            (0.0, 1, 0, 2, 0),
+            (0.0, 2, 0, 0, 0),
+            (10.0, 1, 0, 1, 0),
+        ],
+    ]
+
+
+def test_outputs_before_a_dwell_belong_to_the_end_of_the_motion_before_it(
+    tmp_path: Path, machine: Machine
+) -> None:
+    text = "M64 P1\nG4 P0.1\nG1 X10\nM64 P0\nG4 P0.5\nM65 P0\nG1 X20"
+    assert events(job(tmp_path, machine, text)) == [
+        [(0.0, 1, 0, 2, 2), (10.0, 1, 0, 1, 1)],
+        [(0.0, 1, 0, 3, 3), (0.0, 1, 0, 1, 0)],
+    ]
+
+
+def test_spindle_words_that_the_machine_file_maps(tmp_path: Path, machine: Machine) -> None:
+    found = job(tmp_path, machine, "M3 S40\nG1 X10\nM5\nG1 X20\nM7\nG1 X30")
+    laser, power = (0.0, 1, 0, 4, 4), (0.0, 2, 0, 0, 13107)
+    assert events(found) == [
+        [laser, power],
+        [laser, power, (0.0, 1, 0, 4, 0), (0.0, 2, 0, 0, 0)],
+        [],
+    ]
+    assert [note.split(":")[-2] for note in found.notes] == [" coolant (M7, M8, M9)"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("M62 P9\nG1 X10", r"job.ngc:3: the machine has no digital output 9: add it"),
+        ("G1 X10\nM68 E1 Q1\nG1 X20", r"job.ngc:4: the machine has no analogue output 1: add it"),
+        ("M67 E0 Q101\nG1 X10", r"job.ngc:3: 101 % of output power is 33095"),
+    ],
+)
+def test_outputs_that_the_machine_does_not_have(
+    tmp_path: Path, machine: Machine, text: str, words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        job(tmp_path, machine, text)
+
+
+def test_a_machine_without_outputs_notes_them(tmp_path: Path) -> None:
+    plain = load_machine(MACHINES / "tuned.toml")
+    found = job(tmp_path, plain, "M62 P0\nG1 X10")
+    assert "outputs (M62 to M65, M67, M68): the machine has none" in found.notes[0]
+    assert events(found) == [[]]

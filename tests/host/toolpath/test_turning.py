@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: MIT
+"""Axes that turn along with a toolpath: smooth, within the tolerance, and run on a machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.config import Machine, load_machine
+from hodograph.errors import InputError, PlanError
+from hodograph.job import load_job, simulate_job
+from hodograph.spline.spatial import SpatialPHSpline
+from hodograph.stream.reading import StreamReader
+from hodograph.toolpath.files import ReadOptions
+from hodograph.toolpath.fit.fitting import FittedPath, Tolerance, fit
+from hodograph.toolpath.fit.reference import Reference
+from hodograph.toolpath.fit.sections import divided
+from hodograph.toolpath.fit.speeds import MotionLimits
+from hodograph.toolpath.fit.turning import Angles, turning_bound_deg, with_turning
+from hodograph.toolpath.gcode import read_gcode
+
+ROOT = Path(__file__).resolve().parent.parent.parent.parent
+MACHINES = ROOT / "examples" / "machines"
+TOLERANCE = 0.01
+
+
+@pytest.fixture(scope="module")
+def five() -> Machine:
+    return load_machine(MACHINES / "mill_five_axes.toml")
+
+
+def program(folder: Path, text: str) -> Path:
+    file = folder / "part.ngc"
+    file.write_text(text)
+    return file
+
+
+def turned(points: np.ndarray, angles: np.ndarray) -> tuple[FittedPath, Angles]:
+    count = len(points) - 1
+    feed = np.full(count, np.inf)
+    reference = Reference(points, np.arange(1, count + 1), feed, np.zeros(count), angles)
+    found = fit(reference, Tolerance(TOLERANCE, MotionLimits(200.0, 2000.0, 50000.0)))
+    assert isinstance(found, FittedPath)
+    target = Angles.of(found.arc_length_at(reference.place_mm), angles)
+    return with_turning(found, (0, 1, 2), TOLERANCE), target
+
+
+def smooth_program() -> tuple[np.ndarray, np.ndarray]:
+    t = np.linspace(0.0, 1.0, 120)
+    points = np.stack((40.0 * np.cos(3 * t), 40.0 * np.sin(3 * t), 5.0 * t), axis=1)
+    return points, np.stack((20.0 * np.sin(2 * t), 0.0 * t, 170.0 * t**2), axis=1)
+
+
+def hard_program() -> tuple[np.ndarray, np.ndarray]:
+    """Legs from 1 um to 100 mm, rates that jump, angles with noise."""
+    rng = np.random.default_rng(3)
+    legs = 10.0 ** rng.uniform(-3.0, 2.0, size=40)
+    way = np.cumsum(np.column_stack((legs, legs * rng.uniform(-0.5, 0.5, 40), 0 * legs)), axis=0)
+    angles = np.cumsum(rng.choice([0.0, 0.001, 1.0, 30.0], size=(40, 3)), axis=0)
+    zero = np.zeros((1, 3))
+    return np.vstack((zero, way)), np.vstack((zero, angles))
+
+
+@pytest.mark.parametrize("make", [smooth_program, hard_program])
+def test_angles_are_smooth_and_within_the_tolerance(make: object) -> None:
+    points, angles = smooth_program() if make is smooth_program else hard_program()
+    path, target = turned(points, angles)
+    curve = path.curve
+    bound = turning_bound_deg(curve, target).max()
+    s = np.linspace(0.0, curve.length_mm, 20001)
+    off = np.linalg.norm(curve.extra_point(s) - target(s), axis=1).max()
+    assert off <= bound <= TOLERANCE
+    assert off >= 0.1 * TOLERANCE
+    assert np.array_equal(curve.axes_nodes[[0, -1], 3:], angles[[0, -1]])
+    before = np.arange(curve.segment_count - 1)
+    ends, starts = (
+        curve.frames_at(segment, np.full(before.size, xi))
+        for segment, xi in ((before, 1.0), (before + 1, 0.0))
+    )
+    for one, other in ((ends.r1, starts.r1), (ends.r2, starts.r2)):
+        assert np.allclose(one, other, rtol=1e-6, atol=1e-6 * np.abs(one).max())
+
+
+def test_joints_for_angles_leave_the_curve_as_it_is() -> None:
+    points, angles = hard_program()
+    path, _ = turned(points, angles)
+    plain, _ = turned(points, np.zeros_like(angles))
+    assert path.curve.segment_count > plain.curve.segment_count
+    s = np.linspace(0.0, plain.curve.length_mm, 2001)
+    assert path.curve.length_mm == pytest.approx(plain.curve.length_mm, rel=1e-12)
+    assert np.abs(path.curve.point(s) - plain.curve.point(s)).max() < 1e-9
+    assert path.deviation_mm == plain.deviation_mm
+
+
+def test_angles_that_stay_are_constant() -> None:
+    points, _ = smooth_program()
+    path, _ = turned(points, np.tile([5.0, 0.0, -3.0], (len(points), 1)))
+    assert np.array_equal(np.unique(path.curve.extra, axis=0)[0, :, 0], [5.0, 0.0, -3.0])
+    assert np.ptp(path.curve.extra, axis=(0, 2)).max() == 0.0
+
+
+def test_arcs_turn_in_proportion_and_later_moves_keep_the_angle() -> None:
+    text = "G21 F600\nG1 X10\nG3 X10 Y20 J10 A90 C-30\nG1 X0\nM2"
+    (section,) = divided(read_gcode(text.splitlines()), TOLERANCE, "part.ngc").sections
+    angles = section.reference.turn_deg
+    assert angles is not None
+    arc = section.reference.line == 3
+    first, last = np.flatnonzero(arc)[[0, -1]]
+    assert np.allclose(angles[first : last + 2, 0], np.linspace(0.0, 90.0, last - first + 2))
+    assert angles[-1].tolist() == [90.0, 0.0, -30.0]
+    assert not angles[: first + 1].any()
+
+
+def test_a_program_of_five_axes_runs_to_its_end(tmp_path: Path, five: Machine) -> None:
+    lines = [f"X{k:g} Y{0.02 * k * k:g} A{0.5 * k:g} C{-2 * k:g}" for k in range(1, 13)]
+    text = "\n".join(["G21 G1 F1500", *lines, "G93 X20 Y8 C0 F60", "M2"])
+    job = load_job(program(tmp_path, text), five)
+    run = simulate_job(job)
+    (motion,) = run.motions
+    assert np.allclose(motion.cmd_mm[-1], [20.0, 8.0, 0.0, 6.0, 0.0], atol=1e-9)
+    line = job.sections[0].line_at(motion.arc_length_mm)
+    timed_s = np.count_nonzero(line == 14) * run.period_s
+    assert 1.0 <= timed_s < 1.3, "G93 F60 asks for a second, a stop comes at the end"
+    at = np.flatnonzero(np.diff(line))[5]
+    x, angle = motion.cmd_mm[at, 0], motion.cmd_mm[at, 3]
+    assert angle == pytest.approx(0.5 * x, abs=0.06)
+
+
+def test_what_cannot_turn_is_refused_with_its_line(tmp_path: Path, five: Machine) -> None:
+    mill = load_machine(MACHINES / "mill.toml")
+    cases = (
+        (five, "F600\nG1 X5\nG0 A90\n", ":3: the move turns A alone"),
+        (five, "F600\nG1 X5\nG1 X6 B9\n", ":3: the move turns B, but no axis b of"),
+        (mill, "F600\nG1 X5 A1\n", ":2: the move turns A, but no axis a of mill.toml"),
+    )
+    for machine, text, words in cases:
+        with pytest.raises(InputError, match=words):
+            load_job(program(tmp_path, text), machine)
+    with pytest.raises(PlanError, match=r":3: a goes to .* … 125 deg with the work offset"):
+        load_job(program(tmp_path, "F600\nG1 X5\nG1 X90 A125\nX99\n"), five)
+    file = program(tmp_path, "F600\nG1 X5 A1\nX9\n")
+    with pytest.raises(InputError, match=":2: the move turns A, B or C: stream takes"):
+        list(StreamReader(file, five, TOLERANCE, ReadOptions()).sections())
+
+
+def test_axes_that_the_program_does_not_turn_stand(tmp_path: Path, five: Machine) -> None:
+    job = load_job(program(tmp_path, "F600\nG1 X5 C3\nX9\n"), five)
+    curve = job.sections[0].fitted.curve
+    assert curve.axes == 5
+    assert not curve.axes_nodes[:, 3].any()
+    assert curve.axes_nodes[-1, 4] == 3.0
+    plain = load_job(program(tmp_path, "F600\nG1 X5\nX9\n"), five).sections[0].pipeline.curve
+    assert isinstance(plain, SpatialPHSpline)
+    assert plain.axes == 5
+    assert not plain.extra.any()

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: MIT
+"""Sections as one job on a bus: program stops, the recording, and `run` that streams what does not fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from bench import EXAMPLES
+from commands import result
+from hodograph.bus.capture.decode import RPDO1, SYNC_ID
+from hodograph.bus.capture.recordings import read_recording
+from hodograph.bus.hub import LocalHub
+from hodograph.bus.sdo.controller import connect
+from hodograph.bus.sdo.objects import HELD, RESUME
+from hodograph.bus.sdo.stream_channel import PROGRAM_STOP, stream_status
+from hodograph.cli import stream_command
+from hodograph.cli.main import main
+from hodograph.job_run import Look
+
+MILL = EXAMPLES / "machines" / "mill.toml"
+PART = "F6000\nG61\nG1 X4\nG4 P0.1\nM0\nG1 Y3\nM1\nG1 X0 Y0\nM2\n"
+
+
+def _part(folder: Path) -> str:
+    file = folder / "part.ngc"
+    file.write_text(PART)
+    return str(file)
+
+
+def test_program_stops_wait_for_the_operator_or_a_resume(
+    hub: LocalHub,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The first one ends by Enter, the second one by a resume from elsewhere; all in one job of the controller."""
+    asked: list[str] = []
+
+    def operator(text: str, look: Look) -> None:
+        asked.append(text)
+        with connect(hub.address, 1, 1_000_000) as controller:
+            for _ in range(3):
+                look()
+            assert controller.state() == HELD
+            assert stream_status(controller).state == PROGRAM_STOP
+            if len(asked) == 2:
+                controller.command(RESUME)
+        for _ in range(100):
+            if len(asked) == 2:
+                look()
+
+    monkeypatch.setattr(stream_command, "await_enter", operator)
+    part, log = _part(tmp_path), tmp_path / "bus.log"
+    journal = str(tmp_path / "stream.json")
+    found = result(
+        capsys,
+        *("stream", part, "--machine", str(MILL), "--journal", journal, "--json"),
+        *("--record", str(log)),
+    )
+    assert [text.removeprefix(part) for text in asked] == [":5: M0", ":7: M1"]
+    assert (found["sections"], found["chunks"]) == (3, 3)
+    frames = read_recording(log, None)
+    assert (frames["id"] == SYNC_ID).sum() > 1000 * found["motion_s"]
+    x = frames["data"][frames["id"] == RPDO1 + 2][:, 2:6].copy().view("<i4")[:, 0]
+    assert x.max() == 4_000_000
+    assert (x == 4_000_000).sum() > 100  # the dwell
+    assert abs(x[-1]) < 1000
+
+
+def test_run_streams_what_no_bank_can_hold(
+    hub: LocalHub, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = MILL.read_text().replace("../drives", f"{EXAMPLES}/drives")
+    assert "[controller]" in text
+    machine = tmp_path / "small.toml"
+    machine.write_text(text.replace("[controller]", "[controller]\nprogram_bytes = 4000", 1))
+    words = ("run", _part(tmp_path), "--machine", str(machine), "--no-stops", "--json")
+    assert main([*words, "--trace", str(tmp_path / "trace.csv")]) != 0
+    assert "hodograph stream takes jobs of any length" in capsys.readouterr().err
+    found = result(capsys, *words)
+    assert (found["sections"], found["chunks"]) == (3, 3)
+    assert found["underruns"] == 0
