@@ -12,7 +12,16 @@ from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
-from .image import PIECE_SIZE, RECORD_BYTES, STOP_SIZE, VERSION, Program, header_size, record_bytes, segment_size
+from .image import (
+    PIECE_SIZE,
+    RECORD_BYTES,
+    STOP_SIZE,
+    VERSION,
+    Program,
+    header_size,
+    record_bytes,
+    segment_size,
+)
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
 
 RING_BYTES = 48 * 1024
