@@ -161,8 +161,8 @@ const struct coefficients_segment *interpolator_segment_in(const struct coeffici
                                                            int64_t number,
                                                            int64_t arc_length_q40_mm)
 {
-    struct interpolator at;
-    at.segment = coefficients_window_segment(window, number > 0 ? (uint32_t)number : 0u);
+    struct interpolator at = {
+        .segment = coefficients_window_segment(window, number > 0 ? (uint32_t)number : 0u)};
     return at.segment != NULL && find_segment(&at, arc_length_q40_mm, INTERPOLATOR_MOST_SEGMENTS) ==
                                      INTERPOLATOR_OK
                ? at.segment
