@@ -243,6 +243,10 @@ static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 {
     struct controller *controller = self;
     tick_run(&controller->tick, now_us, late_ns);
+    if (machine_on_path(&controller->machine) &&
+        motion_wants_records(&controller->machine.motion)) {
+        port_wake();
+    }
 }
 
 int controller_start(struct controller *controller)

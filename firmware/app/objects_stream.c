@@ -87,7 +87,7 @@ uint64_t object_read_stream(struct controller *controller, const struct od_entry
     case 6:
         return stream->refused.index;
     case 7:
-        return stream_free_bytes(stream, &controller->config);
+        return stream_free_bytes(stream);
     case 14:
         return stream->ring.size;
     case 16:

@@ -5,12 +5,10 @@
 #include <string.h>
 
 #include "app/machine/path_counts.h"
-#include "core/coefficients.h"
-#include "core/kernel.h"
 #include "core/qmath.h"
 #include "port/port.h"
 
-/* At the start of a block of the ring; the bytes of the chunk follow, and behind them its coefficient records. */
+/* At the start of a block of the ring; the bytes of the chunk follow. */
 struct stream_chunk {
     struct stream_chunk *next; /* accepted after it; NULL: the newest */
     uint64_t job_time_q32_s;   /* time of the job at its program time 0, */
@@ -23,17 +21,13 @@ struct stream_chunk {
 typedef char
     stream_assert_aligned[sizeof(struct stream_chunk) % CHUNK_RING_ALIGNMENT == 0u ? 1 : -1];
 
-static uint32_t aligned(uint32_t size)
-{
-    return (size + COEFFICIENTS_ALIGNMENT - 1u) & ~(COEFFICIENTS_ALIGNMENT - 1u);
-}
-
 void stream_init(struct stream *stream)
 {
     uint32_t size;
     uint8_t *memory = port_stream_memory(&size);
     memset(stream, 0, sizeof *stream);
     chunk_ring_init(&stream->ring, memory, size);
+    chunk_records_init(&stream->records);
     stream->optional_stop = true;
 }
 
@@ -115,21 +109,14 @@ static int check_program(const struct stream *stream, struct chunk *chunk,
     return chunk_check(chunk, previous, &limits, fault);
 }
 
-static int make_records(struct stream *stream, struct chunk *chunk, const struct config *config)
+/* The block becomes as small as the chunk. */
+static int fit(struct stream *stream, const struct chunk *chunk, const struct config *config)
 {
-    const struct kernel *kernel = kernel_find(config->kernel);
-    const uint32_t used = aligned(chunk->size);
-    if (kernel == NULL) {
-        return PROGRAM_ERR_KERNEL;
+    const int code = chunk_records_check(&stream->records, &chunk->program, config);
+    if (code == 0) {
+        chunk_ring_trim(&stream->ring, HEAD_SIZE + chunk->size);
     }
-    if (used > stream->receiving_bytes ||
-        coefficients_make_in(&chunk->program, kernel, stream->receiving + HEAD_SIZE + used,
-                             stream->receiving_bytes - used) != 0) {
-        return PROGRAM_ERR_ROOM;
-    }
-    chunk_ring_trim(&stream->ring,
-                    HEAD_SIZE + used + (uint32_t)coefficients_size(&chunk->program, kernel));
-    return 0;
+    return code;
 }
 
 /* The first thing that is wrong with the chunk that has come. */
@@ -143,7 +130,7 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
     }
     fault.code = fault.code != 0 ? fault.code : check_turn(stream, chunk, config);
     fault.code = fault.code != 0 ? fault.code : check_program(stream, chunk, config, &fault);
-    fault.code = fault.code != 0 ? fault.code : make_records(stream, chunk, config);
+    fault.code = fault.code != 0 ? fault.code : fit(stream, chunk, config);
     return fault;
 }
 
@@ -251,16 +238,18 @@ void stream_close(struct stream *stream)
     stream->place = (struct stream_place){.sequence = 0};
 }
 
-enum machine_refusal stream_prepare(const struct stream *stream, const struct config *config,
+enum machine_refusal stream_prepare(struct stream *stream, const struct config *config,
                                     struct motion *prepared, int32_t start_counts[AXES_MAX])
 {
     if (stream->started) {
         return MACHINE_JOB_STARTED;
     }
-    if (stream->config_crc32 != config->crc32 ||
-        motion_begin_job(prepared, &stream->executed->chunk, config) != 0) {
+    if (stream->config_crc32 != config->crc32) {
         return MACHINE_OUTSIDE_LIMITS;
     }
+    const struct chunk *first = &stream->executed->chunk;
+    motion_begin_job(prepared, first,
+                     chunk_records_begin(&stream->records, &first->program, config), config);
     memcpy(start_counts, stream->start_counts, sizeof stream->start_counts);
     return MACHINE_ACCEPTED;
 }
@@ -338,11 +327,14 @@ static bool take_next_over(struct stream *stream, struct machine *machine)
     if (next == NULL) {
         return false;
     }
+    const struct coefficients_window *window =
+        chunk_records_for_next(&stream->records, machine, &next->chunk);
     port_lock();
     stop_before_next(stream, machine);
-    const bool taken = machine_take_over(machine, &next->chunk);
+    const bool taken = window != NULL && machine_take_over(machine, &next->chunk, window);
     port_unlock();
     if (taken) {
+        chunk_records_taken_over(&stream->records);
         chunk_ring_free_oldest(&stream->ring, (const uint8_t *)next);
         stream->waits = false;
         enter(stream, next);
@@ -355,7 +347,11 @@ void stream_process(struct stream *stream, struct machine *machine)
     bool again = stream->started;
     while (again && stream->executed != NULL) {
         note_state(stream, machine);
-        again = stream->executed != NULL && !is_over(stream) && take_next_over(stream, machine);
+        again = stream->executed != NULL && !is_over(stream);
+        if (again) {
+            chunk_records_go_on(&stream->records, machine, &stream->executed->chunk.program);
+            again = take_next_over(stream, machine);
+        }
     }
 }
 
@@ -366,25 +362,10 @@ uint32_t stream_hold_worst_us(const struct stream *stream)
     return stream->executed != NULL ? stream->executed->chunk.program.header.hold_worst_us : 0u;
 }
 
-/* Of bytes in the ring, those that are left for a chunk beside its records, whatever it consists of. */
-static uint32_t share_of(uint64_t room, uint32_t image_size, uint32_t record_size)
+uint32_t stream_free_bytes(const struct stream *stream)
 {
-    return (uint32_t)qmath_div_u64(room * image_size, (uint64_t)image_size + record_size);
-}
-
-uint32_t stream_free_bytes(const struct stream *stream, const struct config *config)
-{
-    const struct kernel *kernel = kernel_find(config->kernel);
     const uint32_t room = chunk_ring_room(&stream->ring);
-    if (kernel == NULL || room <= HEAD_SIZE) {
-        return 0;
-    }
-    const uint32_t axes = config->axis_count < PROGRAM_PLANE ? PROGRAM_PLANE : config->axis_count;
-    const uint32_t of_pieces = share_of(room - HEAD_SIZE, PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE,
-                                        coefficients_piece_size(kernel));
-    const uint32_t of_segments = share_of(room - HEAD_SIZE, program_segment_size(axes),
-                                          coefficients_segment_size(kernel, axes));
-    return of_pieces < of_segments ? of_pieces : of_segments;
+    return room > HEAD_SIZE ? room - HEAD_SIZE : 0u;
 }
 
 static uint64_t time_now_q32_s(const struct stream *stream, const struct machine *machine)

@@ -2,7 +2,8 @@
 /*
  * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
  *
- * Chunks are downloaded in order to a ring in RAM, checked there as strictly as a program, and given coefficient records.
+ * Chunks are downloaded in order to a ring in RAM, and checked there as strictly as a program. Coefficient records are made
+ * of what is near the motion only (app/chunk_records.h).
  * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
  * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
  * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
@@ -21,6 +22,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "app/chunk_records.h"
 #include "app/chunk_ring.h"
 #include "app/machine/config.h"
 #include "app/machine/machine.h"
@@ -59,6 +61,7 @@ struct stream {
     void *self;
 
     struct chunk_ring ring;
+    struct chunk_records records;
     struct stream_chunk *executed; /* NULL: no chunks are kept */
     struct stream_chunk *newest;   /* accepted last; executed ... newest are linked */
     uint8_t *receiving;            /* the block of the download under way; NULL: none */
@@ -93,19 +96,20 @@ static inline bool stream_is_open(const struct stream *stream)
 }
 
 /* Prepares the start of the job. MACHINE_ACCEPTED, or why it cannot be. */
-enum machine_refusal stream_prepare(const struct stream *stream, const struct config *config,
+enum machine_refusal stream_prepare(struct stream *stream, const struct config *config,
                                     struct motion *prepared, int32_t start_counts[AXES_MAX]);
 /* machine_start has accepted it. */
 void stream_started(struct stream *stream);
 
-/* A round: takes the next chunk over where it can be; notes underrun and end. Short; also to be called from `attend`. */
+/* A round: makes records further on, takes the next chunk over where it can be; notes underrun and end. Short; also to be called
+ * from `attend`. */
 void stream_process(struct stream *stream, struct machine *machine);
 
 /* The longest hold of the program that is executed, us; 0: none is. */
 uint32_t stream_hold_worst_us(const struct stream *stream);
 
 /* Object 0x2060 subs 7, 8, 11, 12. */
-uint32_t stream_free_bytes(const struct stream *stream, const struct config *config);
+uint32_t stream_free_bytes(const struct stream *stream);
 uint32_t stream_committed_ms(const struct stream *stream, const struct machine *machine);
 int64_t stream_arc_length_q40_mm(const struct stream *stream, const struct machine *machine);
 uint32_t stream_remaining_ms(const struct stream *stream, const struct machine *machine);

@@ -233,6 +233,8 @@ int chunk_check(struct chunk *next, const struct chunk *previous,
     }
     own.chunk = 1;
     if (fault->code == 0 && program_check(&next->program, &own, fault) == 0) {
+        next->joint_time_q32_s =
+            next->time_shift_q32_s + time_of_piece_q32_s(&next->program, next->shared_pieces);
         override_bounds_of(&next->least, &next->program, 0, next->program.header.piece_count);
         interpolator_exact_end(&next->program, &next->end);
     }

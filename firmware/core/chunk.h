@@ -55,6 +55,7 @@ struct chunk {
     uint32_t rest_flags;       /* CHUNK_REST_STOP, CHUNK_REST_OPTIONAL */
     struct program program;
     /* What a takeover needs of the whole program, made by chunk_check: */
+    uint64_t joint_time_q32_s;     /* program time of the joint in the predecessor, */
     struct program_override least; /* the least override bounds of its pieces, */
     struct interpolator_point end; /* and its exact end point */
 };

@@ -19,16 +19,23 @@ uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
                                         coefficients_segment_size(kernel, p->header.axis_count);
 }
 
-static void look_ahead(struct program_override ahead[OVERRIDE_WINDOWS], const struct program *p,
-                       uint32_t i)
+/* Bounds of the windows, and their ends: of that with the last piece none. */
+static void look_ahead(struct coefficients_piece *out, const struct program *p, uint32_t i)
 {
+    uint64_t end_q32_s = qmath_q32_of_q42(out->start_q42_s);
+    uint32_t behind = i;
     for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
-        override_bounds_of(&ahead[k], p, i, override_window_pieces(k));
+        const uint32_t pieces = override_window_pieces(k);
+        override_bounds_of(&out->ahead[k], p, i, pieces);
+        for (; behind - i < pieces && behind < p->header.piece_count; behind++) {
+            end_q32_s += program_piece_duration(p, behind);
+        }
+        out->ahead_end_q32_s[k] = behind < p->header.piece_count ? end_q32_s : UINT64_MAX;
     }
 }
 
-static void make_piece(struct coefficients_piece *out, const struct program *p,
-                       const struct kernel *kernel, uint32_t i, uint64_t start_q42_s)
+void coefficients_make_piece(struct coefficients_piece *out, const struct program *p,
+                             const struct kernel *kernel, uint32_t i, uint64_t start_q42_s)
 {
     struct program_piece piece;
     program_piece_get(p, i, &piece);
@@ -36,12 +43,14 @@ static void make_piece(struct coefficients_piece *out, const struct program *p,
     out->end_q42_s = i + 1u == p->header.piece_count
                          ? qmath_q42_of_q32(p->header.duration_q32_s)
                          : start_q42_s + qmath_q42_of_q32(piece.duration_q32_s);
-    look_ahead(out->ahead, p, i);
+    out->next = 0;
+    out->number = i;
+    look_ahead(out, p, i);
     kernel->piece_set(&out->feed, &piece);
 }
 
-static void make_segment(struct coefficients_segment *out, const struct program *p,
-                         const struct kernel *kernel, uint32_t i)
+void coefficients_make_segment(struct coefficients_segment *out, const struct program *p,
+                               const struct kernel *kernel, uint32_t i)
 {
     struct program_segment segment;
     struct ph_segment ph;
@@ -50,6 +59,9 @@ static void make_segment(struct coefficients_segment *out, const struct program 
     out->from_q40_mm = i == 0 ? INT64_MIN : segment.start_q40_mm;
     out->to_q40_mm =
         i + 1u == p->header.segment_count ? INT64_MAX : program_segment_start(p, i + 1u);
+    out->next = 0;
+    out->back = 0;
+    out->number = i;
     kernel_path(kernel, ph.axis_count)->segment_set(&out->path, &ph);
 }
 
@@ -61,21 +73,38 @@ int coefficients_make(const struct program *p, const struct kernel *kernel, coef
         struct coefficients_segment segment;
         uint8_t bytes[sizeof(struct coefficients_segment)];
     } record;
+    const uint32_t piece_size = coefficients_piece_size(kernel);
+    const uint32_t segment_size = coefficients_segment_size(kernel, p->header.axis_count);
     uint64_t start_q42_s = 0;
     int error = 0;
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.piece_count; i++) {
-        make_piece(&record.piece, p, kernel, i, start_q42_s);
+        coefficients_make_piece(&record.piece, p, kernel, i, start_q42_s);
         start_q42_s = record.piece.end_q42_s;
-        error = sink(context, record.bytes, coefficients_piece_size(kernel));
+        record.piece.next = i + 1u < p->header.piece_count ? (int32_t)piece_size : 0;
+        error = sink(context, record.bytes, piece_size);
     }
     memset(&record, 0, sizeof record);
     for (uint32_t i = 0; error == 0 && i < p->header.segment_count; i++) {
-        make_segment(&record.segment, p, kernel, i);
-        error =
-            sink(context, record.bytes, coefficients_segment_size(kernel, p->header.axis_count));
+        coefficients_make_segment(&record.segment, p, kernel, i);
+        record.segment.next = (int16_t)(i + 1u < p->header.segment_count ? segment_size : 0u);
+        record.segment.back = (int16_t)(i > 0u ? -(int32_t)segment_size : 0);
+        error = sink(context, record.bytes, segment_size);
     }
     return error;
+}
+
+void coefficients_window_of(struct coefficients_window *out, const struct program *p)
+{
+    const struct kernel *kernel = p->coefficients_for;
+    out->kernel = kernel;
+    out->pieces = p->coefficients;
+    out->segments = p->coefficients + pieces_size(p, kernel);
+    out->segment_step = (int32_t)coefficients_segment_size(kernel, p->header.axis_count);
+    out->first_piece = 0;
+    out->piece_count = p->header.piece_count;
+    out->first_segment = 0;
+    out->segment_count = p->header.segment_count;
 }
 
 void coefficients_attach(struct program *p, const struct kernel *kernel, const uint8_t *records)

@@ -4,8 +4,11 @@
  * crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Precomputed coefficients").
  *
  * The records are made by the controller itself from a program that has passed program_check; they are never uploaded.
- * Layout: those of the pieces, then those of the segments, each of one size. They hold native structs: for the binary
- * that made them and no other. Any context but where it says otherwise.
+ * They hold native structs: for the binary that made them and no other. Any context but where it says otherwise.
+ *
+ * A tick goes from record to record by the links in them. So it needs a window of records round its place, and no more:
+ * all of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). Where a window ends before
+ * the program does, the link is 0, and a tick that would have to go on is refused (INTERPOLATOR_ERR_JUMP).
  */
 #ifndef HODOGRAPH_CORE_COEFFICIENTS_H
 #define HODOGRAPH_CORE_COEFFICIENTS_H
@@ -28,8 +31,12 @@
 /* A record ends behind the kernel's own part. */
 struct coefficients_piece {
     uint64_t start_q42_s;
-    uint64_t end_q42_s;                              /* of the last piece the duration */
-    struct program_override ahead[OVERRIDE_WINDOWS]; /* of the windows that begin with it */
+    uint64_t end_q42_s; /* of the last piece the duration */
+    int32_t next;       /* bytes from this record to that of the next piece; 0: it is not there */
+    uint32_t number;    /* of the piece */
+    uint64_t ahead_end_q32_s[OVERRIDE_WINDOWS]; /* of the windows that begin with it: their end,
+                                                        UINT64_MAX with the last piece, */
+    struct program_override ahead[OVERRIDE_WINDOWS]; /* and their least bounds */
     union {
         struct feed_piece integers;
         struct kernel_double_piece doubles;
@@ -39,6 +46,9 @@ struct coefficients_piece {
 struct coefficients_segment {
     int64_t from_q40_mm; /* arc lengths that belong to it: from here, INT64_MIN in the first, */
     int64_t to_q40_mm;   /* to below here, INT64_MAX in the last */
+    int16_t next;    /* bytes from this record to that of the next segment; 0: it is not there; */
+    int16_t back;    /* and to that of the one before */
+    uint32_t number; /* of the segment */
     union {
         struct kernel_fixed_segment fixed;
         struct kernel_float_segment floats;
@@ -68,7 +78,7 @@ uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
 /* Takes the next bytes of the records; 0 or a negative error. */
 typedef int coefficients_sink(void *context, const uint8_t *bytes, uint32_t size);
 
-/* Makes all records, in order. Gives the sink's first error, or 0. Main loop; linear. */
+/* Makes all records, in order: those of the pieces, then those of the segments, each of one size. Gives the sink's first error, or 0. Main loop; linear. */
 int coefficients_make(const struct program *p, const struct kernel *kernel, coefficients_sink *sink,
                       void *context);
 
@@ -97,12 +107,71 @@ coefficients_segment_at(const struct program *p, const struct kernel *kernel, ui
     return (const struct coefficients_segment *)at;
 }
 
-/* The piece behind one that is not the last. */
+/* The record that a link leads to: itself where the link is 0. */
 static inline const struct coefficients_piece *
-coefficients_piece_next(const struct coefficients_piece *piece, const struct kernel *kernel)
+coefficients_piece_next(const struct coefficients_piece *piece)
 {
-    const void *at = (const uint8_t *)piece + coefficients_piece_size(kernel);
+    const void *at = (const uint8_t *)piece + piece->next;
+    return (const struct coefficients_piece *)at; /* C++ wants the cast */
+}
+
+static inline const struct coefficients_segment *
+coefficients_segment_next(const struct coefficients_segment *segment)
+{
+    const void *at = (const uint8_t *)segment + segment->next;
+    return (const struct coefficients_segment *)at;
+}
+
+static inline const struct coefficients_segment *
+coefficients_segment_back(const struct coefficients_segment *segment)
+{
+    const void *at = (const uint8_t *)segment + segment->back;
+    return (const struct coefficients_segment *)at;
+}
+
+/* --- A window: records of some pieces and segments of a program, each without gaps --- */
+
+struct coefficients_window {
+    const struct kernel *kernel;
+    const uint8_t *pieces;   /* the record of the first piece, the others behind it; */
+    const uint8_t *segments; /* of the first segment, */
+    int32_t segment_step;    /* and bytes from each to the next one */
+    uint32_t first_piece;
+    uint32_t piece_count;
+    uint32_t first_segment;
+    uint32_t segment_count;
+};
+
+/* All records of a program that has them. */
+void coefficients_window_of(struct coefficients_window *out, const struct program *p);
+
+/* The record of a piece or a segment; NULL: it is not in the window. */
+static inline const struct coefficients_piece *
+coefficients_window_piece(const struct coefficients_window *w, uint32_t i)
+{
+    const void *at = NULL;
+    if (i - w->first_piece < w->piece_count) { /* below the first one it wraps */
+        at = w->pieces + (size_t)(i - w->first_piece) * coefficients_piece_size(w->kernel);
+    }
     return (const struct coefficients_piece *)at;
 }
+
+static inline const struct coefficients_segment *
+coefficients_window_segment(const struct coefficients_window *w, uint32_t i)
+{
+    const void *at = NULL;
+    if (i - w->first_segment < w->segment_count) {
+        at = w->segments + (ptrdiff_t)(i - w->first_segment) * w->segment_step;
+    }
+    return (const struct coefficients_segment *)at;
+}
+
+/* --- One record each; its links are 0. Main loop. --- */
+
+/* Of a piece that begins at this program time. */
+void coefficients_make_piece(struct coefficients_piece *out, const struct program *p,
+                             const struct kernel *kernel, uint32_t i, uint64_t start_q42_s);
+void coefficients_make_segment(struct coefficients_segment *out, const struct program *p,
+                               const struct kernel *kernel, uint32_t i);
 
 #endif

@@ -29,15 +29,21 @@ enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 #define UM_PER_MM 1000u
 #define US_PER_S  1000000u
 
+/* The clock has been set. */
+static void begin(struct feed_override *f, const struct program *p)
+{
+    override_plan_begin(&f->plan, p);
+    f->phase = PHASE_PLAN;
+    f->state = f->clock.time_q42_s == f->clock.duration_q42_s ? FEED_ENDED : FEED_RUNNING;
+    f->at_end = FEED_ENDED;
+}
+
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s)
 {
     memset(f, 0, sizeof *f);
     program_clock_begin(&f->clock, p, period_us, time_q42_s);
-    override_plan_begin(&f->plan, p);
-    f->phase = PHASE_PLAN;
-    f->state = f->clock.time_q42_s == f->clock.duration_q42_s ? FEED_ENDED : FEED_RUNNING;
-    f->at_end = FEED_ENDED;
+    begin(f, p);
 }
 
 /* What each state becomes at the end of a tail. */
@@ -63,9 +69,13 @@ static void goes_on(struct feed_override *f, const struct chunk *chunk)
     set_state(f, f->state);
 }
 
-void feed_override_begin_job(struct feed_override *f, const struct chunk *first, uint32_t period_us)
+void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
+                             const struct coefficients_window *window, uint32_t period_us)
 {
-    feed_override_begin(f, &first->program, period_us, 0);
+    memset(f, 0, sizeof *f);
+    program_clock_begin_at_piece(&f->clock, &first->program, period_us,
+                                 coefficients_window_piece(window, 0));
+    begin(f, &first->program);
     goes_on(f, first);
 }
 
@@ -258,8 +268,7 @@ static int brake_tick(struct feed_override *f, struct interpolator *it)
     path_brake_step(&f->brake);
     const int result = interpolate_brake(f, it);
     if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
-        interpolator_search_begin(&f->place, f->clock.record, f->clock.piece,
-                                  f->point.arc_length_q40_mm);
+        interpolator_search_begin(&f->place, f->clock.piece, f->point.arc_length_q40_mm);
         come_to_rest(f, 0);
     }
     return result;
@@ -455,12 +464,8 @@ static int is_shared(const struct feed_override *f, const struct chunk *next)
 /* The plan goes on, and what is on its way was decided with pieces before the joint. */
 static int may_take_over_moving(const struct feed_override *f, const struct chunk *next)
 {
-    const uint64_t joint_q42_s =
-        coefficients_piece_at(f->clock.program, f->clock.program->coefficients_for,
-                              next->piece_shift + next->shared_pieces)
-            ->start_q42_s;
     return f->state == FEED_RUNNING && is_shared(f, next) &&
-           override_plan_ends_by(&f->plan, qmath_q32_of_q42(joint_q42_s));
+           override_plan_ends_by(&f->plan, next->joint_time_q32_s);
 }
 
 static int may_take_over_resting(const struct feed_override *f, const struct chunk *next)
@@ -469,51 +474,127 @@ static int may_take_over_resting(const struct feed_override *f, const struct chu
                               program_piece_start(&next->program, 0);
 }
 
-/* A chunk behind a rest: at its start, as a program begins. A path that is held waits. */
-static int begin_at_rest(struct feed_override *f, struct interpolator *it, const struct chunk *next)
+/* A chunk behind a rest: at the end of its predecessor. A path that is held waits. */
+static int may_begin_next(const struct feed_override *f)
 {
-    if (f->phase != PHASE_PLAN || f->state != STATE_WAITING) {
-        return 0;
+    return f->phase == PHASE_PLAN && f->state == STATE_WAITING;
+}
+
+static int may_take_over(const struct feed_override *f, const struct chunk *next)
+{
+    if (chunk_begins_at_rest(next)) {
+        return may_begin_next(f);
     }
-    f->point.arc_length_q40_mm = 0;
-    program_clock_begin(&f->clock, &next->program, f->clock.period_us, 0);
-    (void)interpolator_begin(it, &next->program);
+    return f->goes_on != 0u && f->phase != PHASE_BRAKE &&
+           (rests(f) ? may_take_over_resting(f, next) : may_take_over_moving(f, next));
+}
+
+/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the first
+ * piece. */
+static void place_in_next(const struct feed_override *f, const struct interpolator *it,
+                          const struct chunk *next, struct feed_place *place)
+{
+    if (chunk_begins_at_rest(next)) {
+        *place = (struct feed_place){.piece = 0};
+        return;
+    }
+    const int resting = rests(f);
+    const uint32_t segment = it->segment->number;
+    place->piece = resting ? 0u : f->clock.piece - next->piece_shift;
+    place->segment = segment > next->segment_shift ? segment - next->segment_shift : 0u;
+    place->arc_length_q40_mm = f->point.arc_length_q40_mm - next->arc_shift_q40_mm;
+    place->by_arc = resting ? 1u : 0u;
+}
+
+int feed_override_may_take_over(const struct feed_override *f, const struct interpolator *it,
+                                const struct chunk *next, struct feed_place *place)
+{
+    place_in_next(f, it, next, place);
+    return may_take_over(f, next);
+}
+
+/* At rest: on from the same arc length, once its time is found. */
+static void rest_in_next(struct feed_override *f)
+{
+    interpolator_search_begin(&f->place, 0, f->point.arc_length_q40_mm);
+    f->phase = PHASE_REST;
+    f->found = 0;
+    f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
+}
+
+/* As a program begins. */
+static void begin_next(struct feed_override *f, const struct chunk *next,
+                       const struct coefficients_piece *first)
+{
+    program_clock_begin_at_piece(&f->clock, &next->program, f->clock.period_us, first);
     override_plan_begin_next(&f->plan, &next->least);
     f->state = FEED_RUNNING;
+}
+
+static void go_on_in_next(struct feed_override *f, const struct chunk *next,
+                          const struct feed_place *at, const struct coefficients_piece *record)
+{
+    const int resting = at->by_arc != 0u;
+    /* at rest at its start until the place is found */
+    program_clock_carry(&f->clock, &next->program,
+                        resting ? f->clock.time_q42_s : qmath_q42_of_q32(next->time_shift_q32_s),
+                        at->piece, record);
+    override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
+    if (resting) {
+        rest_in_next(f);
+    }
+}
+
+int feed_override_take_over(struct feed_override *f, struct interpolator *it,
+                            const struct chunk *next, const struct coefficients_window *window)
+{
+    struct feed_place at;
+    place_in_next(f, it, next, &at);
+    const struct coefficients_piece *record = coefficients_window_piece(window, at.piece);
+    const struct coefficients_segment *segment =
+        interpolator_segment_in(window, at.segment, at.arc_length_q40_mm);
+    if (!may_take_over(f, next) || segment == NULL || (at.by_arc == 0u && record == NULL)) {
+        return 0;
+    }
+    f->point.arc_length_q40_mm = at.arc_length_q40_mm;
+    interpolator_carry(it, &next->program, window, segment, &next->end);
+    if (chunk_begins_at_rest(next)) {
+        begin_next(f, next, record);
+    } else {
+        go_on_in_next(f, next, &at, record);
+    }
     goes_on(f, next);
     return 1;
 }
 
-int feed_override_take_over(struct feed_override *f, struct interpolator *it,
-                            const struct chunk *next)
+/* --- Its records --- */
+
+void feed_override_place(const struct feed_override *f, const struct interpolator *it,
+                         struct feed_place *place)
 {
-    if (chunk_begins_at_rest(next)) {
-        return begin_at_rest(f, it, next);
-    }
-    const struct program *p = &next->program;
-    const int resting = rests(f);
-    uint64_t shift_q42_s = qmath_q42_of_q32(next->time_shift_q32_s);
-    uint32_t piece = 0;
-    if (f->goes_on == 0u || f->phase == PHASE_BRAKE ||
-        !(resting ? may_take_over_resting(f, next) : may_take_over_moving(f, next))) {
+    const int found = f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
+    place->piece = f->phase == PHASE_REST && !found ? f->place.piece_index : f->clock.piece;
+    place->segment = it->segment->number;
+    place->arc_length_q40_mm = f->point.arc_length_q40_mm;
+    place->by_arc = found ? 0u : 1u;
+}
+
+/* While it is looked for where the motion rests, no piece is needed but that which is bisected; in a brake, none. */
+int feed_override_use(struct feed_override *f, struct interpolator *it,
+                      const struct coefficients_window *window)
+{
+    const int bisects = f->phase == PHASE_REST && f->found == 0 && f->place.bisecting != 0;
+    const int plan = f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
+    const uint32_t piece = bisects ? f->place.piece_index : f->clock.piece;
+    const struct coefficients_piece *record = coefficients_window_piece(window, piece);
+    if (((bisects || plan) && record == NULL) ||
+        coefficients_window_segment(window, it->segment->number) == NULL) {
         return 0;
     }
-    f->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
-    if (resting) {
-        shift_q42_s = f->clock.time_q42_s; /* at its start until the place is found */
-    } else {
-        piece = f->clock.piece - next->piece_shift;
-    }
-    program_clock_carry(&f->clock, p, shift_q42_s, piece);
-    interpolator_carry(it, p, &next->end, next->segment_shift, piece, f->point.arc_length_q40_mm);
-    override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
-    if (resting) {
-        interpolator_search_begin(&f->place, f->clock.record, 0, f->point.arc_length_q40_mm);
-        f->phase = PHASE_REST;
-        f->found = 0;
-        f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
-    }
-    goes_on(f, next);
+    override_plan_let_go(&f->plan);
+    f->clock.record = record;
+    f->place.piece = record;
+    interpolator_use(it, window);
     return 1;
 }
 

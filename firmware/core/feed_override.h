@@ -66,20 +66,56 @@ struct feed_override {
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
-/* The same for the first chunk of a job, from its start. The override stays at or below 100 % until the last chunk. */
+/* The same for the first chunk of a job, from its start, with these records, which have its first piece and segment
+ * (interpolator_begin_window). The override stays at or below 100 % until the last chunk. */
 void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
-                             uint32_t period_us);
+                             const struct coefficients_window *window, uint32_t period_us);
 
-/* Takes the next chunk, which chunk_check has accepted behind the one under way and which has coefficient records for the
+/* --- The records near the motion (core/coefficient_cache.h), main loop with the tick held off --- */
+
+/* Where the motion needs records: in this piece and this segment, and in what comes behind them. */
+struct feed_place {
+    uint32_t piece;
+    uint32_t segment;
+    int64_t arc_length_q40_mm;
+    uint32_t
+        by_arc; /* 1: the piece is to be looked for from this one on, as that of the arc length */
+};
+
+void feed_override_place(const struct feed_override *f, const struct interpolator *it,
+                         struct feed_place *place);
+
+/* Goes on with these records of the program under way. 1, or 0: they do not have what the next tick needs, and nothing has
+ * changed. After 1 the records before are no longer in use. Constant time. */
+int feed_override_use(struct feed_override *f, struct interpolator *it,
+                      const struct coefficients_window *window);
+
+/* 1: half of the records of the window are behind, and the program goes on behind it. Also in the tick. */
+static inline int feed_override_wants_records(const struct feed_override *f,
+                                              const struct interpolator *it)
+{
+    const struct coefficients_window *w = &it->window;
+    const struct program_header *h = &it->program->header;
+    return (f->clock.piece >= w->first_piece + w->piece_count / 2u &&
+            w->first_piece + w->piece_count < h->piece_count) ||
+           (it->segment->number >= w->first_segment + (w->segment_count + 1u) / 2u &&
+            w->first_segment + w->segment_count < h->segment_count);
+}
+
+/* 1: feed_override_take_over takes the next chunk now, with records of it for this place. */
+int feed_override_may_take_over(const struct feed_override *f, const struct interpolator *it,
+                                const struct chunk *next, struct feed_place *place);
+
+/* Takes the next chunk, which chunk_check has accepted behind the one under way and of which these records are there, for the
  * same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those of the
  * program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a ramp or is on
  * one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from the same arc length;
  * the motion goes on when it is running and the place is found, with the override from 0. A chunk that begins at rest: at the end
  * of its predecessor, running; the next tick gives its first setpoint, as of a program.
- * Returns 1, or 0: not now, and nothing has changed; try again after the next tick. After 1 the program before is no longer
- * in use. Main loop with the tick held off; constant time. */
+ * Returns 1, or 0: not now, or not with these records, and nothing has changed; try again after the next tick. After 1 the
+ * program before and its records are no longer in use. Constant time. */
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,
-                            const struct chunk *next);
+                            const struct chunk *next, const struct coefficients_window *window);
 
 /* --- Commands: take effect from the next tick. Any sequence is allowed. Constant time. --- */
 

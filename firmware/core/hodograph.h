@@ -112,6 +112,7 @@ extern "C" {
 #endif
 
 #include "core/chunk.h"
+#include "core/coefficient_cache.h"
 #include "core/coefficients.h"
 #include "core/counts.h"
 #include "core/feed_override.h"

@@ -27,13 +27,11 @@ static int find_piece(struct interpolator *it, uint64_t time_q42_s, uint32_t mos
     if (time_q42_s < piece->start_q42_s) {
         return INTERPOLATOR_ERR_JUMP;
     }
-    const struct coefficients_piece *last =
-        coefficients_piece_at(it->program, it->kernel, it->program->header.piece_count - 1u);
-    for (; piece != last && time_q42_s >= piece->end_q42_s; most--) {
-        if (most == 0) {
+    for (; time_q42_s >= piece->end_q42_s; most--) {
+        if (most == 0 || piece->next == 0) {
             return INTERPOLATOR_ERR_JUMP;
         }
-        piece = coefficients_piece_next(piece, it->kernel);
+        piece = coefficients_piece_next(piece);
     }
     it->piece = piece;
     return INTERPOLATOR_OK;
@@ -41,7 +39,6 @@ static int find_piece(struct interpolator *it, uint64_t time_q42_s, uint32_t mos
 
 static int step_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint32_t most)
 {
-    const uint32_t size = it->segment_size;
     const struct coefficients_segment *segment = it->segment;
     uint32_t left = most;
     if (arc_length_q40_mm >= segment->to_q40_mm) {
@@ -49,14 +46,14 @@ static int step_segment(struct interpolator *it, int64_t arc_length_q40_mm, uint
             if (left-- == 0) {
                 return INTERPOLATOR_ERR_JUMP;
             }
-            segment = (const void *)((const uint8_t *)segment + size);
+            segment = coefficients_segment_next(segment);
         } while (arc_length_q40_mm >= segment->to_q40_mm);
     } else {
         do {
             if (left-- == 0) {
                 return INTERPOLATOR_ERR_JUMP;
             }
-            segment = (const void *)((const uint8_t *)segment - size);
+            segment = coefficients_segment_back(segment);
         } while (arc_length_q40_mm < segment->from_q40_mm);
     }
     it->segment = segment;
@@ -124,41 +121,66 @@ void interpolator_ends(const struct program *p, const struct kernel *kernel,
     interpolator_exact_end(p, last);
 }
 
+void interpolator_begin_window(struct interpolator *it, const struct program *p,
+                               const struct coefficients_window *window)
+{
+    it->program = p;
+    it->kernel = window->kernel;
+    it->axis_count = p->header.axis_count;
+    it->segment_at = kernel_path(it->kernel, it->axis_count)->segment_at;
+    it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
+    it->length_q40_mm = p->header.length_q40_mm;
+    it->window = *window;
+    it->piece = coefficients_window_piece(window, 0);
+    it->segment = coefficients_window_segment(window, 0);
+    interpolator_exact_end(p, &it->end);
+}
+
 int interpolator_begin(struct interpolator *it, const struct program *p)
 {
+    struct coefficients_window all;
     if (p == NULL || p->image == NULL) {
         return INTERPOLATOR_ERR_PROGRAM;
     }
     if (p->coefficients_for == NULL) {
         return INTERPOLATOR_ERR_COEFFICIENTS;
     }
-    it->program = p;
-    it->kernel = p->coefficients_for;
-    it->axis_count = p->header.axis_count;
-    it->segment_at = kernel_path(it->kernel, it->axis_count)->segment_at;
-    it->segment_size = coefficients_segment_size(it->kernel, it->axis_count);
-    it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
-    it->length_q40_mm = p->header.length_q40_mm;
-    it->piece = coefficients_piece_at(p, it->kernel, 0);
-    it->segment = coefficients_segment_at(p, it->kernel, 0);
-    interpolator_exact_end(p, &it->end);
+    coefficients_window_of(&all, p);
+    interpolator_begin_window(it, p, &all);
     return 0;
 }
 
-void interpolator_carry(struct interpolator *it, const struct program *p,
-                        const struct interpolator_point *end, uint32_t segment_shift,
-                        uint32_t piece, int64_t arc_length_q40_mm)
+void interpolator_use(struct interpolator *it, const struct coefficients_window *window)
 {
-    const uint8_t *first = (const uint8_t *)coefficients_segment_at(it->program, it->kernel, 0);
-    const uint32_t present = (uint32_t)((const uint8_t *)it->segment - first) / it->segment_size;
-    const uint32_t index = present > segment_shift ? present - segment_shift : 0u;
+    it->segment = coefficients_window_segment(window, it->segment->number);
+    it->piece = coefficients_window_piece(window, window->first_piece);
+    it->window = *window;
+}
+
+const struct coefficients_segment *interpolator_segment_in(const struct coefficients_window *window,
+                                                           int64_t number,
+                                                           int64_t arc_length_q40_mm)
+{
+    struct interpolator at = {
+        .segment = coefficients_window_segment(window, number > 0 ? (uint32_t)number : 0u)};
+    return at.segment != NULL && find_segment(&at, arc_length_q40_mm, INTERPOLATOR_MOST_SEGMENTS) ==
+                                     INTERPOLATOR_OK
+               ? at.segment
+               : NULL;
+}
+
+void interpolator_carry(struct interpolator *it, const struct program *p,
+                        const struct coefficients_window *window,
+                        const struct coefficients_segment *segment,
+                        const struct interpolator_point *end)
+{
     it->program = p;
     it->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
     it->length_q40_mm = p->header.length_q40_mm;
-    it->piece = coefficients_piece_at(p, it->kernel, piece);
-    it->segment = coefficients_segment_at(p, it->kernel, index);
+    it->window = *window;
+    it->piece = coefficients_window_piece(window, window->first_piece);
+    it->segment = segment;
     it->end = *end;
-    (void)find_segment(it, arc_length_q40_mm, INTERPOLATOR_MOST_SEGMENTS);
 }
 
 /* Beyond the end of the piece: the last one ends with the program. */
@@ -226,38 +248,45 @@ int64_t interpolator_acceleration_q40(const struct interpolator *it,
     return it->kernel->piece_acceleration(&piece->feed, time_q42_s - piece->start_q42_s);
 }
 
-void interpolator_search_begin(struct interpolator_search *search,
-                               const struct coefficients_piece *piece, uint32_t index,
+void interpolator_search_begin(struct interpolator_search *search, uint32_t index,
                                int64_t arc_length_q40_mm)
 {
     search->arc_length_q40_mm = arc_length_q40_mm;
     search->time_q42_s = 0;
-    search->piece = piece;
+    search->piece = NULL;
     search->piece_index = index;
     search->bisecting = 0;
 }
 
-int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search)
+/* On by a piece, or into it. */
+static void find_place(const struct interpolator *it, struct interpolator_search *search)
 {
     const struct program *p = it->program;
-    const struct coefficients_piece *piece = search->piece;
+    const uint32_t next = search->piece_index + 1u;
+    if (next < p->header.piece_count && program_piece_start(p, next) <= search->arc_length_q40_mm) {
+        search->piece_index = next;
+        return;
+    }
+    const struct coefficients_piece *piece =
+        coefficients_window_piece(&it->window, search->piece_index);
+    if (piece != NULL) {
+        search->piece = piece;
+        search->low_q42_s = piece->start_q42_s;
+        search->high_q42_s = piece->end_q42_s - 1u;
+        search->bisecting = 1;
+    }
+}
+
+int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search)
+{
     if (search->bisecting == 0) {
-        const uint32_t next = search->piece_index + 1u;
-        if (next < p->header.piece_count &&
-            program_piece_start(p, next) <= search->arc_length_q40_mm) {
-            search->piece_index = next;
-            search->piece = coefficients_piece_next(piece, it->kernel);
-        } else {
-            search->low_q42_s = piece->start_q42_s;
-            search->high_q42_s = piece->end_q42_s - 1u;
-            search->bisecting = 1;
-        }
+        find_place(it, search);
         return 0;
     }
     if (search->low_q42_s < search->high_q42_s) {
         struct feed_point f;
         const uint64_t middle = search->low_q42_s + (search->high_q42_s - search->low_q42_s) / 2u;
-        evaluate_feed(it, piece, middle, &f);
+        evaluate_feed(it, search->piece, middle, &f);
         if (f.arc_length_q40_mm >= search->arc_length_q40_mm) {
             search->high_q42_s = middle;
         } else {
@@ -281,7 +310,7 @@ int interpolator_seek(struct interpolator *it, uint64_t time_q32_s)
     const uint64_t time_q42_s = qmath_q42_of_q32(time_q32_s < last_q32_s ? time_q32_s : last_q32_s);
     struct feed_point f;
     if (time_q42_s < it->piece->start_q42_s) {
-        it->piece = coefficients_piece_at(it->program, it->kernel, 0);
+        it->piece = coefficients_window_piece(&it->window, 0);
     }
     find_piece(it, time_q42_s, UINT32_MAX);
     evaluate_feed(it, it->piece, time_q42_s, &f);

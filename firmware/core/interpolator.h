@@ -24,7 +24,7 @@ enum interpolator_result {
     INTERPOLATOR_ERR_COEFFICIENTS = -1, /* the program has no coefficient records */
     INTERPOLATOR_ERR_PROGRAM = -2,      /* no program */
     INTERPOLATOR_ERR_JUMP =
-        -3, /* time is before the cursor, or more than two ends ahead: seek first */
+        -3, /* time is before the cursor, or more than two ends ahead: seek first; or a record is not there */
 };
 
 /* Segment ends that a tick may cross by arc length. */
@@ -58,34 +58,48 @@ static inline void interpolator_point_copy(struct interpolator_point *out,
     }
 }
 
-/* Caller allocates (about 0.1 KiB); contents private. */
+/* Caller allocates (about 0.2 KiB); contents private. */
 struct interpolator {
     const struct program *program;
     const struct kernel *kernel;
     void (*segment_at)(const void *segment, int64_t position_q40[],
                        int64_t arc_length_q40_mm); /* of the kernel, for
                                                                         the program's axes */
-    uint32_t segment_size;                         /* of a record */
     uint32_t axis_count;
     const struct coefficients_piece *piece; /* the present ones */
     const struct coefficients_segment *segment;
     uint64_t duration_q42_s;
     int64_t length_q40_mm;
-    struct interpolator_point end; /* the exact end point */
+    struct interpolator_point end;     /* the exact end point */
+    struct coefficients_window window; /* the records that there are */
 };
 
 /* Starts at time 0. Returns 0 or INTERPOLATOR_ERR_... Main loop. */
 int interpolator_begin(struct interpolator *it, const struct program *p);
 
+/* The same for a program of which these records are there; those of its first piece and segment are. Main loop. */
+void interpolator_begin_window(struct interpolator *it, const struct program *p,
+                               const struct coefficients_window *window);
+
+/* Goes on with these records of the same program, which have the present segment. Main loop; constant time. */
+void interpolator_use(struct interpolator *it, const struct coefficients_window *window);
+
 /* First and last point of a program, with coefficient records or without. Main loop. */
 void interpolator_ends(const struct program *p, const struct kernel *kernel,
                        struct interpolator_point *first, struct interpolator_point *last);
 
-/* Goes on in another program for the same kernel, which has the present segment of this one, `segment_shift` numbers lower, and
- * this exact end point; at this arc length and in this piece of the other. Main loop; constant time. */
+/* The record of the segment with this arc length, at most INTERPOLATOR_MOST_SEGMENTS from that of this number (0 for one below 0);
+ * NULL: the window does not have both, and those between. Main loop; bounded time. */
+const struct coefficients_segment *interpolator_segment_in(const struct coefficients_window *window,
+                                                           int64_t number,
+                                                           int64_t arc_length_q40_mm);
+
+/* Goes on in another program for the same kernel and axes, which has these records and this exact end point, in this segment
+ * of it. Main loop; constant time. */
 void interpolator_carry(struct interpolator *it, const struct program *p,
-                        const struct interpolator_point *end, uint32_t segment_shift,
-                        uint32_t piece, int64_t arc_length_q40_mm);
+                        const struct coefficients_window *window,
+                        const struct coefficients_segment *segment,
+                        const struct interpolator_point *end);
 
 /* Only the last point. */
 void interpolator_exact_end(const struct program *p, struct interpolator_point *end);
@@ -118,20 +132,19 @@ int64_t interpolator_acceleration_q40(const struct interpolator *it,
 struct interpolator_search {
     int64_t arc_length_q40_mm;
     uint64_t time_q42_s;                    /* when it is found */
-    const struct coefficients_piece *piece; /* that it lies in */
+    const struct coefficients_piece *piece; /* that it lies in, once it is known */
     uint32_t piece_index;
     uint32_t bisecting; /* the piece is known; the time is between these two, from its start: */
     uint64_t low_q42_s;
     uint64_t high_q42_s;
 };
 
-/* Looks from piece `index` on, of which this is the record; it begins at or before the arc length. */
-void interpolator_search_begin(struct interpolator_search *search,
-                               const struct coefficients_piece *piece, uint32_t index,
+/* Looks from piece `index` on; it begins at or before the arc length. */
+void interpolator_search_begin(struct interpolator_search *search, uint32_t index,
                                int64_t arc_length_q40_mm);
 
-/* One step: goes on by a piece, or halves the time. 1 when it is found, else 0. Some 60 steps and one for each piece on
- * the way. Tick context; bounded time. */
+/* One step: goes on by a piece of the image, or halves the time. 1 when it is found, else 0. Some 60 steps and one for each
+ * piece on the way; it waits where the record of the piece is not there. Tick context; bounded time. */
 int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search);
 
 /* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of

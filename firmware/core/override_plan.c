@@ -74,6 +74,14 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->searched = NOWHERE;
 }
 
+void override_plan_let_go(struct override_plan *plan)
+{
+    if (plan->ahead.bounds != NULL) {
+        plan->kept = *plan->ahead.bounds;
+        plan->ahead.bounds = &plan->kept;
+    }
+}
+
 void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
 {
     override_plan_carry(plan, least, 0);
@@ -123,16 +131,8 @@ static int64_t wanted_override(const struct override_plan *plan)
 void override_window_get(struct override_window *w, const struct program_clock *clock,
                          uint32_t window)
 {
-    const struct program *p = clock->program;
-    const uint32_t behind = override_window_pieces(window) - 1u;
-    const uint32_t left = p->header.piece_count - 1u - clock->piece;
     w->bounds = &clock->record->ahead[window];
-    w->end_q32_s = UINT64_MAX;
-    if (behind < left) {
-        const struct coefficients_piece *last =
-            coefficients_piece_at(p, p->coefficients_for, clock->piece + behind);
-        w->end_q32_s = qmath_q32_of_q42(last->end_q42_s);
-    }
+    w->end_q32_s = clock->record->ahead_end_q32_s[window];
 }
 
 static int64_t factor_q57(const struct override_window *w)

@@ -64,6 +64,7 @@ struct override_plan {
     uint32_t step;   /* of the search, enum override_search */
     uint32_t window; /* looked at next, */
     struct override_window ahead; /* and the one looked at */
+    struct program_override kept; /* its bounds, where their record is gone */
     uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* what is looked for, */
@@ -93,6 +94,9 @@ int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s)
  * rest, or where override_plan_ends_by accepts the time of its first new piece. */
 void override_plan_carry(struct override_plan *plan, const struct program_override *least,
                          uint64_t shift_q32_s);
+
+/* The records that the clock has had may go. */
+void override_plan_let_go(struct override_plan *plan);
 
 /* The path came to rest otherwise: the override goes on from 0. */
 void override_plan_rest(struct override_plan *plan);

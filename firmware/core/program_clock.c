@@ -35,15 +35,23 @@ static void set_time(struct program_clock *clock, uint64_t time_q42_s)
     clock->even_q62_s = 0;
 }
 
-void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
-                         uint64_t time_q42_s)
+void program_clock_begin_at_piece(struct program_clock *clock, const struct program *p,
+                                  uint32_t period_us, const struct coefficients_piece *first)
 {
     clock->program = p;
     clock->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
-    set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
+    set_time(clock, 0);
     set_period(clock, period_us);
     clock->piece = 0;
-    clock->record = coefficients_piece_at(p, p->coefficients_for, 0);
+    clock->record = first;
+}
+
+void program_clock_begin(struct program_clock *clock, const struct program *p, uint32_t period_us,
+                         uint64_t time_q42_s)
+{
+    program_clock_begin_at_piece(clock, p, period_us,
+                                 coefficients_piece_at(p, p->coefficients_for, 0));
+    set_time(clock, time_q42_s < clock->duration_q42_s ? time_q42_s : clock->duration_q42_s);
     if (clock->time_q42_s != clock->duration_q42_s &&
         clock->time_q42_s >= clock->record->end_q42_s) {
         program_clock_find_piece(clock, clock->time_q42_s, UINT32_MAX);
@@ -59,11 +67,11 @@ void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_
 }
 
 void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
-                         uint32_t piece)
+                         uint32_t piece, const struct coefficients_piece *record)
 {
     clock->program = p;
     clock->duration_q42_s = qmath_q42_of_q32(p->header.duration_q32_s);
     clock->time_q42_s -= shift_q42_s;
     clock->piece = piece;
-    clock->record = coefficients_piece_at(p, p->coefficients_for, piece);
+    clock->record = record;
 }

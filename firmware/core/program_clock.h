@@ -42,7 +42,8 @@ struct program_clock {
     uint64_t
         even_q62_s; /* program time of a tick whose override does not change; 0: not known yet */
     uint32_t piece; /* of the last tick, */
-    const struct coefficients_piece *record; /* and its coefficient record */
+    const struct coefficients_piece
+        *record; /* and its coefficient record; not in use while the program does not go on */
 };
 
 /* Sets the clock to a program time of a checked program with coefficient records; beyond the duration: to the duration.
@@ -54,10 +55,14 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
 
+/* Sets the clock to the start of a program whose first piece has this record. Main loop. */
+void program_clock_begin_at_piece(struct program_clock *clock, const struct program *p,
+                                  uint32_t period_us, const struct coefficients_piece *first);
+
 /* The same instant in a program that begins `shift` later, inside its piece of this number: what is left below 2^-42 s
- * stays. Main loop. */
+ * stays. `record` is that of the piece; NULL where program_clock_set comes before the next tick. Main loop. */
 void program_clock_carry(struct program_clock *clock, const struct program *p, uint64_t shift_q42_s,
-                         uint32_t piece);
+                         uint32_t piece, const struct coefficients_piece *record);
 
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
@@ -107,18 +112,19 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
 }
 
 /* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
- * ends at most. When they are not enough, the piece ends before the time, which interpolator_at_piece refuses. */
+ * ends at most. When they are not enough, or a record is not there, the piece ends before the time, which
+ * interpolator_at_piece refuses. */
 static inline void program_clock_find_piece(struct program_clock *clock, uint64_t time_q42_s,
                                             uint32_t most)
 {
     const struct coefficients_piece *record = clock->record;
     uint32_t left = most;
     do {
-        record = coefficients_piece_next(record, clock->program->coefficients_for);
+        record = coefficients_piece_next(record);
         left--;
     } while (time_q42_s >= record->end_q42_s && left > 0);
     clock->record = record;
-    clock->piece += most - left;
+    clock->piece = record->number;
 }
 
 /* The time is at or beyond the end of the present piece: goes to the piece that it is in, or stays at the duration. */

@@ -152,6 +152,9 @@ const uint8_t *port_store_data(unsigned bank);
  * Always the same. Main loop. */
 uint8_t *port_stream_memory(uint32_t *size);
 
+/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is streamed. */
+uint8_t *port_cache_memory(uint32_t *size);
+
 /* --- Words for a human --- */
 
 enum port_level {

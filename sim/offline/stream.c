@@ -5,14 +5,13 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "core/coefficients.h"
-
 void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
-                          const struct program_limits *limits)
+                          const struct program_limits *limits, uint8_t *memory, uint32_t size)
 {
     memset(s, 0, sizeof *s);
     s->kernel = kernel;
     s->limits = *limits;
+    coefficient_cache_init(&s->cache, memory, size);
 }
 
 int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
@@ -25,18 +24,22 @@ int offline_stream_check(const struct offline_stream *s, struct offline_part *pa
     return fault->code != 0 ? fault->code : chunk_check(&part->chunk, before, &s->limits, fault);
 }
 
-int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
-                       uint64_t size)
+static void begin(struct offline_stream *s, const struct chunk *first)
 {
-    struct program *p = &part->chunk.program;
-    const int code = coefficients_make_in(p, s->kernel, records, size);
-    if (code != 0) {
-        return code;
+    const struct program *p = &first->program;
+    const struct coefficients_window *window = coefficient_cache_begin(&s->cache, p, s->kernel);
+    interpolator_begin_window(&s->interp, p, window);
+    feed_override_begin_job(&s->feed, first, window, p->header.period_us);
+}
+
+int offline_stream_add(struct offline_stream *s, struct offline_part *part)
+{
+    if (!coefficient_cache_fits(&s->cache, s->kernel, part->chunk.program.header.axis_count)) {
+        return COEFFICIENTS_ERR_SIZE;
     }
     if (s->active == NULL) {
         s->active = part;
-        (void)interpolator_begin(&s->interp, p);
-        feed_override_begin_job(&s->feed, &part->chunk, p->header.period_us);
+        begin(s, &part->chunk);
     } else {
         s->newest->next = part;
     }
@@ -44,13 +47,31 @@ int offline_stream_add(struct offline_stream *s, struct offline_part *part, void
     return 0;
 }
 
+static void make_records(struct offline_stream *s)
+{
+    struct feed_place place;
+    feed_override_place(&s->feed, &s->interp, &place);
+    const struct coefficients_window *window =
+        coefficient_cache_prepare(&s->cache, &s->active->chunk.program, &place);
+    if (window != NULL && feed_override_use(&s->feed, &s->interp, window)) {
+        coefficient_cache_used(&s->cache);
+    }
+}
+
 static void take_over(struct offline_stream *s)
 {
     struct offline_part *next = s->active->next;
     const int rests = feed_override_feed_q32(&s->feed) == 0;
-    if (next == NULL || !feed_override_take_over(&s->feed, &s->interp, &next->chunk)) {
+    struct feed_place place;
+    if (next == NULL || !feed_override_may_take_over(&s->feed, &s->interp, &next->chunk, &place)) {
         return;
     }
+    const struct coefficients_window *window =
+        coefficient_cache_prepare(&s->cache, &next->chunk.program, &place);
+    if (!feed_override_take_over(&s->feed, &s->interp, &next->chunk, window)) {
+        return;
+    }
+    coefficient_cache_used(&s->cache);
     if (chunk_begins_at_rest(&next->chunk)) {
         const uint32_t ticks = chunk_rest_ticks(&next->chunk);
         s->rest_ticks = ticks > s->waited_ticks ? ticks - s->waited_ticks : 0u;
@@ -69,6 +90,7 @@ static int misses_next(const struct offline_stream *s)
 
 static int tick(struct offline_stream *s, struct interpolator_point *point)
 {
+    make_records(s);
     s->waited_ticks = feed_override_waits(&s->feed) ? s->waited_ticks : 0u;
     take_over(s);
     s->waited_ticks += feed_override_waits(&s->feed) ? 1u : 0u;

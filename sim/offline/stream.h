@@ -2,11 +2,13 @@
 /*
  * A job in chunks without a bus: what the controller makes of chunks that come when they come (docs/reference/protocol.md
  * 1.7). Chunks are opened, checked and taken over by the code of the controller, one try before each tick; commands are
- * those of the feed override. Dwells between chunks take their ticks, program stops no time. Gives setpoints as the controller would, bit for bit.
+ * those of the feed override. Dwells between chunks take their ticks, program stops no time. Gives setpoints as the controller
+ * would, bit for bit, from records of what is near the motion only, as there (core/coefficient_cache.h); they are made before
+ * each tick.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
- * offline_stream_run in between. No heap: the caller lends a struct offline_part, memory for records and the bytes of each chunk. They
- * have to stay as long as the stream. Main loop only.
+ * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of each
+ * chunk. They have to stay as long as the stream. Main loop only.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H
@@ -14,6 +16,7 @@
 #include <stdint.h>
 
 #include "core/chunk.h"
+#include "core/coefficient_cache.h"
 #include "core/feed_override.h"
 #include "core/interpolator.h"
 #include "core/kernel.h"
@@ -29,6 +32,7 @@ struct offline_stream {
     struct program_limits limits;
     struct feed_override feed; /* its commands may be called between ticks */
     struct interpolator interp;
+    struct coefficient_cache cache;
     struct offline_part *active; /* NULL before the first chunk, */
     struct offline_part *newest; /* and the last one accepted */
     uint64_t ticks;
@@ -41,18 +45,18 @@ struct offline_stream {
     struct interpolator_point last; /* setpoint, with the arc length of the job */
 };
 
+/* The memory of the cache, aligned to COEFFICIENTS_ALIGNMENT: 8 KiB are as on a small controller. */
 void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
-                          const struct program_limits *limits);
+                          const struct program_limits *limits, uint8_t *memory, uint32_t size);
 
 /* Opens and checks a chunk behind the newest accepted one. 0, or enum program_error with *fault the same: the stream has
  * not changed, and the chunk may be given again. */
 int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
                          const uint8_t *bytes, uint32_t size, struct program_fault *fault);
 
-/* Accepts a chunk that has just passed offline_stream_check, and makes its records in this memory of coefficients_size
- * bytes, aligned to COEFFICIENTS_ALIGNMENT. The first one begins the motion. 0 or COEFFICIENTS_ERR_SIZE. */
-int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
-                       uint64_t size);
+/* Accepts a chunk that has just passed offline_stream_check. The first one begins the motion. 0, or COEFFICIENTS_ERR_SIZE: the
+ * cache is too small. */
+int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 
 /* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind which
  * no chunk is known. Points have arc lengths of the job. How many ticks it were, or a negative INTERPOLATOR_ERR_.... */

@@ -12,18 +12,20 @@
 #include <string.h>
 
 #include "chunked.h"
+#include "core/coefficient_cache.h"
 #include "core/feed_override.h"
 #include "fuzz.h"
 #include "golden.h"
 
-#define JOBS      4u
-#define COMMANDS  16u
-#define TICKS_MAX 2500u
-#define NEVER     255u
-#define FAULT     2.0  /* codes of a fault stop are twice those of a hold (stop_table.h) */
-#define NOISE_MM  4e-9 /* of the double kernel, and of an arc length at a takeover */
-#define STEPS     1.02 /* what joints of pieces may add (docs/guides/limits.md) */
-#define BACK_MM 0.0002 /* a feed may run back by 2^-14 mm, and the next setpoint come from there */
+#define JOBS       4u
+#define COMMANDS   16u
+#define TICKS_MAX  2500u
+#define NEVER      255u
+#define CACHE_SIZE 8192u
+#define FAULT      2.0  /* codes of a fault stop are twice those of a hold (stop_table.h) */
+#define NOISE_MM   4e-9 /* of the double kernel, and of an arc length at a takeover */
+#define STEPS      1.02 /* what joints of pieces may add (docs/guides/limits.md) */
+#define BACK_MM 0.0002  /* a feed may run back by 2^-14 mm, and the next setpoint come from there */
 #define Q40     1099511627776.0
 
 static struct job {
@@ -36,7 +38,6 @@ struct part {
     uint8_t *bytes; /* exactly as long as it says, so that the sanitizer sees any read beyond */
     uint32_t size;
     struct chunk chunk;
-    void *records;
     uint32_t from_tick;
 };
 
@@ -46,6 +47,7 @@ struct run {
     uint32_t now;   /* the one under way */
     struct feed_override feed;
     struct interpolator it;
+    struct coefficient_cache cache;
     double period_s;
     double arc_mm[4];
     double place_mm[2][2];
@@ -125,10 +127,9 @@ static struct program_limits limits_of(const struct job *job)
     return limits;
 }
 
-/* The parts up to the first that is refused, with records. */
+/* The parts up to the first that is refused. */
 static void accept(struct run *run, uint32_t count, const struct program_limits *limits)
 {
-    const struct kernel *kernel = kernel_find(KERNEL_DOUBLE);
     for (uint32_t i = 0; i < count; i++) {
         struct part *part = &run->parts[i];
         struct program_fault fault;
@@ -137,10 +138,6 @@ static void accept(struct run *run, uint32_t count, const struct program_limits 
             chunk_check(&part->chunk, i > 0u ? &part[-1].chunk : NULL, limits, &fault) != 0) {
             return;
         }
-        const uint64_t size = coefficients_size(&part->chunk.program, kernel);
-        part->records = malloc((size_t)size);
-        FUZZ_CHECK(part->records != NULL);
-        FUZZ_CHECK(coefficients_make_in(&part->chunk.program, kernel, part->records, size) == 0);
         run->count++;
     }
 }
@@ -195,13 +192,45 @@ static int over(const struct run *run)
     return state == FEED_ENDED || state == FEED_STOPPED;
 }
 
+static void make_records(struct run *run)
+{
+    struct feed_place place;
+    feed_override_place(&run->feed, &run->it, &place);
+    const struct coefficients_window *window =
+        coefficient_cache_prepare(&run->cache, &run->parts[run->now].chunk.program, &place);
+    if (window != NULL && feed_override_use(&run->feed, &run->it, window) != 0) {
+        coefficient_cache_used(&run->cache);
+    }
+}
+
 static void take_over(struct run *run, uint32_t tick)
 {
-    const uint32_t next = run->now + 1u;
-    if (next < run->count && tick >= run->parts[next].from_tick &&
-        feed_override_take_over(&run->feed, &run->it, &run->parts[next].chunk) != 0) {
-        run->now = next;
+    const uint32_t number = run->now + 1u;
+    if (number >= run->count || tick < run->parts[number].from_tick) {
+        return;
     }
+    const struct chunk *next = &run->parts[number].chunk;
+    struct feed_place place;
+    if (feed_override_may_take_over(&run->feed, &run->it, next, &place) != 0) {
+        const struct coefficients_window *window =
+            coefficient_cache_prepare(&run->cache, &next->program, &place);
+        FUZZ_CHECK(window != NULL);
+        if (feed_override_take_over(&run->feed, &run->it, next, window) != 0) {
+            coefficient_cache_used(&run->cache);
+            run->now = number;
+        }
+    }
+}
+
+/* With a cache as small as that of a small controller. */
+static void begin_job(struct run *run, const struct chunk *first)
+{
+    static uint64_t memory[CACHE_SIZE / 8u];
+    coefficient_cache_init(&run->cache, (uint8_t *)memory, CACHE_SIZE);
+    const struct coefficients_window *window =
+        coefficient_cache_begin(&run->cache, &first->program, kernel_find(KERNEL_DOUBLE));
+    interpolator_begin_window(&run->it, &first->program, window);
+    feed_override_begin_job(&run->feed, first, window, first->program.header.period_us);
 }
 
 static void run_accepted(struct run *run, const struct program_limits *limits,
@@ -211,8 +240,7 @@ static void run_accepted(struct run *run, const struct program_limits *limits,
     unsigned command = 0;
     unsigned waited = 0;
     run->period_s = 1e-6 * first->program.header.period_us;
-    FUZZ_CHECK(interpolator_begin(&run->it, &first->program) == 0);
-    feed_override_begin_job(&run->feed, first, first->program.header.period_us);
+    begin_job(run, first);
     for (uint32_t tick = 0; tick < TICKS_MAX && !over(run); tick++) {
         struct interpolator_point point = {0};
         while (command < COMMANDS && waited >= commands[2u * command]) {
@@ -221,6 +249,7 @@ static void run_accepted(struct run *run, const struct program_limits *limits,
             waited = 0;
         }
         waited++;
+        make_records(run);
         take_over(run, tick);
         FUZZ_CHECK(feed_override_next(&run->feed, &run->it, &point) >= 0);
         FUZZ_CHECK(!feed_override_late(&run->feed));
@@ -256,7 +285,6 @@ static void harness(struct fuzz_input *in)
         run_accepted(&run, &limits, commands);
     }
     for (uint32_t i = 0; i < count; i++) {
-        free(run.parts[i].records);
         free(run.parts[i].bytes);
     }
 }

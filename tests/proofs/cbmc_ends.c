@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces, from any of them and at any time: it never
- * asks for a record after the last.
+ * The program clock looks for its piece, in a program of any three pieces of which any first ones have records, from any of
+ * these and at any time: it never asks for a record after the last, stops at the first piece that ends after the time, and
+ * is at the duration in no other than the last state of the program.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
  * shows: program_clock_find_piece
- * mutant: core/program_clock.h: clock->piece += most - left => clock->piece += most - left + 1u
+ * mutant: core/program_clock.h: clock->piece = record->number => clock->piece = record->number + 1u
+ * mutant: core/program_clock.h: record = coefficients_piece_next(record); => record++;
  * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
  * mutant: core/program_clock.h: while (time_q42_s >= record->end_q42_s && left > 0) => while (time_q42_s <= record->end_q42_s && left > 0)
  */
@@ -18,8 +20,6 @@
 
 static struct coefficients_piece records[COUNT];
 static struct program program;
-static struct kernel kernel = {.piece_size = sizeof(struct coefficients_piece) -
-                                             offsetof(struct coefficients_piece, feed)};
 
 /* In piece i, whose end has been reached. */
 static void place(struct program_clock *clock, uint32_t i)
@@ -38,20 +38,28 @@ void harness(void)
     struct program_clock clock;
     program.header.piece_count = COUNT;
     program.header.duration_q32_s = (uint64_t)any_between(1, INT64_MAX >> 10);
-    program.coefficients_for = &kernel;
+    const uint32_t last = nondet_uint32();
+    __CPROVER_assume(last < COUNT);
     for (uint32_t k = 0; k < COUNT; k++) {
+        records[k].number = k;
+        records[k].next = k < last ? (int32_t)sizeof records[0] : 0;
         records[k].end_q42_s = k + 1u == COUNT
                                    ? qmath_q42_of_q32(program.header.duration_q32_s)
                                    : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
-    __CPROVER_assume(i < COUNT);
+    __CPROVER_assume(i <= last);
     place(&clock, i);
     const uint64_t time_q42_s = program_clock_time_q42(&clock);
     if (time_q42_s >= clock.record->end_q42_s) {
-        program_clock_pass_end(&clock, time_q42_s);
+        const uint64_t passed_q42_s = program_clock_pass_end(&clock, time_q42_s);
+        prove(passed_q42_s <= clock.duration_q42_s);
+        prove(passed_q42_s < clock.duration_q42_s ||
+              (clock.time_q42_s == passed_q42_s && clock.rest == 0u && clock.fine == 0u));
+        prove(passed_q42_s == clock.duration_q42_s || i == last ||
+              time_q42_s >= records[i + 1u].end_q42_s || clock.piece == i + 1u);
     }
-    prove(clock.piece < COUNT);
+    prove(clock.piece <= last);
     prove(clock.record == &records[clock.piece]);
     reached();
 }

@@ -1,27 +1,32 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The takeover of the next chunk (docs/theory/numerics.md section 15.7): whatever the state of the motion, after any tick,
- * command or takeover the program under way is one of the two, at one of its pieces, with what its end means. A stop and a
- * hold are never lost, a job that goes on never counts as ended, and a takeover in motion keeps time and piece.
+ * command, takeover or other records the program under way is one of the two, at one of its pieces, with what its end means
+ * and, where the plan goes on, with the record of that piece. A stop and a hold are never lost, a job that goes on never
+ * counts as ended, a takeover in motion keeps time and piece, and other records change nothing else.
  *
  * The functions that the motion calls do anything that their headers allow.
  *
  * prover: cbmc
  * options: --unwind 4 --unwinding-assertions --signed-overflow-check
- * shows: feed_override_take_over feed_override_waits
- * mutant: core/feed_override.c: f->goes_on == 0u || f->phase == PHASE_BRAKE => f->goes_on == 0u
+ * shows: feed_override_take_over feed_override_waits feed_override_use feed_override_may_take_over feed_override_place
+ * mutant: core/feed_override.c: return f->goes_on != 0u && f->phase != PHASE_BRAKE && => return f->goes_on != 0u &&
  * mutant: core/feed_override.c: f->clock.piece >= joint || => f->clock.piece > joint ||
- * mutant: core/feed_override.c: f->clock.piece < next->piece_shift || =>
  * mutant: core/feed_override.c: return f->state == FEED_RUNNING && is_shared => return is_shared
- * mutant: core/feed_override.c: override_plan_ends_by(&f->plan, qmath_q32_of_q42(joint_q42_s)); => 1;
+ * mutant: core/feed_override.c: override_plan_ends_by(&f->plan, next->joint_time_q32_s); => 1;
  * mutant: core/feed_override.c: f->clock.time_q42_s < qmath_q42_of_q32(next->time_shift_q32_s)) => 0)
  * mutant: core/feed_override.c: return !is_over(f) && f->point => return f->point
  * mutant: core/feed_override.c: f->state == STATE_WAITING ? FEED_RUNNING : f->state; => FEED_RUNNING;
  * mutant: core/feed_override.c: f->at_end = f->goes_on != 0u ? state_at_tail_end(state) : FEED_ENDED; => f->at_end = FEED_ENDED;
  * mutant: core/feed_override.c: return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED; => return FEED_STOPPED;
- * mutant: core/feed_override.c: piece = f->clock.piece - next->piece_shift; => piece = f->clock.piece;
- * mutant: core/feed_override.c: if (f->phase != PHASE_PLAN || f->state != STATE_WAITING) { => if (f->phase != PHASE_PLAN) {
- * mutant: core/feed_override.c: if (f->phase != PHASE_PLAN || f->state != STATE_WAITING) { => if (f->state == FEED_HELD || f->state == STATE_WAITING) { } else {
+ * mutant: core/feed_override.c: 0u : f->clock.piece - next->piece_shift; => 0u : f->clock.piece;
+ * mutant: core/feed_override.c: segment == NULL || (at.by_arc == 0u && record == NULL)) { => segment == NULL) {
+ * mutant: core/feed_override.c: || segment == NULL || => ||
+ * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((bisects && record == NULL) ||
+ * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((plan && record == NULL) ||
+ * mutant: core/feed_override.c: override_plan_let_go(&f->plan); =>
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase == PHASE_PLAN;
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->state == FEED_HELD || f->state == STATE_WAITING;
  */
 #include <stddef.h>
 
@@ -38,6 +43,8 @@ int nondet_int(void);
 static struct chunk chunks[2];
 static struct coefficients_piece records[2][PIECES]; /* in order, without gaps */
 static int64_t starts[2][PIECES];
+static struct coefficients_segment segments[2]; /* one for all of each */
+static struct coefficients_window window;       /* new records, or the next chunk's */
 static const struct kernel kernel = {
     .piece_size = sizeof(struct coefficients_piece) - offsetof(struct coefficients_piece, feed)};
 
@@ -56,8 +63,6 @@ static void any_chunk(uint32_t n)
 {
     struct chunk *c = &chunks[n];
     c->flags = nondet_uint32() & (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST);
-    c->program.coefficients = (const uint8_t *)records[n];
-    c->program.coefficients_for = &kernel;
     c->program.header.piece_count = (uint32_t)any_between(1, PIECES);
     c->program.header.length_q40_mm = any_between(1, LENGTH);
     c->program.header.axis_count = PROGRAM_PLANE;
@@ -67,6 +72,7 @@ static void any_chunk(uint32_t n)
         const uint64_t duration_q32 = (uint64_t)any_between(1, POWER(50));
         starts[n][i] = arc;
         records[n][i].start_q42_s = time;
+        records[n][i].number = i;
         time += duration_q32 << 10;
         records[n][i].end_q42_s = time;
         arc = any_between(arc, LENGTH);
@@ -88,6 +94,7 @@ static void second_follows_first(void)
     assume(next->piece_shift + next->shared_pieces < before);
     assume(next->shared_pieces <= next->program.header.piece_count);
     next->time_shift_q32_s = records[0][next->piece_shift].start_q42_s >> 10;
+    next->joint_time_q32_s = records[0][next->piece_shift + next->shared_pieces].start_q42_s >> 10;
     next->arc_shift_q40_mm = any_between(0, LENGTH);
     next->segment_shift = (uint32_t)any_between(0, 9);
     assume(next->segment_shift != 0u || next->arc_shift_q40_mm == 0);
@@ -101,11 +108,27 @@ static void second_follows_first(void)
     }
 }
 
+/* Records of any pieces of a program in a row, or of none; and the segment of the motion, or not. */
+static void any_window(uint32_t n)
+{
+    const uint32_t first = (uint32_t)any_between(0, PIECES - 1u);
+    window.kernel = &kernel;
+    window.first_piece = first;
+    window.piece_count = (uint32_t)any_between(0, PIECES);
+    assume(first + window.piece_count <= chunks[n].program.header.piece_count);
+    window.pieces = (const uint8_t *)&records[n][first];
+    window.first_segment = nondet_uint32() & 1u;
+    window.segment_count = nondet_uint32() & 1u;
+    window.segments = (const uint8_t *)&segments[n];
+    window.segment_step = 0;
+}
+
 /* --- What the motion calls --- */
 
 static int may_carry;           /* what override_plan_ends_by has said, */
 static uint64_t carry_by_q32_s; /* and of which time */
 static uint32_t carried;
+static uint32_t let_go;
 
 int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s)
 {
@@ -123,6 +146,12 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     carried++;
 }
 
+void override_plan_let_go(struct override_plan *plan)
+{
+    (void)plan;
+    let_go++;
+}
+
 void override_plan_begin(struct override_plan *plan, const struct program *p)
 {
     (void)plan;
@@ -134,14 +163,6 @@ void override_plan_begin_next(struct override_plan *plan, const struct program_o
     prove(least == &chunks[1].least);
     plan->started = 0;
     carried++;
-}
-
-int interpolator_begin(struct interpolator *to, const struct program *p)
-{
-    to->program = p;
-    to->duration_q42_s = p->header.duration_q32_s << 10;
-    to->length_q40_mm = p->header.length_q40_mm;
-    return 0;
 }
 
 void override_plan_limit(struct override_plan *plan, int64_t most_q57)
@@ -242,34 +263,62 @@ void interpolator_point_copy_rest(struct interpolator_point *out,
     (void)axis_count;
 }
 
-void interpolator_carry(struct interpolator *it, const struct program *p,
-                        const struct interpolator_point *end, uint32_t segment_shift,
-                        uint32_t piece, int64_t arc_length_q40_mm)
+void interpolator_begin_window(struct interpolator *at, const struct program *p,
+                               const struct coefficients_window *w)
 {
-    prove(p == &chunks[1].program && end == &chunks[1].end);
-    prove(segment_shift == chunks[1].segment_shift && piece < p->header.piece_count);
-    prove(arc_length_q40_mm >= 0);
-    it->program = p;
-    it->duration_q42_s = p->header.duration_q32_s << 10;
-    it->length_q40_mm = p->header.length_q40_mm;
+    (void)at;
+    (void)p;
+    (void)w;
 }
 
-void interpolator_search_begin(struct interpolator_search *search,
-                               const struct coefficients_piece *piece, uint32_t index,
+const struct coefficients_segment *interpolator_segment_in(const struct coefficients_window *w,
+                                                           int64_t number, int64_t arc_length_q40_mm)
+{
+    prove(w == &window && number >= 0 && arc_length_q40_mm <= LENGTH);
+    return nondet_int() != 0 ? &segments[1] : NULL;
+}
+
+void interpolator_use(struct interpolator *at, const struct coefficients_window *w)
+{
+    prove(w == &window && coefficients_window_segment(w, at->segment->number) != NULL);
+}
+
+void interpolator_carry(struct interpolator *at, const struct program *p,
+                        const struct coefficients_window *w,
+                        const struct coefficients_segment *segment,
+                        const struct interpolator_point *end)
+{
+    prove(w == &window && p == &chunks[1].program && end == &chunks[1].end);
+    prove(segment == &segments[1]);
+    at->program = p;
+    at->segment = segment;
+    at->duration_q42_s = p->header.duration_q32_s << 10;
+    at->length_q40_mm = p->header.length_q40_mm;
+}
+
+void interpolator_search_begin(struct interpolator_search *search, uint32_t index,
                                int64_t arc_length_q40_mm)
 {
-    search->piece = piece;
+    search->piece = NULL;
     search->piece_index = index;
+    search->bisecting = 0;
     search->arc_length_q40_mm = arc_length_q40_mm;
 }
 
-int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search)
+/* Into a piece of which there is a record, and in the end the time; or it waits. */
+int interpolator_search_step(const struct interpolator *at, struct interpolator_search *search)
 {
-    struct program_clock at = {.program = it->program};
-    any_piece(&at, 0);
-    search->piece = at.record;
-    search->piece_index = at.piece;
-    search->time_q42_s = at.record->start_q42_s;
+    const uint32_t n = number_of(at->program);
+    if (search->bisecting == 0u) {
+        search->piece_index = (uint32_t)any_between(0, chunks[n].program.header.piece_count - 1u);
+        if (nondet_int() != 0) {
+            search->piece = &records[n][search->piece_index];
+            search->bisecting = 1;
+        }
+        return 0;
+    }
+    prove(search->piece == &records[n][search->piece_index]);
+    search->time_q42_s = search->piece->start_q42_s;
     return nondet_int() != 0;
 }
 
@@ -376,11 +425,24 @@ static int end_is_known(void)
     return f.state != STATE_WAITING && f.at_end == FEED_ENDED;
 }
 
+/* The record of the piece where the plan goes on, or will; that of the piece looked into. */
+static int records_are_right(uint32_t n)
+{
+    const int rests_unknown = f.phase == PHASE_REST && f.found == 0u;
+    const int goes_by_plan = f.phase == PHASE_PLAN || (f.phase == PHASE_REST && !rests_unknown);
+    return (!goes_by_plan || f.clock.record == &records[n][f.clock.piece]) &&
+           (!rests_unknown || f.place.bisecting == 0u ||
+            f.place.piece == &records[n][f.place.piece_index]);
+}
+
 static int is_sound(uint32_t n)
 {
     const struct program *p = &chunks[n].program;
     return f.clock.program == p && it.program == p && f.clock.piece < p->header.piece_count &&
-           f.clock.record == &records[n][f.clock.piece] &&
+           (f.phase != PHASE_REST || f.found != 0u ||
+            f.place.piece_index < p->header.piece_count) &&
+           records_are_right(n) &&
+           it.segment == &segments[n] &&
            f.clock.duration_q42_s == p->header.duration_q32_s << 10 &&
            it.duration_q42_s == f.clock.duration_q42_s &&
            it.length_q40_mm == p->header.length_q40_mm && f.clock.time_q42_s <= f.clock.duration_q42_s &&
@@ -394,6 +456,9 @@ static void any_motion(uint32_t n)
     f.clock.program = &chunks[n].program;
     it.program = &chunks[n].program;
     it.axis_count = PROGRAM_PLANE;
+    it.segment = &segments[n];
+    segments[0].number = nondet_uint32() & 15u;
+    segments[1].number = nondet_uint32() & 15u;
     f.clock.period_us = 1000;
     f.clock.period_log2 = 0;
     f.clock.rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1u);
@@ -405,6 +470,10 @@ static void any_motion(uint32_t n)
     f.clock.time_q42_s = nondet_uint64();
     assume(f.clock.time_q42_s + 1u >= f.clock.record->start_q42_s &&
            f.clock.time_q42_s <= f.clock.record->end_q42_s);
+    f.place.bisecting = nondet_uint32() & 1u;
+    f.place.piece_index = (uint32_t)any_between(0, PIECES - 1u);
+    f.place.piece = nondet_int() != 0 ? &records[n][f.place.piece_index] : NULL;
+    f.clock.record = nondet_int() != 0 ? f.clock.record : NULL;
     f.goes_on = chunk_goes_on(&chunks[n]) ? 1u : 0u;
     f.state = nondet_uint32();
     f.at_end = nondet_uint32();
@@ -516,7 +585,7 @@ static void take_over(void)
     /* a piece reaches no further before its start (protocol.md 1.3) */
     assume(resting || f.point.arc_length_q40_mm >= starts[0][f.clock.piece] - REACH_Q40);
     const struct feed_override before = f;
-    if (feed_override_take_over(&f, &it, &chunks[1]) == 0) {
+    if (feed_override_take_over(&f, &it, &chunks[1], &window) == 0) {
         prove(is_sound(0) && carried == 0u);
         prove(f.state == before.state && f.phase == before.phase && f.at_end == before.at_end &&
               f.clock.time_q42_s == before.clock.time_q42_s && f.clock.piece == before.clock.piece &&
@@ -545,6 +614,32 @@ static void take_over(void)
     reached();
 }
 
+static void same_motion(const struct feed_override *before)
+{
+    prove(f.state == before->state && f.phase == before->phase && f.at_end == before->at_end &&
+          f.clock.time_q42_s == before->clock.time_q42_s && f.clock.piece == before->clock.piece &&
+          f.found == before->found && f.place.piece_index == before->place.piece_index &&
+          f.place.bisecting == before->place.bisecting &&
+          f.point.arc_length_q40_mm == before->point.arc_length_q40_mm);
+}
+
+/* Other records of the program under way: only these of all change, and no record before is in use. */
+static void use_records(uint32_t n)
+{
+    const struct feed_override before = f;
+    struct feed_place place;
+    feed_override_place(&f, &it, &place);
+    prove(place.piece < chunks[n].program.header.piece_count);
+    const int used = feed_override_use(&f, &it, &window);
+    prove(is_sound(n));
+    same_motion(&before);
+    prove(let_go == (used ? 1u : 0u));
+    prove(used || (f.clock.record == before.clock.record && f.place.piece == before.place.piece));
+    prove(!used || f.clock.record == NULL ||
+          f.clock.record == coefficients_window_piece(&window, f.clock.record->number));
+    prove(!used || f.place.piece == f.clock.record);
+}
+
 void harness(void)
 {
     any_chunk(0);
@@ -553,7 +648,11 @@ void harness(void)
     const uint32_t n = nondet_uint32() & 1u;
     any_motion(n);
     if (n == 0u && nondet_int() != 0) {
+        any_window(1);
         take_over();
+    } else if (nondet_int() != 0) {
+        any_window(n);
+        use_records(n);
     } else {
         tick_or_command(n);
     }

@@ -10,7 +10,7 @@
  * instead: core/program_clock.h: program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece;
  * assumes: qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
  * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
- * mutant: core/override_plan.c: if (behind < left) { => if (behind <= left + 1u) {
+ * mutant: core/override_plan.c: clock->record->ahead[window] => clock->record->ahead[window + 1u]
  * mutant: core/override_plan.c: qmath_lesser(plan->asked_q57, most_q57) => plan->asked_q57 + most_q57
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
@@ -145,6 +145,8 @@ int main(void)
     p.coefficients_for = &any_kernel;
     for (uint32_t i = 0; i < COUNT; i++) {
         struct coefficients_piece *record = (void *)coefficients_piece_at(&p, &any_kernel, i);
+        record->next = i + 1 == COUNT ? 0 : (int32_t)sizeof *record;
+        record->number = i;
         record->end_q42_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(INT64_MIN, INT64_MAX);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();

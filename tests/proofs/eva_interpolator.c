@@ -6,9 +6,9 @@
  * prover: eva
  * options: -eva-slevel 60
  * instead: core/interpolator.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_override program_piece_start ph_segment_expand ph_segment_end
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
  * shows: interpolator_at_q42 interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step interpolator_seek interpolator_ends coefficients_make
- * mutant: core/interpolator.c: it->program->header.piece_count - 1u); => it->program->header.piece_count);
+ * mutant: core/coefficients.c: i + 1u < p->header.piece_count ? (int32_t)piece_size => i < p->header.piece_count ? (int32_t)piece_size
  * mutant: core/interpolator.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
  * mutant: core/coefficients.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
  * mutant: core/coefficients.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
@@ -44,6 +44,11 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     assigns \result \from i;
     ensures 0 <= \result < (1 << 62); */
 int64_t program_piece_start(const struct program *p, uint32_t i);
+
+/*@ requires i < p->header.piece_count;
+    assigns \result \from i;
+    ensures 0 < \result <= (1 << 54); */
+uint64_t program_piece_duration(const struct program *p, uint32_t i);
 
 /*@ requires \initialized(segment) && is_bounded(segment);
     assigns *ph \from *segment;
@@ -180,12 +185,13 @@ static void along_path(struct interpolator *it, uint32_t i)
     stays(it);
     place(it, i);
     interpolator_acceleration_q40(it, it->piece, any_time());
-    interpolator_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    interpolator_search_begin(&search, i, any_between(INT64_MIN, INT64_MAX));
     interpolator_search_step(it, &search);
     prove(search.piece_index < COUNT);
     stays(it);
     place(it, i);
-    interpolator_search_begin(&search, it->piece, i, any_between(INT64_MIN, INT64_MAX));
+    interpolator_search_begin(&search, i, any_between(INT64_MIN, INT64_MAX));
+    search.piece = it->piece;
     search.bisecting = 1;
     search.low_q42_s = any_time();
     search.high_q42_s = any_time();
@@ -234,6 +240,8 @@ static void program_of(uint32_t axis_count)
     if (coefficients_make(&p, &any_kernel, take, records) == 0) {
         prove(filled == coefficients_size(&p, &any_kernel) && filled <= sizeof records);
         coefficients_attach(&p, &any_kernel, (const uint8_t *)records);
+        prove(coefficients_segment_at(&p, &any_kernel, 0)->from_q40_mm == INT64_MIN);
+        prove(coefficients_segment_at(&p, &any_kernel, COUNT - 1u)->to_q40_mm == INT64_MAX);
         interpolate(&p);
         reached();
     }

@@ -17,7 +17,7 @@
  * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40
  * mutant: core/feed_override.c: f->kind : NO_NUMBERS; => f->kind : NO_NUMBERS + 1u;
  * mutant: core/feed_override.c: f->place.piece_index, f->place.piece => f->place.piece_index + 1u, f->place.piece
- * mutant: core/feed_override.c: &f->place, f->clock.record, f->clock.piece, => &f->place, f->clock.record, f->clock.piece + 1u,
+ * mutant: core/feed_override.c: interpolator_search_begin(&f->place, f->clock.piece, => interpolator_search_begin(&f->place, f->clock.piece + 1u,
  */
 #include "override_contracts.h"
 #include "proof.h"

@@ -126,8 +126,8 @@ int64_t interpolator_acceleration_q40(const struct interpolator *it, const struc
     assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,
             arc_length_q40_mm;
     ensures search->piece_index < 3; */
-void interpolator_search_begin(struct interpolator_search *search, const struct coefficients_piece *piece,
-                         uint32_t index, int64_t arc_length_q40_mm);
+void interpolator_search_begin(struct interpolator_search *search, uint32_t index,
+                               int64_t arc_length_q40_mm);
 
 /*@ requires search->piece_index < 3;
     assigns \result, search->time_q42_s, search->piece_index, search->bisecting, search->low_q42_s, search->high_q42_s

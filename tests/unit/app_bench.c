@@ -165,7 +165,7 @@ static void beat(struct app_bench *bench)
 }
 
 /* As a port does that waits for answers. */
-void app_bench_period(struct app_bench *bench)
+void app_bench_period_unattended(struct app_bench *bench)
 {
     const bool guard_over = fake_port_awaited_us() > 0u && !fake_port_ready();
     fake_port_advance_us(guard_over ? fake_port_awaited_us() : bench->controller.config.period_us);
@@ -175,8 +175,13 @@ void app_bench_period(struct app_bench *bench)
     if (bench->module.id != 0u && !bench->module_dead) {
         io_module_process(&bench->module, bench->controller.config.period_us);
     }
-    app_bench_settle(bench);
     bench->ticks++;
+}
+
+void app_bench_period(struct app_bench *bench)
+{
+    app_bench_period_unattended(bench);
+    app_bench_settle(bench);
 }
 
 void app_bench_periods(struct app_bench *bench, uint32_t count)

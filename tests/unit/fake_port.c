@@ -36,6 +36,7 @@ static struct {
     struct can_msg sent[SENT_MAX];
     uint8_t banks[PORT_STORE_BANKS_ALL][FAKE_PORT_BANK_BYTES] __attribute__((aligned(8)));
     uint8_t ring[FAKE_PORT_RING_BYTES] __attribute__((aligned(8)));
+    uint8_t cache[FAKE_PORT_CACHE_BYTES] __attribute__((aligned(8)));
     uint32_t ring_missing;
     const struct fake_port_store *store;
     void (*wait_hook)(void *context);
@@ -238,6 +239,12 @@ uint8_t *port_stream_memory(uint32_t *size)
 {
     *size = FAKE_PORT_RING_BYTES - self.ring_missing;
     return self.ring;
+}
+
+uint8_t *port_cache_memory(uint32_t *size)
+{
+    *size = FAKE_PORT_CACHE_BYTES;
+    return self.cache;
 }
 
 int port_can_send(const struct can_msg *message)

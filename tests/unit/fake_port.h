@@ -57,7 +57,8 @@ void fake_port_keep_store(void);
 void fake_port_shrink_store(uint32_t bytes);
 
 /* The ring of streamed jobs has only so many bytes from now on: before controller_init. */
-#define FAKE_PORT_RING_BYTES (256u * 1024u)
+#define FAKE_PORT_RING_BYTES  (256u * 1024u)
+#define FAKE_PORT_CACHE_BYTES (8u * 1024u)
 void fake_port_shrink_ring(uint32_t bytes);
 
 /* Turns the bits of one byte of the store. */

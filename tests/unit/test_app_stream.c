@@ -17,7 +17,7 @@
 #define Y_MM       (-5)
 #define JOB        7u
 #define UNIT       1000000 /* counts a mm */
-#define SMALL_RING (80u * 1024u)
+#define SMALL_RING (20u * 1024u)
 #define WHOLE      97u /* pieces of the job, after which it ends: 0.5 s + 96 / 32 s + 0.5 s */
 
 static struct app_bench bench;
@@ -789,7 +789,42 @@ static void test_another_configuration_refuses_start_and_chunks(void)
     command(COMMAND_START);
 }
 
-/* Two chunks with their records, and no more: flow control. */
+/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job runs. */
+static void test_a_main_loop_that_makes_no_records(void)
+{
+    expect_sent(&parts[0]);
+    command(COMMAND_START);
+    uint32_t ticks = 0;
+    while (bench.controller.machine.state == MACHINE_RUNNING) {
+        TEST_ASSERT_TRUE(ticks++ < MACHINE_UNATTENDED_US / 1000u);
+        app_bench_period_unattended(&bench);
+    }
+    TEST_ASSERT_TRUE(ticks > 600u);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_HEX32(EMCY_SOFTWARE, bench.controller.machine.fault.code);
+    app_bench_periods(&bench, 400);
+    expect_state(STREAM_STOPPED);
+    TEST_ASSERT_TRUE(bench.drives[0].worst_step_counts <= 16001);
+}
+
+/* The motion is followed with the records that there are in the cache of a small controller. */
+static void test_the_motion_asks_for_records(void)
+{
+    expect_sent(&parts[0]);
+    command(COMMAND_START);
+    uint32_t asked = 0;
+    for (uint32_t k = 0; k < 1000u; ++k) {
+        app_bench_period_unattended(&bench);
+        if (motion_wants_records(&bench.controller.machine.motion)) {
+            asked++;
+            app_bench_settle(&bench);
+        }
+    }
+    TEST_ASSERT_GREATER_THAN_UINT32(2, asked);
+    TEST_ASSERT_LESS_THAN_UINT32(100, asked);
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
+}
+
 /* ---- Rests between chunks ---- */
 
 /* Two paths of 40 pieces, the second from the end of the first, with a rest before it. */
@@ -1011,6 +1046,7 @@ static void test_override_over_a_rest(void)
     TEST_ASSERT_UINT32_WITHIN(4, 2u * ROUND_END * 5u / 4u + 30u, bench.recorded - 200u);
 }
 
+/* Room for two chunks, and no more: flow control. */
 static void test_a_small_ring(void)
 {
     app_bench_init(&bench, X_MM * UNIT, Y_MM * UNIT);
@@ -1063,6 +1099,8 @@ int main(void)
     RUN_TEST(test_close_and_the_next_job);
     RUN_TEST(test_the_power_takes_the_job_away);
     RUN_TEST(test_another_configuration_refuses_start_and_chunks);
+    RUN_TEST(test_a_main_loop_that_makes_no_records);
+    RUN_TEST(test_the_motion_asks_for_records);
     RUN_TEST(test_a_dwell_takes_its_ticks);
     RUN_TEST(test_a_chunk_behind_a_rest_may_be_late);
     RUN_TEST(test_a_program_stop_waits_for_resume);

@@ -236,7 +236,7 @@ static void begin(struct motion *m)
 {
     memset(m, 0, sizeof *m);
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&m->it, &chunks[0].program));
-    feed_override_begin_job(&m->feed, &chunks[0], whole.program.header.period_us);
+    feed_override_begin_job(&m->feed, &chunks[0], &m->it.window, whole.program.header.period_us);
 }
 
 static void tick(struct motion *m)
@@ -248,7 +248,9 @@ static void tick(struct motion *m)
 static int take_over(struct motion *m)
 {
     const struct motion before = *m;
-    if (feed_override_take_over(&m->feed, &m->it, &chunks[m->chunk + 1u])) {
+    struct coefficients_window window;
+    coefficients_window_of(&window, &chunks[m->chunk + 1u].program);
+    if (feed_override_take_over(&m->feed, &m->it, &chunks[m->chunk + 1u], &window)) {
         m->chunk++;
         return 1;
     }

@@ -109,6 +109,7 @@ static int kernel_recvmmsg(int fd, struct mmsghdr *headers, unsigned count, int 
 #define port_store_write    linux_store_write
 #define port_store_data     linux_store_data
 #define port_stream_memory  linux_stream_memory
+#define port_cache_memory   linux_cache_memory
 #define port_log            linux_log
 #include "port/linux/port_linux.c" /* NOLINT(bugprone-suspicious-include) */
 

@@ -27,6 +27,7 @@
 #define port_store_write    board_store_write
 #define port_store_data     board_store_data
 #define port_stream_memory  board_stream_memory
+#define port_cache_memory   board_cache_memory
 #define port_log            board_log
 #include "port/stm32g4/port_stm32g4.c" /* NOLINT(bugprone-suspicious-include) */
 #include "port/stm32g4/port_store.c"   /* NOLINT(bugprone-suspicious-include) */

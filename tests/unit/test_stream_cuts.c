@@ -3,7 +3,8 @@
  * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop and
  * fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside its
  * limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case ends with
- * a host that sends no more: then the motion comes to rest.
+ * a host that sends no more: then the motion comes to rest. Records are those of a coefficient cache, from the least that
+ * does to one for whole chunks; where it has room to spare, the main loop is late with them by a tick.
  *
  * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
  */
@@ -13,6 +14,7 @@
 #include <string.h>
 
 #include "chunked.h"
+#include "core/coefficient_cache.h"
 #include "core/feed_override.h"
 #include "golden.h"
 #include "unity.h"
@@ -23,6 +25,8 @@
 #define CHAINS     6u /* of each whole program */
 #define MOST_TICKS 6000u
 #define LONGEST    20000u /* until rest */
+#define CACHE_MOST 65536u
+#define CACHE_LATE 12288u /* from this size on the main loop may be late */
 
 /* Found among 10^6: a hold while the override rises is late by the bound of the piece where it was commanded. */
 #define HOLD_IN_A_RISE 525090u
@@ -68,11 +72,16 @@ static struct {
     uint32_t commanded; /* commands so far, */
     uint32_t rested;    /* and rests at the end of a tail */
     unsigned number;
+    struct coefficient_cache cache;
+    const struct coefficients_window *made; /* a tick ago; NULL: nothing */
+    uint32_t late;                          /* 1: the main loop is late by a tick */
 } now;
+
+static uint64_t cache_memory[CACHE_MOST / 8u];
 
 static struct {
     uint64_t ticks;
-    unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited;
+    unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited, windows;
     double jerk;
 } seen;
 
@@ -142,12 +151,15 @@ static void note_begins(struct chain *c)
     struct motion m = {.chunk = 0};
     struct interpolator_point point;
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&m.it, &c->chunks[0].program));
-    feed_override_begin_job(&m.feed, &c->chunks[0], c->cuts.whole->program.header.period_us);
+    feed_override_begin_job(&m.feed, &c->chunks[0], &m.it.window,
+                            c->cuts.whole->program.header.period_us);
     c->begun[0] = m;
     while (m.chunk + 1u < c->cuts.count) {
         TEST_ASSERT_EQUAL_INT(0, feed_override_next(&m.feed, &m.it, &point));
         m.tick++;
-        if (feed_override_take_over(&m.feed, &m.it, &c->chunks[m.chunk + 1u])) {
+        struct coefficients_window window;
+        coefficients_window_of(&window, &c->chunks[m.chunk + 1u].program);
+        if (feed_override_take_over(&m.feed, &m.it, &c->chunks[m.chunk + 1u], &window)) {
             m.chunk++;
             c->begun[m.chunk] = m;
         }
@@ -218,8 +230,35 @@ static void check_same(void)
     }
 }
 
+static void use_records(const struct coefficients_window *window)
+{
+    if (window != NULL && feed_override_use(&now.m.feed, &now.m.it, window)) {
+        coefficient_cache_used(&now.cache);
+        seen.windows++;
+    }
+}
+
+static const struct coefficients_window *make_records(void)
+{
+    struct feed_place place;
+    feed_override_place(&now.m.feed, &now.m.it, &place);
+    return coefficient_cache_prepare(&now.cache, now.m.feed.clock.program, &place);
+}
+
+/* What the main loop does between two ticks, or in the time of one. */
+static void attend(void)
+{
+    if (now.late != 0u) {
+        use_records(now.made);
+        now.made = make_records();
+    } else {
+        use_records(make_records());
+    }
+}
+
 static void tick(void)
 {
+    attend();
     const int waited = feed_override_waits(&now.m.feed);
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, feed_override_next(&now.m.feed, &now.m.it, &now.point),
                                   where("no error", 0, 0));
@@ -298,12 +337,42 @@ static void refuse(uint64_t *random)
 static void try_to_take_over(void)
 {
     const int moves = feed_override_feed_q32(&now.m.feed) != 0;
-    if (now.m.chunk + 1u < now.chain->cuts.count &&
-        feed_override_take_over(&now.m.feed, &now.m.it, &now.chain->chunks[now.m.chunk + 1u])) {
+    struct feed_place place;
+    if (now.m.chunk + 1u == now.chain->cuts.count) {
+        return;
+    }
+    const struct chunk *next = &now.chain->chunks[now.m.chunk + 1u];
+    if (!feed_override_may_take_over(&now.m.feed, &now.m.it, next, &place)) {
+        return;
+    }
+    now.made = NULL;
+    const struct coefficients_window *window =
+        coefficient_cache_prepare(&now.cache, &next->program, &place);
+    TEST_ASSERT_NOT_NULL(window);
+    if (feed_override_take_over(&now.m.feed, &now.m.it, next, window)) {
+        coefficient_cache_used(&now.cache);
         now.m.chunk++;
         seen.moving += moves ? 1u : 0u;
         seen.resting += moves ? 0u : 1u;
     }
+}
+
+/* The motion goes on with a cache instead of all records of its chunk. */
+static void begin_cache(uint64_t *random)
+{
+    const struct kernel *fixed = kernel_find(KERNEL_FIXED);
+    const uint32_t least =
+        2u * COEFFICIENT_CACHE_LEAST *
+            (coefficients_piece_size(fixed) + coefficients_segment_size(fixed, PROGRAM_PLANE)) +
+        COEFFICIENTS_ALIGNMENT;
+    const uint32_t size = least << golden_random(random) % 4u;
+    coefficient_cache_init(&now.cache, (uint8_t *)cache_memory,
+                           size + (uint32_t)(golden_random(random) % size));
+    TEST_ASSERT_TRUE(coefficient_cache_fits(&now.cache, fixed, PROGRAM_PLANE));
+    (void)feed_override_use(&now.m.feed, &now.m.it,
+                            coefficient_cache_begin(&now.cache, now.m.feed.clock.program, fixed));
+    use_records(make_records());
+    now.late = size >= CACHE_LATE ? (uint32_t)(golden_random(random) % 2u) : 0u;
 }
 
 static void begin(uint64_t *random)
@@ -317,6 +386,7 @@ static void begin(uint64_t *random)
     now.m = now.chain->begun[golden_random(random) % now.chain->cuts.count];
     now.h = now.p->program.header.period_us * 1e-6;
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&now.path, &wholes[now.which].exact.program));
+    begin_cache(random);
 }
 
 /* The host sends no more: to rest, unless the override is nothing or it has been held there. */
@@ -412,9 +482,9 @@ static void test_cuts_at_any_instant(void)
     run_case(seed * 0x100000001u + HOLD_IN_A_RISE);
     printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
            "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
-           "the whole; jerk %.4f of the limit\n",
+           "the whole; %u windows of records; jerk %.4f of the limit\n",
            cases, (double)seen.ticks, seen.moving, seen.resting, seen.refused, seen.underruns,
-           seen.ended, seen.stopped, seen.held, seen.waited, seen.same, seen.jerk);
+           seen.ended, seen.stopped, seen.held, seen.waited, seen.same, seen.windows, seen.jerk);
     if (cases >= 1000u) {
         TEST_ASSERT_TRUE(seen.moving > cases / 8u && seen.resting > cases / 64u);
         TEST_ASSERT_TRUE(seen.refused > 0 && seen.underruns > cases / 8u && seen.same > cases);

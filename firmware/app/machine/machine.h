@@ -153,7 +153,8 @@ enum machine_refusal machine_start(struct machine *machine, const struct motion 
 
 /* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be now. A path
  * that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
-bool machine_take_over(struct machine *machine, const struct chunk *next);
+bool machine_take_over(struct machine *machine, const struct chunk *next,
+                       const struct coefficients_window *window);
 
 /* Homing, from OFF to OFF. In between the main loop sets each axis's `goal` and `control_extra`
  * (under the lock); the targets follow the positions. It has failed when the state has left HOMING

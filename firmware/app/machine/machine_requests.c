@@ -106,11 +106,12 @@ enum machine_refusal machine_resume(struct machine *machine)
     return MACHINE_ACCEPTED;
 }
 
-bool machine_take_over(struct machine *machine, const struct chunk *next)
+bool machine_take_over(struct machine *machine, const struct chunk *next,
+                       const struct coefficients_window *window)
 {
     const bool goes_on = machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
                          machine->state == MACHINE_HELD;
-    return goes_on && motion_take_over(&machine->motion, next);
+    return goes_on && motion_take_over(&machine->motion, next, window);
 }
 
 enum machine_refusal machine_begin_homing(struct machine *machine)

@@ -21,18 +21,20 @@ int motion_begin(struct motion *motion, const struct program *program, const str
     return result;
 }
 
-int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config)
+void motion_begin_job(struct motion *motion, const struct chunk *first,
+                      const struct coefficients_window *window, const struct config *config)
 {
-    const int result = motion_begin(motion, &first->program, config);
-    if (result == 0) {
-        feed_override_begin_job(&motion->feed, first, config->period_us);
-    }
-    return result;
+    memset(motion, 0, sizeof *motion);
+    path_counts_init(&motion->scale, &first->program, config);
+    interpolator_begin_window(&motion->interp, &first->program, window);
+    feed_override_begin_job(&motion->feed, first, window, config->period_us);
+    path_outputs_begin(&motion->outputs, &first->program, -1);
 }
 
-bool motion_take_over(struct motion *motion, const struct chunk *next)
+bool motion_take_over(struct motion *motion, const struct chunk *next,
+                      const struct coefficients_window *window)
 {
-    if (feed_override_take_over(&motion->feed, &motion->interp, next) == 0) {
+    if (feed_override_take_over(&motion->feed, &motion->interp, next, window) == 0) {
         return false;
     }
     if (chunk_begins_at_rest(next)) {

@@ -41,13 +41,22 @@ int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX]);
 
-/* As motion_begin, for the first chunk of a job. */
-int motion_begin_job(struct motion *motion, const struct chunk *first, const struct config *config);
+/* As motion_begin, for the first chunk of a job, with these records from its start on. */
+void motion_begin_job(struct motion *motion, const struct chunk *first,
+                      const struct coefficients_window *window, const struct config *config);
 
-/* Goes on with the next chunk of the job, where the motion is in the part that it shares with the program under way, or rests: then
- * true, and that program is not needed any more. A chunk that begins at rest starts so many ticks after its predecessor has ended
- * as it says (chunk_rest_ticks), at once when it comes later; ticks of a hold do not count. Under the lock. */
-bool motion_take_over(struct motion *motion, const struct chunk *next);
+/* Goes on with the next chunk of the job, of which these records are there, where the motion is in the part that it shares with
+ * the program under way, or rests: then true, and that program is not needed any more. A chunk that begins at rest starts so many
+ * ticks after its predecessor has ended as it says (chunk_rest_ticks), at once when it comes later; ticks of a hold do not count.
+ * Under the lock. */
+bool motion_take_over(struct motion *motion, const struct chunk *next,
+                      const struct coefficients_window *window);
+
+/* True when the motion has come so far that the main loop should make records further on. Timer. */
+static inline bool motion_wants_records(const struct motion *motion)
+{
+    return feed_override_wants_records(&motion->feed, &motion->interp) != 0;
+}
 
 /* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
  * Timer. */

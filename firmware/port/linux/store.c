@@ -80,8 +80,10 @@ int store_open(const char *file)
     return 0;
 }
 
-/* Pages that are never written cost nothing. */
+/* Pages that are never written cost nothing. The cache is large, since the main loop may come late on a computer. */
+#define CACHE_BYTES (4u * 1024u * 1024u)
 static uint8_t ring[STORE_RING_MAX] __attribute__((aligned(8)));
+static uint8_t cache[CACHE_BYTES] __attribute__((aligned(8)));
 static uint32_t ring_bytes = STORE_RING_MAX;
 
 void store_ring(uint32_t bytes)
@@ -93,4 +95,10 @@ uint8_t *port_stream_memory(uint32_t *size)
 {
     *size = ring_bytes;
     return ring;
+}
+
+uint8_t *port_cache_memory(uint32_t *size)
+{
+    *size = sizeof cache;
+    return cache;
 }

@@ -11,15 +11,24 @@ struct ram_store ram_store = {
     .memory = banks[0], .bank_bytes = sizeof banks[0], .parameters = parameters};
 
 #if defined(__ARM_ARCH_6M__)
-#define RING_BYTES (8u * 1024u)
+#define RING_BYTES  (8u * 1024u)
+#define CACHE_BYTES (5u * 1024u) /* for six axes */
 #else
-#define RING_BYTES (48u * 1024u)
+#define RING_BYTES  (48u * 1024u)
+#define CACHE_BYTES (8u * 1024u)
 #endif
 
 static uint8_t ring[RING_BYTES] __attribute__((aligned(8)));
+static uint8_t cache[CACHE_BYTES] __attribute__((aligned(8)));
 
 uint8_t *port_stream_memory(uint32_t *size)
 {
     *size = sizeof ring;
     return ring;
+}
+
+uint8_t *port_cache_memory(uint32_t *size)
+{
+    *size = sizeof cache;
+    return cache;
 }

@@ -4,7 +4,8 @@
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
 
-#define RING_BYTES (48u * 1024u)
+#define RING_BYTES  (48u * 1024u)
+#define CACHE_BYTES (8u * 1024u)
 
 uint32_t port_store_size(unsigned bank)
 {
@@ -34,4 +35,11 @@ uint8_t *port_stream_memory(uint32_t *size)
     static uint8_t ring[RING_BYTES] __attribute__((aligned(8)));
     *size = sizeof ring;
     return ring;
+}
+
+uint8_t *port_cache_memory(uint32_t *size)
+{
+    static uint8_t cache[CACHE_BYTES] __attribute__((aligned(8)));
+    *size = sizeof cache;
+    return cache;
 }

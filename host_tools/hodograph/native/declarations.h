@@ -327,10 +327,9 @@ struct offline_stream {
     ...;
 };
 void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
-                          const struct program_limits *limits);
+                          const struct program_limits *limits, uint8_t *memory, uint32_t size);
 int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
                          const uint8_t *bytes, uint32_t size, struct program_fault *fault);
-int offline_stream_add(struct offline_stream *s, struct offline_part *part, void *records,
-                       uint64_t size);
+int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
                            struct interpolator_point *points);

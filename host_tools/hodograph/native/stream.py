@@ -13,6 +13,9 @@ from .feed_override import FeedCommands
 from .library import library, text
 from .program import POINT, NativeFault, NativeLimits, kernel_code, limits_fields
 
+CACHE_BYTES = 8192
+"""The coefficient cache of a small controller."""
+
 
 class OfflineStream(FeedCommands):
     """Chunks of docs/reference/protocol.md 1.7 in, setpoints out. Chunks and commands take effect from the next tick.
@@ -20,15 +23,27 @@ class OfflineStream(FeedCommands):
     Memory of a chunk is given back when a later one has been taken over.
     """
 
-    def __init__(self, kernel: str = "fixed", limits: NativeLimits | None = None) -> None:
-        """Raises InputError for an unknown kernel. Without limits those of the format hold."""
+    def __init__(
+        self,
+        kernel: str = "fixed",
+        limits: NativeLimits | None = None,
+        *,
+        cache_bytes: int = CACHE_BYTES,
+    ) -> None:
+        """Raises InputError for an unknown kernel. Without limits those of the format hold.
+
+        The setpoints do not depend on the size of the cache.
+        """
         self._ffi, self._lib = library()
         self._kernel = self._lib.kernel_find(kernel_code(kernel))
         self._stream = self._ffi.new("struct offline_stream *")
         self._feed = self._ffi.addressof(self._stream, "feed")
         self._parts: list[tuple[Any, ...]] = []
         given = self._ffi.new("struct program_limits *", limits_fields(limits or NativeLimits()))
-        self._lib.offline_stream_begin(self._stream, self._kernel, given)
+        self._cache = self._ffi.new("uint64_t[]", cache_bytes // 8)
+        memory = self._ffi.cast("uint8_t *", self._cache)
+        size = 8 * (cache_bytes // 8)
+        self._lib.offline_stream_begin(self._stream, self._kernel, given, memory, size)
 
     def give(self, chunk: bytes) -> NativeFault | None:
         """A chunk behind the newest accepted one; None: accepted. A refused one has changed nothing."""
@@ -39,11 +54,11 @@ class OfflineStream(FeedCommands):
         code = lib.offline_stream_check(self._stream, part, buffer, len(chunk), fault)
         if code != 0:
             return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
-        size = lib.coefficients_size(ffi.addressof(part.chunk, "program"), self._kernel)
-        records = ffi.new("uint64_t[]", (size + 7) // 8)
-        if lib.offline_stream_add(self._stream, part, records, size) != 0:
-            raise HodographError("coefficients: their size is not what it was: report a bug")
-        self._parts.append((part, buffer, records))
+        if lib.offline_stream_add(self._stream, part) != 0:
+            raise HodographError(
+                "the coefficient cache is too small for a program with so many axes"
+            )
+        self._parts.append((part, buffer))
         return None
 
     def run(self, ticks: int, *, until_rest: bool = False) -> NDArray[np.void]:

@@ -378,9 +378,9 @@ class RecordBytes:
 
 
 RECORD_BYTES = {
-    "fixed": RecordBytes(288, 208, 376, 56),
-    "float": RecordBytes(272, 208, 336, 56),
-    "double": RecordBytes(248, 176, 312, 48),
+    "fixed": RecordBytes(296, 256, 384, 56),
+    "float": RecordBytes(280, 256, 344, 56),
+    "double": RecordBytes(256, 224, 320, 48),
 }
 """By kernel."""
 LARGEST_BANK = 64 * 2**20 - 16
@@ -388,9 +388,14 @@ LARGEST_BANK = 64 * 2**20 - 16
 _COUNTS = struct.Struct("<20xIIxxH")
 
 
+def record_bytes(records: RecordBytes, axes: int) -> tuple[int, int]:
+    """Of a segment of a program with so many axes, and of a piece."""
+    extra = max(0, axes - SPACE_AXES) * records.extra_axis
+    return records.segment if axes <= PLANE_AXES else records.spatial_segment + extra, records.piece
+
+
 def memory_bytes(image: bytes, records: RecordBytes) -> int:
     """Image and its records. The image has a whole header."""
     segments, pieces, axes = _COUNTS.unpack_from(image[:HEADER_SIZE])
-    extra = max(0, axes - SPACE_AXES) * records.extra_axis
-    segment = records.segment if axes <= PLANE_AXES else records.spatial_segment + extra
-    return len(image) + int(segments) * segment + int(pieces) * records.piece
+    segment, piece = record_bytes(records, axes)
+    return len(image) + int(segments) * segment + int(pieces) * piece

@@ -12,11 +12,20 @@ from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import segment_ways, way_to_q40
-from .image import PIECE_SIZE, STOP_SIZE, VERSION, Program, header_size, segment_size
+from .image import (
+    PIECE_SIZE,
+    RECORD_BYTES,
+    STOP_SIZE,
+    VERSION,
+    Program,
+    header_size,
+    record_bytes,
+    segment_size,
+)
 from .stops import FAULT, HOLD, numbers, stops_dict, stops_text
 
 RING_BYTES = 48 * 1024
-"""For chunks, in the memory of a small controller."""
+"""Memory for chunks of the small controllers (0x2060 sub 14)."""
 
 _ROWS = 12
 
@@ -55,24 +64,65 @@ def inspect_dict(program: Program) -> dict[str, Any]:
 
 
 def _bytes(program: Program) -> dict[str, Any]:
-    """Of an image and of each of its records; how many seconds of such a program a ring for chunks has room for."""
-    rate = program.image_size / program.duration_s
+    """Of an image, of each of its parts and of the coefficients of each; what a ring for chunks has room for."""
+    segments, pieces, seconds = ring_holds(program, RING_BYTES)
     return {
         "header": header_size(program.axis_count),
         "segment": segment_size(program.axis_count),
         "piece": PIECE_SIZE,
         "stop": STOP_SIZE,
-        "image_per_s": rate,
+        "coefficients": {kernel: _coefficients(program, kernel) for kernel in RECORD_BYTES},
+        "image_per_s": program.image_size / program.duration_s,
         "ring": RING_BYTES,
-        "seconds_in_ring": RING_BYTES / rate,
+        "segments_in_ring": segments,
+        "pieces_in_ring": pieces,
+        "seconds_in_ring": seconds,
     }
 
 
+def _coefficients(program: Program, kernel: str) -> dict[str, int]:
+    of_segment, of_piece = record_bytes(RECORD_BYTES[kernel], program.axis_count)
+    return {"segment": of_segment, "piece": of_piece}
+
+
+def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
+    """Segments, pieces and seconds that fill so many bytes where they are densest.
+
+    Of a program that is smaller: so many of its mean density.
+    """
+    size = segment_size(program.axis_count), PIECE_SIZE + STOP_SIZE
+    starts = np.append(program.pieces.start_q40, program.length_q40)
+    times = np.concatenate((np.zeros(1), np.cumsum(program.pieces.duration_q32_s) * 2.0**-32))
+    # of the segments, those that begin before the end of each piece
+    begun = np.searchsorted(program.start_q40, starts, side="right")
+    filled = begun * size[0] + np.arange(program.piece_count + 1) * size[1]
+    last = np.searchsorted(filled, filled + ring_bytes, side="right") - 1
+    if last[0] == program.piece_count:
+        times_as_many = ring_bytes / (
+            program.segment_count * size[0] + program.piece_count * size[1]
+        )
+        return (
+            int(times_as_many * program.segment_count),
+            int(times_as_many * program.piece_count),
+            times_as_many * float(times[-1]),
+        )
+    full = np.flatnonzero(last < program.piece_count)
+    least = full[np.argmin(times[last[full]] - times[full])]
+    end = last[least]
+    return int(begun[end] - begun[least]), int(end - least), float(times[end] - times[least])
+
+
 def _bytes_text(found: dict[str, Any]) -> str:
+    coefficients = "; ".join(
+        f"{kernel} {one['segment']} and {one['piece']}"
+        for kernel, one in found["coefficients"].items()
+    )
     return (
         f"bytes     header {found['header']}, segment {found['segment']}, piece {found['piece']} with stop "
-        f"{found['stop']}; {found['image_per_s']:.0f} a second of motion, so {found['seconds_in_ring']:.3g} s in a "
-        f"ring of {found['ring'] // 1024} KiB"
+        f"{found['stop']}; {found['image_per_s']:.0f} a second of motion\n"
+        f"          coefficients of a segment and a piece: {coefficients}\n"
+        f"ring      {found['ring'] // 1024} KiB hold {found['segments_in_ring']} segments and "
+        f"{found['pieces_in_ring']} pieces, {found['seconds_in_ring']:.3g} s, where they are densest"
     )
 
 

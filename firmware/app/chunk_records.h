@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * chunk_records: the coefficient records of a job in chunks: those near the motion, in the memory of the port
+ * (core/coefficient_cache.h). The main loop makes them ahead of the tick: some half of the cache is ahead of the motion.
+ * Where the main loop stands still for longer than that, the tick has no point: the fault EMCY 0x6100, and the drives stop by
+ * their own ramps, as when the main loop stands still at all (FAULT_UNATTENDED).
+ * Main loop; machine is locked here where it has to be.
+ */
+#ifndef APP_CHUNK_RECORDS_H
+#define APP_CHUNK_RECORDS_H
+
+#include <stdbool.h>
+
+#include "app/machine/config.h"
+#include "app/machine/machine.h"
+#include "core/chunk.h"
+#include "core/coefficient_cache.h"
+
+/* Contents private. */
+struct chunk_records {
+    struct coefficient_cache cache;
+};
+
+void chunk_records_init(struct chunk_records *records);
+
+/* 0: the motion can follow this program; PROGRAM_ERR_KERNEL: the kernel of the configuration is not there;
+ * PROGRAM_ERR_ROOM: the cache is too small for a program with so many axes. */
+int chunk_records_check(const struct chunk_records *records, const struct program *program,
+                        const struct config *config);
+
+/* Those at the start of a program that has passed the check: for motion_begin_job. No motion uses others. */
+const struct coefficients_window *chunk_records_begin(struct chunk_records *records,
+                                                      const struct program *program,
+                                                      const struct config *config);
+
+/* Makes records further on in the program that is executed. */
+void chunk_records_go_on(struct chunk_records *records, struct machine *machine,
+                         const struct program *program);
+
+/* Records of the next chunk, where it can be taken over now: for machine_take_over. NULL: it cannot. */
+const struct coefficients_window *chunk_records_for_next(struct chunk_records *records,
+                                                         const struct machine *machine,
+                                                         const struct chunk *next);
+/* The machine has taken it over, with these records. */
+void chunk_records_taken_over(struct chunk_records *records);
+
+#endif
