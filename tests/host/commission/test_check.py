@@ -20,7 +20,9 @@ ROOT = Path(__file__).resolve().parents[3]
 MACHINE = load_machine(ROOT / "examples/machines/real_drives.toml")
 X = MACHINE.axes[0]
 """Has every key of an axis."""
-TABLE = (ROOT / "firmware/app/drives/drive_configuration.c").read_text(encoding="utf-8")
+SOURCE = (ROOT / "firmware/app/drives/drive_configuration.c").read_text(encoding="utf-8")
+TABLE = SOURCE[: SOURCE.index("module_rows[] =")]
+"""Without the rows of an I/O module."""
 ROW = re.compile(r"\{WHEN_(\w+), ROW_(\w+), (0x[0-9A-F]{4}), (\d+), (\d+),")
 Place = tuple[int, int]
 

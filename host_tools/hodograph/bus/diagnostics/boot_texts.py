@@ -71,6 +71,10 @@ _OBJECTS = {
     0x609A: ("homing acceleration", "correct the homing acceleration in the machine file"),
     0x60C2: ("interpolation period", "choose a period that the drive has ([bus] period_us)"),
     0x60FD: ("digital inputs", "see the drive's manual"),
+    0x6206: ("error mode of the digital outputs", "see the I/O module's manual"),
+    0x6207: ("error values of the digital outputs", "see the I/O module's manual"),
+    0x6443: ("error mode of the analogue outputs", "see the I/O module's manual"),
+    0x6444: ("error values of the analogue outputs", "see the I/O module's manual"),
     0x6502: (
         "supported modes",
         "the drive has no cyclic synchronous position mode: use another drive",
