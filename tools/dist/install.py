@@ -103,7 +103,8 @@ def other_items(build: Path, library: Path, places: Places) -> list[Item]:
         page = program_page(program, version())
         if page is not None:
             items.append(Item(places.prefix / f"share/man/man1/{program.name}.1", page))
-    for eds in (ROOT / "firmware/app/controller.eds", ROOT / "sim/node/drive.eds"):
+    for name in ("firmware/app/controller.eds", "sim/node/drive.eds", "sim/node/module.eds"):
+        eds = ROOT / name
         items.append(Item(places.data / "eds" / eds.name, eds.read_bytes()))
     examples = library / "tree/examples"
     for file in sorted(path for path in examples.rglob("*") if path.is_file()):

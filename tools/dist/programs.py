@@ -41,7 +41,11 @@ FOLDERS = (
 )
 """Where the rest of their sources lies; the linker takes what a program needs."""
 
-OBJECT_DICTIONARIES = {"controller": "firmware/app/controller.eds", "drive": "sim/node/drive.eds"}
+OBJECT_DICTIONARIES = {
+    "controller": "firmware/app/controller.eds",
+    "drive": "sim/node/drive.eds",
+    "module": "sim/node/module.eds",
+}
 
 CFLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC")
 LIBRARIES = ("-lm", "-lpthread")
