@@ -16,12 +16,13 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 /* Whether a brake would rest before the end of the path: found out a tick before it begins. */
 enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
 
-#define TICK_Q30      ((int64_t)1 << 30)
-#define SPARE_TICKS   2  /* of the deadline: rounding */
-#define END_TICKS     2u /* until a command counts, and until the end is a setpoint */
-#define SEARCH_STEPS  2  /* in a tick at rest */
-#define NO_NUMBERS    2u
-#define MOST_FEED_Q32 ((int64_t)1 << 45)
+#define TICK_Q30          ((int64_t)1 << 30)
+#define SPARE_TICKS       2        /* of the deadline: rounding */
+#define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
+#define END_TICKS         2u       /* until a command counts, and until the end is a setpoint */
+#define SEARCH_STEPS      2        /* in a tick at rest */
+#define NO_NUMBERS        2u
+#define MOST_FEED_Q32     ((int64_t)1 << 45)
 #define MOST_SLOPE_Q56                                                                             \
     (((int64_t)1 << 57) - 1)         /* 2^57, the greatest, less a unit: it is made an int32_t */
 #define REACH_Q40 ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
@@ -108,9 +109,8 @@ static uint32_t left_us(const struct feed_override *f)
 static int64_t deadline_q30(const struct feed_override *f)
 {
     const uint32_t bound_us = feed_override_bound_us(f, (enum program_stop_kind)f->kind);
-    const uint64_t time_us = qmath_product_unsigned(bound_us, 6u);
-    const uint64_t ticks_q8 = qmath_div_u64(time_us << 8, 5u * f->clock.period_us);
-    return ((int64_t)ticks_q8 << 22) + SPARE_TICKS * TICK_Q30;
+    const uint64_t ms_q32 = qmath_product_unsigned(bound_us, FIFTH_MORE_MS_Q32);
+    return ((int64_t)(ms_q32 >> (2u + f->clock.period_log2))) + SPARE_TICKS * TICK_Q30;
 }
 
 static void read_numbers(struct feed_override *f)
