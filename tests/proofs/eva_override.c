@@ -14,7 +14,7 @@
  * mutant: core/feed_override.c: ((int64_t)1 << 45) => ((int64_t)1 << 49)
  * mutant: core/feed_override.c: program_stop_get(f->clock.program, f->clock.piece, (enum => program_stop_get(f->clock.program, f->clock.piece + 1u, (enum
  * mutant: core/feed_override.c: slope_q56 >> 26 => slope_q56 >> 25
- * mutant: core/feed_override.c: (int64_t)ticks_q8 << 22 => (int64_t)ticks_q8 << 40
+ * mutant: core/feed_override.c: SPARE_TICKS * TICK_Q30 => INT64_MAX
  * mutant: core/feed_override.c: f->kind : NO_NUMBERS; => f->kind : NO_NUMBERS + 1u;
  * mutant: core/feed_override.c: f->place.piece_index, f->place.piece => f->place.piece_index + 1u, f->place.piece
  * mutant: core/feed_override.c: interpolator_search_begin(&f->place, f->clock.piece, => interpolator_search_begin(&f->place, f->clock.piece + 1u,
