@@ -248,9 +248,9 @@ def test_a_program_that_no_bank_can_hold_is_refused_before_it_is_sent(
 ) -> None:
     """Not after the last of its bytes."""
     image = bytearray(program("alpha_quintic"))
-    image[24:28] = (2**20).to_bytes(4, "little")  # pieces: 208 MB of records
+    image[24:28] = (2**20).to_bytes(4, "little")  # pieces: 268 MB of records
     sent: list[int] = []
-    with pytest.raises(RefusedError, match=r"takes 218.* with what is prepared from it"):
+    with pytest.raises(RefusedError, match=r"takes 268.* with what is prepared from it"):
         controller.upload(bytes(image), sent.append)
     assert sent == []
 
