@@ -24,6 +24,7 @@ from neighbour import latched
 from bench import EXAMPLES, VCAN0, Bench, MakeBench
 from hodograph.bus.capture.frames import Frames
 from hodograph.bus.capture.recorder import Recorder
+from hodograph.bus.processes import CONTROLLER, find_program
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.objects import MOVING
 from hodograph.bus.sdo.stream_channel import ENDED, OPEN, stream_status
@@ -145,7 +146,7 @@ def _killed_and_stopped(bench: Bench, host: Host, kill_mm: float, stop_mm: float
             _await_y(bench, child, kill_mm)
             child.send_signal(signal.SIGKILL)
             child.communicate(timeout=LIMIT_S)
-        _await_rest(bench)
+        assert _await_rest(bench) != host.corners[-1].tolist()
         with host.running("--continue") as child:
             _await_y(bench, child, stop_mm)
             child.send_signal(signal.SIGSTOP)
@@ -159,8 +160,15 @@ def _killed_and_stopped(bench: Bench, host: Host, kill_mm: float, stop_mm: float
     host.expect_on_path(frames, nodes)
 
 
-def test_a_host_that_is_killed_and_one_that_stops(make_bench: MakeBench, tmp_path: Path) -> None:
-    _killed_and_stopped(make_bench("fast", MILL), Host(tmp_path, CORNERS, PART), 0.3, 1.5)
+def test_a_host_that_is_killed_and_one_that_stops(
+    make_bench: MakeBench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ring of 12 KiB holds few of the sections: at any load most of them have not been sent when the host goes."""
+    monkeypatch.setenv("HODOGRAPH_CONTROLLER", f"{find_program(CONTROLLER)} --ring 12")
+    corners = [(0.0, 0.0, 0.0), *((4.0 - k % 2, 0.4 * k, 0.0) for k in range(61)), (0.0, 0.0, -2.0)]
+    moves = "\n".join(f"G1 X{x:g} Y{y:g} Z{z:g}" for x, y, z in corners[1:])
+    host = Host(tmp_path, tuple(corners), f"F6000\nG61\n{moves}\nM2\n")
+    _killed_and_stopped(make_bench("fast", MILL), host, 0.3, 6.0)
 
 
 @pytest.mark.long
