@@ -11,14 +11,13 @@
 #include "canopen/cob.h"
 #include "port/port.h"
 
-#define SDO_TIMEOUT_US            2000000u
-#define SDO_BLOCK_SEGMENTS        127u
-#define SEND_TRIES                40u
-#define SEND_PAUSE_US             500u
-#define FIRST_MANUFACTURER_OBJECT 0x2000u
-#define LAST_OBJECT               0xFFFFu
-#define OFF_TIME_US               1000000u
-#define STOP_BOUND_MOST_US        60000000u
+#define SDO_TIMEOUT_US     2000000u
+#define SDO_BLOCK_SEGMENTS 127u
+#define SEND_TRIES         40u
+#define SEND_PAUSE_US      500u
+#define LAST_OBJECT        0xFFFFu
+#define OFF_TIME_US        1000000u
+#define STOP_BOUND_MOST_US 60000000u
 
 bool controller_configured(const struct controller *controller)
 {
@@ -89,16 +88,9 @@ static void reset_node(void *self)
 static void reset_communication(void *self)
 {
     struct controller *controller = self;
-    const struct od_table *table = controller->od.table;
-    for (uint16_t i = 0; i < table->entry_count; i++) {
-        const struct od_entry *entry = &table->entries[i];
-        if (entry->index < FIRST_MANUFACTURER_OBJECT && entry->size > 0u) {
-            memcpy(controller->od.storage + entry->offset,
-                   (const uint8_t *)&od_controller_defaults + entry->offset, entry->size);
-        }
-    }
+    od_reset_communication(&controller->od, &od_controller_defaults);
     (void)parameter_store_restore(&controller->store, &controller->od, 0,
-                                  FIRST_MANUFACTURER_OBJECT - 1u);
+                                  OD_FIRST_MANUFACTURER - 1u);
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
     take_configuration(controller);

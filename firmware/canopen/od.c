@@ -19,6 +19,17 @@ void od_init(struct od *od, const struct od_table *table, void *storage,
     od->context = context;
 }
 
+void od_reset_communication(struct od *od, const void *defaults)
+{
+    for (uint16_t i = 0; i < od->table->entry_count; i++) {
+        const struct od_entry *entry = &od->table->entries[i];
+        if (entry->index < OD_FIRST_MANUFACTURER && entry->size > 0u) {
+            memcpy(od->storage + entry->offset, (const uint8_t *)defaults + entry->offset,
+                   entry->size);
+        }
+    }
+}
+
 static uint32_t key_of(uint16_t index, uint8_t sub)
 {
     return ((uint32_t)index << 8) | sub;

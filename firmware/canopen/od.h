@@ -125,6 +125,12 @@ struct od {
 void od_init(struct od *od, const struct od_table *table, void *storage,
              const struct od_hooks *hooks, void *context);
 
+#define OD_FIRST_MANUFACTURER 0x2000u /* the first index that is no communication object */
+
+/* Gives the communication objects, those below OD_FIRST_MANUFACTURER, the values of the generated `od_<name>_defaults`, as
+ * NMT reset communication asks for. Handlers are not called. */
+void od_reset_communication(struct od *od, const void *defaults);
+
 /* The entry (index, sub), or NULL. */
 const struct od_entry *od_find(const struct od *od, uint16_t index, uint8_t sub);
 

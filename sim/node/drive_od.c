@@ -35,13 +35,7 @@ void drive_od_fill(struct drive_node *node)
 
 void drive_od_reset_communication(struct drive_node *node)
 {
-    for (uint16_t i = 0; i < node->od.table->entry_count; i++) {
-        const struct od_entry *entry = &node->od.table->entries[i];
-        if (entry->index < 0x2000u && entry->size > 0) {
-            memcpy(node->od.storage + entry->offset,
-                   (const uint8_t *)&od_drive_defaults + entry->offset, entry->size);
-        }
-    }
+    od_reset_communication(&node->od, &od_drive_defaults);
 }
 
 /* ---- handlers: _check before the value is stored, _changed after it ---- */

@@ -6,7 +6,7 @@
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 
-enum { SDO_TIMEOUT_US = 1000000, FIRST_RPDO = 0x1400, FIRST_PROFILE_OBJECT = 0x2000 };
+enum { SDO_TIMEOUT_US = 1000000, FIRST_RPDO = 0x1400 };
 
 #define DIGITAL_BYTES (sizeof((struct od_module *)0)->write_output_8_bit)
 #define ANALOGUES (sizeof((struct od_module *)0)->write_analogue_output_16_bit / sizeof(int16_t))
@@ -40,13 +40,7 @@ static void reset_node(void *context)
 static void reset_communication(void *context)
 {
     struct io_module *module = context;
-    for (uint16_t i = 0; i < module->od.table->entry_count; i++) {
-        const struct od_entry *entry = &module->od.table->entries[i];
-        if (entry->index < FIRST_PROFILE_OBJECT && entry->size > 0) {
-            memcpy(module->od.storage + entry->offset,
-                   (const uint8_t *)&od_module_defaults + entry->offset, entry->size);
-        }
-    }
+    od_reset_communication(&module->od, &od_module_defaults);
     begin_communication(module);
 }
 

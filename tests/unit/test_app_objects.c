@@ -6,8 +6,7 @@
 #include "app_bench.h"
 #include "unity.h"
 
-#define FIRST_MANUFACTURER_OBJECT 0x2000u
-#define STALE                     UINT64_C(0x5A5A5A5A5A5A5A5A) /* no object ever has this value */
+#define STALE UINT64_C(0x5A5A5A5A5A5A5A5A) /* no object ever has this value */
 
 static struct app_bench bench;
 
@@ -47,7 +46,7 @@ static void test_every_read_only_object_of_the_machine_is_computed(void)
     for (uint16_t i = 0; i < table->entry_count; ++i) {
         const struct od_entry *entry = &table->entries[i];
         const bool member = entry->sub > 0u || entry->index == 0x2002u || entry->index == 0x2040u;
-        if (entry->index >= FIRST_MANUFACTURER_OBJECT && entry->access == OD_READ && member &&
+        if (entry->index >= OD_FIRST_MANUFACTURER && entry->access == OD_READ && member &&
             is_number(entry)) {
             TEST_ASSERT_FALSE_MESSAGE(reads_stale(entry), "an object without a reader");
             seen++;
@@ -65,7 +64,7 @@ static void test_what_the_host_wrote_is_read_back(void)
         const struct od_entry *entry = &table->entries[i];
         const bool own =
             entry->index == 0x2010u || entry->index == 0x2050u || entry->index == 0x2060u;
-        if (entry->index >= FIRST_MANUFACTURER_OBJECT && !own && is_number(entry) &&
+        if (entry->index >= OD_FIRST_MANUFACTURER && !own && is_number(entry) &&
             (entry->access & (OD_READ | OD_WRITE)) == (OD_READ | OD_WRITE)) {
             TEST_ASSERT_TRUE_MESSAGE(reads_stale(entry), "a written object has a reader");
             seen++;
