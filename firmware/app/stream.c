@@ -180,15 +180,6 @@ static uint64_t job_time_behind_q32_s(const struct stream_chunk *newest, const s
            ticks_q32_s(chunk_rest_ticks(chunk), before->period_us);
 }
 
-static uint64_t shared_time_q32_s(const struct chunk *chunk)
-{
-    uint64_t sum = 0;
-    for (uint32_t i = 0; i < chunk->shared_pieces; ++i) {
-        sum += program_piece_duration(&chunk->program, i);
-    }
-    return sum;
-}
-
 static void accept(struct stream *stream, struct stream_chunk *chunk, const struct config *config)
 {
     chunk->next = NULL;
@@ -198,7 +189,8 @@ static void accept(struct stream *stream, struct stream_chunk *chunk, const stru
         chunk->job_time_q32_s = job_time_behind_q32_s(stream->newest, &chunk->chunk);
         stream->newest->next = chunk;
     }
-    chunk->joint_time_q32_s = chunk->job_time_q32_s + shared_time_q32_s(&chunk->chunk);
+    chunk->joint_time_q32_s =
+        chunk->job_time_q32_s + chunk->chunk.joint_time_q32_s - chunk->chunk.time_shift_q32_s;
     stream->newest = chunk;
     stream->wanted = chunk->chunk.sequence + 1u;
 }

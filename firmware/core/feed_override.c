@@ -569,14 +569,20 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 
 /* --- Its records --- */
 
+/* The program clock is where the motion is: not in a brake, nor until the place of its rest is found. */
+static int clock_is_here(const struct feed_override *f)
+{
+    return f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
+}
+
 void feed_override_place(const struct feed_override *f, const struct interpolator *it,
                          struct feed_place *place)
 {
-    const int found = f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
-    place->piece = f->phase == PHASE_REST && !found ? f->place.piece_index : f->clock.piece;
+    const int here = clock_is_here(f);
+    place->piece = f->phase == PHASE_REST && !here ? f->place.piece_index : f->clock.piece;
     place->segment = it->segment->number;
     place->arc_length_q40_mm = f->point.arc_length_q40_mm;
-    place->by_arc = found ? 0u : 1u;
+    place->by_arc = here ? 0u : 1u;
 }
 
 /* While it is looked for where the motion rests, no piece is needed but that which is bisected; in a brake, none. */
@@ -584,10 +590,9 @@ int feed_override_use(struct feed_override *f, struct interpolator *it,
                       const struct coefficients_window *window)
 {
     const int bisects = f->phase == PHASE_REST && f->found == 0 && f->place.bisecting != 0;
-    const int plan = f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
     const uint32_t piece = bisects ? f->place.piece_index : f->clock.piece;
     const struct coefficients_piece *record = coefficients_window_piece(window, piece);
-    if (((bisects || plan) && record == NULL) ||
+    if (((bisects || clock_is_here(f)) && record == NULL) ||
         coefficients_window_segment(window, it->segment->number) == NULL) {
         return 0;
     }

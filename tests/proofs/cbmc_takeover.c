@@ -22,8 +22,8 @@
  * mutant: core/feed_override.c: 0u : f->clock.piece - next->piece_shift; => 0u : f->clock.piece;
  * mutant: core/feed_override.c: segment == NULL || (at.by_arc == 0u && record == NULL)) { => segment == NULL) {
  * mutant: core/feed_override.c: || segment == NULL || => ||
- * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((bisects && record == NULL) ||
- * mutant: core/feed_override.c: if (((bisects || plan) && record == NULL) || => if ((plan && record == NULL) ||
+ * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((bisects && record == NULL) ||
+ * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((clock_is_here(f) && record == NULL) ||
  * mutant: core/feed_override.c: override_plan_let_go(&f->plan); =>
  * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase == PHASE_PLAN;
  * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->state == FEED_HELD || f->state == STATE_WAITING;

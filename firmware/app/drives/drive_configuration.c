@@ -116,7 +116,7 @@ enum pdo_number {
     TPDO3_OFF,
     TPDO3_INPUTS,
     TPDO4_OFF,
-    MODULE_TPDO1_OFF,
+    TPDO1_OFF,
 };
 
 /* docs/reference/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
@@ -169,7 +169,7 @@ static const struct drive_pdo drive_pdos[] = {
                       {0x60FD0020, 0, 0, 0, 0},
                       DRIVE_INPUTS_MAPPED},
     [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [MODULE_TPDO1_OFF] = {0x1800, COB_TPDO1, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO1_OFF] = {0x1800, COB_TPDO1, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
 };
 
 #define FIELD(name) offsetof(struct config_axis, name)
@@ -279,7 +279,7 @@ static const struct drive_row module_rows[] = {
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO4_OFF},
-    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, MODULE_TPDO1_OFF},
+    {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO1_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO2_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO3_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO4_OFF},
