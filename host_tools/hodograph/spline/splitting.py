@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Halving segments until they suit the program format; docs/theory/numerics.md 4.5."""
+"""Parts of segments: halved until they suit the program format (docs/theory/numerics.md 4.5), or cut at places."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from math import inf
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
-from .bernstein import Real, halves, square, square_modulus
+from .bernstein import Real, halves, restricted, square, square_modulus
 from .quintics import halved
 
 _HAIR = 1.0 - 2.0**-20
@@ -73,6 +74,29 @@ def split_segments(
         extra = None if extra is None else _halved_extra(extra, split)
         origin, w, source = _halved(origin, w, source, split, image)
     raise PlanError("split: the segments cannot be made short enough: is the path absurdly long?")
+
+
+def cut_segments(w: Any, segment: NDArray[np.intp], xi: Real) -> tuple[NDArray[np.intp], Real, Any]:
+    """Segments with joints at further places too: of each part the segment (K,) that it is of, the xi (K,) of that at
+    which it begins, and its preimage.
+
+    w            (N, 3) in the plane, (N, 4, 3) in space
+    segment, xi  (n,) of the places, xi inside 0 … 1
+    """
+    whole = np.arange(len(w))
+    owner = np.concatenate((whole, segment))
+    begin = np.concatenate((np.zeros(whole.size), xi))
+    order = np.lexsort((begin, owner))
+    owner, begin = owner[order], begin[order]
+    end = np.where(np.append(np.diff(owner) == 0, False), np.append(begin[1:], 1.0), 1.0)
+    return owner, begin, part_of(w[owner], begin, end)
+
+
+def part_of(w: Any, low: Real, high: Real) -> Any:
+    """The preimages of the parts from xi = low to high (n,) of segments, (n, 3) in the plane, (n, 4, 3) in space."""
+    low, high = (np.reshape(one, (-1,) + (1,) * (w.ndim - 2)) for one in (low, high))
+    # dr/dxi shrinks with the interval, so w by the root of it
+    return np.sqrt(high - low)[..., None] * restricted(w, low, high)
 
 
 def _place(point: Any) -> str:

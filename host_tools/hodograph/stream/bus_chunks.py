@@ -21,6 +21,7 @@ from ..program.image import Program
 from ..spline import PHSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from .chunk import Chunk, parse
+from .geometry import points_at
 
 REQUEST, RESPONSE = 0x600, 0x580
 _CHUNK = struct.pack("<HB", STREAM, 1)
@@ -92,10 +93,8 @@ def _drawn(program: Program) -> tuple[Floats, Floats]:
     origin: Floats = np.ldexp(program.point_q40.astype(np.float64), -40)
     a: Floats = np.ldexp(program.a_q44.astype(np.float64), -44)
     if len(a) == 2:
-        planar = PHSpline(origin[0] + 1j * origin[1], a[0] + 1j * a[1], False).point(ways)
-        return ways, np.stack((planar.real, planar.imag), axis=-1)
-    curve = SpatialPHSpline(origin[:3].T, np.moveaxis(a, 0, 1), False)
-    return ways, np.asarray(curve.point(ways), dtype=np.float64)
+        return ways, points_at(PHSpline(origin[0] + 1j * origin[1], a[0] + 1j * a[1], False), ways)
+    return ways, points_at(SpatialPHSpline(origin[:3].T, np.moveaxis(a, 0, 1), False), ways)
 
 
 class JobPoints:

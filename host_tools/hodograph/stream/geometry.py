@@ -21,6 +21,7 @@ from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
 from ..spline import PHSpline
 from ..spline.spatial import SpatialPHSpline
+from ..spline.splitting import cut_segments, part_of
 
 Real = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -128,34 +129,28 @@ def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
     return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
 
 
-def cut_segments(curve: Curve, at_mm: Real) -> Curve:
-    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint."""
+def with_joints(curve: Curve, at_mm: Real) -> Curve:
+    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint. Without extra axes."""
     if not at_mm.size:
         return curve
     segment, xi = curve.locate(at_mm)
-    w = curve.w if isinstance(curve, PHSpline) else curve.preimage
-    parts, begin, done = [], 0, 0.0
-    for first, x in zip(segment.tolist(), xi.tolist(), strict=True):
-        if first >= begin:
-            parts.append(w[begin:first])
-            rest, begin, done = w[first : first + 1], first + 1, 0.0
-        else:
-            rest = parts.pop()
-        at = (x - done) / (1.0 - done)
-        # The part before is the one behind of the segment the other way round.
-        parts += [_behind_at(rest[..., ::-1], 1.0 - at)[..., ::-1], _behind_at(rest, at)]
-        done = x
     origin: Any = np.insert(curve.origin, segment + 1, curve.position(segment, xi), axis=0)
-    made = PHSpline if isinstance(curve, PHSpline) else SpatialPHSpline
-    return made(origin, np.concatenate([*parts, w[begin:]]), False)
+    if isinstance(curve, PHSpline):
+        return PHSpline(origin, cut_segments(curve.w, segment, xi)[2], False)
+    return SpatialPHSpline(origin, cut_segments(curve.preimage, segment, xi)[2], False)
 
 
 def _behind_at(w: Any, x: float) -> Any:
-    """Preimages (n, …, 3) whose first one begins at x of it; de Casteljau."""
-    a, b, c = np.moveaxis(w[:1], -1, 0)
-    near, far = a + x * (b - a), b + x * (c - b)
-    halved = np.stack((near + x * (far - near), far, c), axis=-1)
-    return np.concatenate((halved * np.sqrt(1.0 - x), w[1:]))
+    """Preimages (n, …, 3) whose first one begins at x of it."""
+    return np.concatenate((part_of(w[:1], np.array([x]), np.ones(1)), w[1:]))
+
+
+def points_at(curve: Curve, s_mm: Real) -> Real:
+    """Points (n, 2) or (n, 3) at arc lengths (n,)."""
+    point = curve.point(s_mm)
+    if isinstance(curve, PHSpline):
+        return np.stack((point.real, point.imag), axis=-1)
+    return np.asarray(point, dtype=np.float64)
 
 
 class StreamPath:

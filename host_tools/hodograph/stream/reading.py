@@ -31,7 +31,7 @@ from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
-from .geometry import Block, cut_segments
+from .geometry import Block, with_joints
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -213,7 +213,7 @@ def block_of(section: JobSection) -> Block:
     apart = np.minimum(changes - edges[after - 1], edges[after] - changes)
     cuts = changes[apart > _LEAST_CUT_MM]
     cuts = cuts[np.append(True, np.diff(cuts) > _LEAST_CUT_MM)] if cuts.size else cuts
-    curve = cut_segments(section.pipeline.curve, fitted.arc_length_at(cuts))
+    curve = with_joints(section.pipeline.curve, fitted.arc_length_at(cuts))
     place = np.sort(np.concatenate((edges, cuts)))
     # A segment that ends where a chord does has nothing of the next one, whose feed may be less.
     low = np.searchsorted(reference.place_mm, place[:-1] + _BESIDE_MM, side="right") - 1

@@ -13,8 +13,7 @@ from ..config import SPACE_AXES, load_paths
 from ..errors import InputError
 from ..names import is_toolpath
 from ..pipeline import Pipeline
-from ..spline import PHSpline
-from .geometry import Block, Curve
+from .geometry import Block, Curve, points_at
 from .journal import Entry
 from .plan import JobFiles, Place
 from .reading import StreamReader
@@ -100,7 +99,7 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
 def _found(
     block: Block, way_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
 ) -> Nearest:
-    point = _points(block.curve, np.array([way_mm]), target.size)[0]
+    point = points_at(block.curve, np.array([way_mm]))[0, : target.size]
     segment, _ = block.curve.locate(way_mm)
     return Nearest(
         Place(number, round((begin_mm + way_mm) * 2.0**40)),
@@ -129,13 +128,4 @@ def _refined(curve: Curve, target: Real, s: Real, k: int) -> float:
 
 
 def _distances(curve: Curve, s: Real, target: Real) -> Real:
-    return np.asarray(np.linalg.norm(_points(curve, s, target.size) - target, axis=1))
-
-
-def _points(curve: Curve, s: Real, axes: int) -> Real:
-    """Points (n, A) at arc lengths (n,)."""
-    if isinstance(curve, PHSpline):
-        planar = curve.point(s)
-        return np.stack((planar.real, planar.imag), axis=-1)
-    point = curve.point(s)
-    return np.asarray(point, dtype=np.float64)[:, :axes]
+    return np.asarray(np.linalg.norm(points_at(curve, s)[:, : target.size] - target, axis=1))

@@ -26,7 +26,7 @@ from hodograph.program.check import check, check_image
 from hodograph.spline import from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
 from hodograph.stream.chunks import SectionChunks
-from hodograph.stream.geometry import blocks_from, cut_segments
+from hodograph.stream.geometry import blocks_from, with_joints
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.toolpath.files import ReadOptions
@@ -155,7 +155,7 @@ def test_a_plunge_behind_a_rapid_move_in_its_direction_takes_its_time(
 def test_segments_are_cut_at_arc_lengths() -> None:
     curve = from_control_polygon(np.array([0, 10 + 5j, 20 - 3j, 33 + 4j, 50 - 7j]), False).spline
     at_mm = np.array([1.0, 2.0, 2.5, 0.6 * curve.length_mm])
-    cut = cut_segments(curve, at_mm)
+    cut = with_joints(curve, at_mm)
     assert np.allclose(np.setdiff1d(np.round(at_mm, 9), np.round(cut.segment_starts_mm, 9)), [])
     s_mm = np.linspace(0.0, curve.length_mm, 200)
     assert cut.segment_count == curve.segment_count + at_mm.size

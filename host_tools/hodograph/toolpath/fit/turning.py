@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...errors import PlanError
 from ...spline.spatial import SpatialPHSpline
 from ...spline.spatial.extra import quintics_by_arc_length
+from ...spline.splitting import cut_segments
 from .certificate import Certificate
 from .fitting import FittedPath
 
@@ -235,25 +236,9 @@ def turning_bound_deg(curve: SpatialPHSpline, target: Angles) -> Real:
 def _cut(fitted: FittedPath, segment: Index, xi: Real) -> FittedPath:
     """The path with joints at these rising places too, xi inside 0 … 1."""
     curve = fitted.curve
-    whole = np.arange(curve.segment_count)
-    owner = np.concatenate((whole, segment))
-    begin = np.concatenate((np.zeros(whole.size), xi))
-    order = np.lexsort((begin, owner))
-    owner, begin = owner[order], begin[order]
-    end = np.where(np.append(np.diff(owner) == 0, False), np.append(begin[1:], 1.0), 1.0)
-    a, b, c = np.moveaxis(curve.preimage[owner], 2, 0)
-    low, high = begin[:, None], end[:, None]
-
-    def blossom(u: Real, v: Real) -> Real:
-        """The polar form of the quadratics."""
-        return np.asarray(
-            (1.0 - u) * (1.0 - v) * a + ((1.0 - u) * v + u * (1.0 - v)) * b + u * v * c
-        )
-
-    share = np.sqrt(high - low)[:, :, None]
-    parts = (blossom(low, low), blossom(low, high), blossom(high, high))
-    preimage = share * np.stack(parts, axis=2)
-    origin = np.where(low > 0.0, curve.position(owner, begin), curve.origin[owner])
+    owner, begin, preimage = cut_segments(curve.preimage, segment, xi)
+    inside = begin[:, None] > 0.0
+    origin = np.where(inside, curve.position(owner, begin), curve.origin[owner])
     passed = curve.arc_length(owner, begin) / curve.segment_lengths_mm[owner]
     place = fitted.place_mm[owner] + np.diff(fitted.place_mm)[owner] * passed
     return FittedPath(
