@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+#include "app/commands.h"
 #include "canopen/cob.h"
 #include "canopen/pdo.h"
 #include "canopen/sdo_abort.h"
@@ -200,6 +201,15 @@ uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint
         count++;
     }
     return count;
+}
+
+void app_bench_make_ready(struct app_bench *bench)
+{
+    (void)app_bench_until(bench, MACHINE_OFF, 1000);
+    app_bench_periods(bench, 3);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(bench, COMMAND_ENABLE));
+    (void)app_bench_until(bench, MACHINE_READY, 100);
+    app_bench_periods(bench, AXIS_STANDSTILL_SYNCS);
 }
 
 static uint32_t finish_transfer(struct app_bench *bench, int begun, const struct can_msg *request)

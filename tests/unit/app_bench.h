@@ -49,6 +49,9 @@ void app_bench_periods(struct app_bench *bench, uint32_t count);
 /* Periods until the state; fails the test when it takes more than `most`. Returns how many. */
 uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint32_t most);
 
+/* From boot: the drives are switched on and have stood still long enough for a start. */
+void app_bench_make_ready(struct app_bench *bench);
+
 /* Delivers all frames that are under way, and lets the main loop do what they ask for. */
 void app_bench_settle(struct app_bench *bench);
 

@@ -34,11 +34,7 @@ void setUp(void)
     app_bench_init(&bench, X_COUNTS, Y_COUNTS);
     app_image_make(image, 10, -5);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
-    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    app_bench_periods(&bench, 3);
-    command(COMMAND_ENABLE);
-    (void)app_bench_until(&bench, MACHINE_READY, 100);
-    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    app_bench_make_ready(&bench);
 }
 
 void tearDown(void)

@@ -100,11 +100,7 @@ static void configure_module(void)
 static void make_ready(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, image_size));
-    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    app_bench_periods(&bench, 3);
-    command(COMMAND_ENABLE);
-    (void)app_bench_until(&bench, MACHINE_READY, 100);
-    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    app_bench_make_ready(&bench);
 }
 
 void setUp(void)
@@ -193,13 +189,19 @@ static void test_a_hold_at_any_instant_keeps_them(void)
     }
 }
 
-static void test_off_in_hold_comes_back(void)
+/* In mid-program, behind the places where both go on. */
+static void start_with_outputs_on(uint32_t behaviour)
 {
-    configure(4, OFF_IN_HOLD, 1);
+    configure(4, behaviour, 1);
     make_ready();
     start();
     app_bench_periods(&bench, 250);
     TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+}
+
+static void test_off_in_hold_comes_back(void)
+{
+    start_with_outputs_on(OFF_IN_HOLD);
     command(COMMAND_HOLD);
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_HEX16(0, digital());
@@ -229,11 +231,7 @@ static void test_proportional_value_follows_the_feed(void)
 static void check_after_stop(unsigned number, uint32_t behaviour, bool kept)
 {
     setUp();
-    configure(4, behaviour, 1);
-    make_ready();
-    start();
-    app_bench_periods(&bench, 250);
-    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    start_with_outputs_on(behaviour);
     command(number);
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_HEX16(kept ? LAMP | VALVE : 0, digital());

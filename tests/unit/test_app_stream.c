@@ -86,11 +86,7 @@ static void expect_refused(const struct chunk_plan *plan, int code)
 /* On the bus with the ring as it is now; drives on. */
 static void power_on(void)
 {
-    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    app_bench_periods(&bench, 3);
-    command(COMMAND_ENABLE);
-    (void)app_bench_until(&bench, MACHINE_READY, 100);
-    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    app_bench_make_ready(&bench);
 }
 
 void setUp(void)
