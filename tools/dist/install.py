@@ -22,6 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from dist.library import PARTS, ROOT, Abi, filled, version
 from dist.program_page import program_page
+from dist.programs import OBJECT_DICTIONARIES
 
 
 @dataclass(frozen=True)
@@ -103,8 +104,7 @@ def other_items(build: Path, library: Path, places: Places) -> list[Item]:
         page = program_page(program, version())
         if page is not None:
             items.append(Item(places.prefix / f"share/man/man1/{program.name}.1", page))
-    for name in ("firmware/app/controller.eds", "sim/node/drive.eds", "sim/node/module.eds"):
-        eds = ROOT / name
+    for eds in map(ROOT.joinpath, OBJECT_DICTIONARIES.values()):
         items.append(Item(places.data / "eds" / eds.name, eds.read_bytes()))
     examples = library / "tree/examples"
     for file in sorted(path for path in examples.rglob("*") if path.is_file()):

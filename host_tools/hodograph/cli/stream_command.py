@@ -45,9 +45,6 @@ from .toolpath_commands import reading_of, refuse_toolpath_options, require_tool
 _RING_SHARE = 3
 """A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
 
-_SMALL_RING = RING_BYTES
-"""Of the small controllers; --simulate makes chunks for it."""
-
 _EVERY_S = 5.0
 _FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
 """Of a frame of a block download, with all stuff bits; share of the free bus that is reached beside answers and
@@ -318,7 +315,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     found: list[StreamedMotion] = []
     begin_s = time.perf_counter()
     with (
-        JobPlan(job, _SMALL_RING // _RING_SHARE, 1, Place()) as plan,
+        JobPlan(job, RING_BYTES // _RING_SHARE, 1, Place()) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():

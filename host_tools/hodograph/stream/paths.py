@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
@@ -43,7 +42,7 @@ class _RestPipeline(Pipeline):
                 f"{self.file.file}: a path with extra axes cannot go on in its middle: stream the job from its start"
             )
         curve = curve_behind(found.spline, self.begin_mm)[1]
-        if isinstance(curve, PHSpline):
+        if isinstance(curve, PHSpline):  # two branches, so that each has the type of its curve
             return FoundSpline(curve, 0)
         return FoundSpline(curve, 0)
 
@@ -136,8 +135,7 @@ class PathsJob:
         return _RestPipeline(file, self.machine, begin_mm)
 
     def _require_meeting(self, number: int, program: Program, place: JobPlace) -> None:
-        start = start_point_q40(program)
-        off = np.abs(start - place.point_q40)
+        off = np.abs(program.point_q40[:, 0] - place.point_q40)
         if off.max() > _MEETS_Q40:
             raise InputError(
                 f"{self.file}: path {number + 1} begins {off.max() * 2.0**-40:.6g} mm from the end of path {number}: "
@@ -153,8 +151,3 @@ def _commands(rest: Rest, number: int) -> tuple[Command, ...]:
     if rest.dwell_ms:
         made.append(Dwell(number, 1e-3 * rest.dwell_ms))
     return tuple(made)
-
-
-def start_point_q40(program: Program) -> NDArray[np.int64]:
-    """(A,) of all axes, mm or degrees."""
-    return np.asarray(program.point_q40[:, 0])

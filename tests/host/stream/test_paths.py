@@ -17,7 +17,7 @@ from hodograph.pipeline import program_limits
 from hodograph.program.inspection import end_point_q40
 from hodograph.stream.chunk import Chunk, Rest
 from hodograph.stream.chunks import CHUNK_BYTES
-from hodograph.stream.paths import PathsJob, start_point_q40
+from hodograph.stream.paths import PathsJob
 from hodograph.stream.plan import JobFiles, JobPlan, Place
 from hodograph.stream.simulation import simulate_chunks
 from hodograph.toolpath.files import ReadOptions
@@ -78,7 +78,7 @@ def test_a_job_of_paths_goes_on_inside_a_path(machine: Machine) -> None:
 def test_ends_of_programs(machine: Machine) -> None:
     for _, chunk, _ in _planned(machine, Place(2)):
         program = chunk.program
-        assert np.allclose(start_point_q40(program) * 2.0**-40, [40, 40], atol=1e-9)
+        assert np.allclose(program.point_q40[:, 0] * 2.0**-40, [40, 40], atol=1e-9)
         assert np.allclose(end_point_q40(program) * 2.0**-40, [0, 0], atol=1e-9)
 
 
