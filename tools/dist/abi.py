@@ -4,7 +4,7 @@
 
     abi.py LIBRARY [--update]
 
-LIBRARY is the folder that `make library` makes. What the shared library exports and its SONAME are compared, and the bytes
+LIBRARY is the folder that `make library` makes. Compared are what the shared library exports, its SONAME, and the bytes
 of each public struct; --update writes the bytes anew. Exit status 1 where something differs.
 """
 

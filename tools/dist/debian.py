@@ -4,9 +4,10 @@
 
     debian.py --build BUILD OUT
 
-Programs and library are those of `make build`, the Python packages those of `make runtime`. The host tools come with all that they need of Python, at the locked
-versions and with the locked hashes, in a virtual environment in /usr/lib/hodograph: Debian's own packages of these are
-other versions, or not there. So the package works with one version of Python, that of this computer's .venv.
+Programs and library are those of `make build`, the Python packages those of `make runtime`. The host tools come with
+the Python packages that they need, at the locked versions and with the locked hashes, in a virtual environment in
+/usr/lib/hodograph: Debian's own packages of these are other versions, or not there. So the package works with one
+version of Python, that of this computer's .venv.
 debhelper makes the packages.
 """
 
@@ -112,8 +113,8 @@ def forget_origin(information: Path) -> None:
     (information / name).unlink()
     record = information / "RECORD"
     lines = record.read_bytes().splitlines(keepends=True)
-    told = f"{information.name}/{name},".encode()
-    record.write_bytes(b"".join(line for line in lines if not line.startswith(told)))
+    origin = f"{information.name}/{name},".encode()
+    record.write_bytes(b"".join(line for line in lines if not line.startswith(origin)))
 
 
 def set_times(folder: Path, time_s: int) -> None:
@@ -124,14 +125,14 @@ def set_times(folder: Path, time_s: int) -> None:
 
 def licence_name(package: Distribution) -> str:
     """SPDX expression, or what the package says in its own words."""
-    told = package.metadata
+    metadata = package.metadata
     classifiers = [
         word.rpartition(" :: ")[2]
-        for word in told.get_all("Classifier") or []
+        for word in metadata.get_all("Classifier") or []
         if word.startswith("License ::")
     ]
     for field in ("License-Expression", "License"):
-        words = told[field] if field in told else ""
+        words = str(metadata[field]) if field in metadata else ""
         if words.strip() and (field == "License-Expression" or not classifiers):
             return words.strip().splitlines()[0]
     return " and ".join(classifiers) or "see its files"

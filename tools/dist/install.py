@@ -104,14 +104,18 @@ def other_items(build: Path, library: Path, places: Places) -> list[Item]:
         page = program_page(program, version())
         if page is not None:
             items.append(Item(places.prefix / f"share/man/man1/{program.name}.1", page))
-    for eds in map(ROOT.joinpath, OBJECT_DICTIONARIES.values()):
-        items.append(Item(places.data / "eds" / eds.name, eds.read_bytes()))
+    items += [
+        Item(places.data / "eds" / eds.name, eds.read_bytes())
+        for eds in map(ROOT.joinpath, OBJECT_DICTIONARIES.values())
+    ]
     examples = library / "tree/examples"
     for file in sorted(path for path in examples.rglob("*") if path.is_file()):
         target = places.data / "examples/embed" / file.relative_to(examples)
         items.append(Item(target, file.read_bytes()))
-    for name in ("LICENSE", "CHANGELOG.md"):
-        items.append(Item(places.prefix / "share/doc/hodograph" / name, (ROOT / name).read_bytes()))
+    items += [
+        Item(places.prefix / "share/doc/hodograph" / name, (ROOT / name).read_bytes())
+        for name in ("LICENSE", "CHANGELOG.md")
+    ]
     return items
 
 

@@ -4,11 +4,13 @@
 
     library.py OUT
 
-The core is one part of a larger tree there, which includes its headers as "core/NAME.h" and has no other code beside it.
-A library lies beside code of others. So here it has one header `hodograph.h`, the rest in a folder `hodograph`, and the
-prefix `hodograph_` before every name that the linker sees; `hodograph/names.h` adds it, so that sources keep theirs.
+In this tree the core is one part of many: its headers are included as "core/NAME.h", and its names meet no other code.
+A library lies beside other code. So here it has one header `hodograph.h`, the rest in a folder `hodograph`, and the
+prefix `hodograph_` before every name that the linker sees. `hodograph/names.h` adds the prefix, so the sources keep
+their names.
 
-OUT is a Zephyr module, a PlatformIO library and an Arduino library; `make install` compiles it too. Standard library only.
+OUT is a Zephyr module, a PlatformIO library and an Arduino library; `make install` compiles it too. This script uses
+the standard library only.
 """
 
 from __future__ import annotations

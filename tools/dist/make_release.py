@@ -4,9 +4,9 @@
 
     make_release.py OUT [--platform TAG]
 
-The wheel is built from the unpacked source distribution, so that nothing which that lacks can get into it. Times in both
-are SOURCE_DATE_EPOCH, or that of the last commit. `--platform` names the platform of the wheel, for compilers ($CC, $AR)
-that build for another one than this computer's.
+The wheel is built from the unpacked source distribution, so that it has nothing that the distribution lacks. Times in
+both are SOURCE_DATE_EPOCH, or that of the last commit. `--platform` names the platform of the wheel, for compilers
+($CC, $AR) that build for another platform than this computer's.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def checked_out(folder: Path) -> Path:
         target = tree / name
         target.parent.mkdir(parents=True, exist_ok=True)
         if source.is_symlink():
-            target.symlink_to(os.readlink(source))
+            target.symlink_to(source.readlink())
         else:
             target.write_bytes(source.read_bytes())
             target.chmod(source.stat().st_mode)

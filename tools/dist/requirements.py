@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which of the locked Python requirements the package itself needs: requirements.lock has those of tests and lint too."""
+"""Which locked Python requirements the package itself needs: requirements.lock has those of tests and lint too."""
 
 from __future__ import annotations
 

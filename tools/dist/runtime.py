@@ -4,8 +4,8 @@
 
     runtime.py FOLDER
 
-At the locked versions and with the locked hashes. Packages copy it, and the list of components is made of it. Its Python
-is /usr/bin/python3, so that it works on another computer with the same version of Python.
+It has the locked versions, checked by the locked hashes. Packages copy it, and the list of components is made of it.
+Its Python is /usr/bin/python3, so that it works on another computer with the same version of Python.
 """
 
 from __future__ import annotations

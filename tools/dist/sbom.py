@@ -4,9 +4,9 @@
 
     sbom.py --build BUILD --tool CYCLONEDX_PY OUT
 
-cyclonedx-py reads BUILD/runtime: the Python packages with versions, licences and who needs whom. To these come the library
-and the programs in C with their hashes; they are this project's own and contain nobody else's code. The same bytes from the
-same tree.
+cyclonedx-py reads BUILD/runtime: the Python packages with versions, licences and dependencies. The library and the
+programs in C are added with their hashes; they are this project's own and contain no other code. The same tree gives
+the same bytes.
 """
 
 from __future__ import annotations
