@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/event_check.h"
 
-#include "core/crossing_check.h"
+#include "core/segment_length_check.h"
 
 static int check_kind(const struct program_event *event)
 {
@@ -43,7 +43,7 @@ static int check_density(const struct program *p, uint32_t *index)
     uint32_t piece = 0;
     for (*index = PROGRAM_EVENTS_A_TICK; *index < p->header.event_count; (*index)++) {
         const int64_t from_q40_mm = program_event_place(p, *index - PROGRAM_EVENTS_A_TICK);
-        if (!crossing_slow_enough(p, from_q40_mm, program_event_place(p, *index), &piece)) {
+        if (!length_exceeds_tick(p, from_q40_mm, program_event_place(p, *index), &piece)) {
             return PROGRAM_ERR_EVENT_DENSE;
         }
     }

@@ -3,11 +3,11 @@
  * refusals. */
 #include "core/program_check.h"
 
-#include "core/crossing_check.h"
 #include "core/event_check.h"
 #include "core/limit_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
+#include "core/segment_length_check.h"
 #include "core/stop_check.h"
 
 #define NAME_FROM 80u
@@ -72,7 +72,7 @@ int program_check(const struct program *p, const struct program_limits *limits,
         fault->code = piece_check_all(p, limits, &fault->index);
     }
     if (fault->code == 0) {
-        fault->code = crossing_check_all(p, &fault->index);
+        fault->code = segment_length_check_all(p, &fault->index);
     }
     if (fault->code == 0) {
         fault->code = limit_check_all(p, limits, &fault->index);

@@ -4,7 +4,7 @@
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
- * assumes: crossing_slow_enough
+ * assumes: length_exceeds_tick
  * shows: event_check_all program_event_get program_event_place
  * mutant: core/event_check.c: *index = 0; *index < p->header => *index = 0; *index <= p->header
  * mutant: core/event_check.c: *index - PROGRAM_EVENTS_A_TICK) => *index + PROGRAM_EVENTS_A_TICK)
@@ -15,7 +15,7 @@
 
 /*@ assigns \result, *first \from *p;
     ensures \initialized(first); */
-int crossing_slow_enough(const struct program *p, int64_t from_q40_mm, int64_t to_q40_mm,
+int length_exceeds_tick(const struct program *p, int64_t from_q40_mm, int64_t to_q40_mm,
                          uint32_t *first);
 
 #include "core/event_check.c"

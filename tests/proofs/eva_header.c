@@ -5,7 +5,7 @@
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations
- * assumes: segment_check_all piece_check_all crossing_check_all stop_check_all limit_check_all event_check_all
+ * assumes: segment_check_all piece_check_all segment_length_check_all stop_check_all limit_check_all event_check_all
  * shows: program_check
  * mutant: core/program_check.c: i < NAME_SIZE && => i <= NAME_SIZE &&
  * mutant: core/program_check.c: h->length_q40_mm <= 0 || =>
@@ -36,7 +36,7 @@ int stop_check_all(const struct program *p, const struct program_limits *limits,
 /*@ requires good_header(&p->header);
     assigns \result, *index \from *p;
     ensures \initialized(index); */
-int crossing_check_all(const struct program *p, uint32_t *index);
+int segment_length_check_all(const struct program *p, uint32_t *index);
 
 /*@ requires good_header(&p->header);
     assigns \result, *index \from *p;

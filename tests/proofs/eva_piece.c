@@ -18,7 +18,7 @@
     ensures \result <= a; */
 uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 
-/* What eva_interpolator.c, eva_crossing.c and eva_ramp.c take for granted of pieces */
+/* What eva_interpolator.c, eva_segment_length.c and eva_ramp.c take for granted of pieces */
 /*@ ensures \result < 0 || (\result == 0 && in_range(c) && 0 <= c->start_q40_mm < (1 << 62)); */
 static int check_ranges(const struct program_piece *c);
 

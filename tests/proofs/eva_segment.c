@@ -33,7 +33,7 @@ static int check_speed(const struct program_segment *g);
     ensures -0x7FFFFFFF <= \result.m <= 0x7FFFFFFF && -200 <= \result.e <= 200; */
 static struct real five_per_speed(const struct program_segment *g, int coefficient);
 
-/* What eva_interpolator.c and eva_crossing.c take for granted of segments */
+/* What eva_interpolator.c and eva_segment_length.c take for granted of segments */
 /*@ ensures \result < 0 || (\result == 0 && in_range(g) && 0 <= g->start_q40_mm < (1 << 62) &&
             point_in_range(g)); */
 static int check_ranges(const struct program_segment *g);

@@ -75,7 +75,7 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
         empty: Real = np.zeros(0)
         return np.zeros(0, dtype=np.int64), empty, empty
     low, high = joints_q40[1:-3], joints_q40[3:-1]
-    allowed_q24 = _crossing_feed_q24(high - low, period_us)
+    allowed_q24 = _covering_feed_q24(high - low, period_us)
     allowed: Real = np.ldexp(allowed_q24.astype(np.float64), -24)
     fast = ~(highest_feed(low, high, pieces) <= allowed)
     brief = np.flatnonzero(fast | (allowed_q24 < _LEAST_FEED_Q24))
@@ -83,7 +83,7 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
     return np.asarray(brief + 1, dtype=np.int64), way, allowed[brief]
 
 
-def _crossing_feed_q24(way_q40: Int, period_us: int) -> Int:
+def _covering_feed_q24(way_q40: Int, period_us: int) -> Int:
     """A feed in 2^-24 mm/s at which twice a period does not quite cover the way; rounded as the controller does."""
     return np.asarray((way_q40 >> 16) * (4_000_000 // period_us) // 8 - 1)
 
@@ -526,7 +526,7 @@ def _dense(program: Program) -> Bool:
     if places.size <= EVENTS_A_TICK:
         return np.zeros(0, dtype=np.bool_)
     low, high = places[:-EVENTS_A_TICK], places[EVENTS_A_TICK:]
-    allowed_q24 = _crossing_feed_q24(high - low, program.period_us)
+    allowed_q24 = _covering_feed_q24(high - low, program.period_us)
     allowed = np.ldexp(allowed_q24.astype(np.float64), -24)
     fast = ~(highest_feed(low, high, program.pieces) <= allowed)
     return _bool(fast | (allowed_q24 < _LEAST_FEED_Q24))

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Which pieces count for a stretch of two segments: those that reach into it, with the slack of a piece's ends. */
-#include "core/crossing_check.h"
+#include "core/segment_length_check.h"
 
 #include "canopen/cob.h"
 #include "core/feed_bounds.h"
@@ -56,14 +56,14 @@ static uint32_t refused_with_a_fast_piece_beyond_them(int64_t by_q40)
     const int64_t start = program_segment_start(&program, 3) + by_q40;
     uint32_t index = 0;
     make_fast(first_beyond(start), start);
-    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SEGMENT_SHORT, crossing_check_all(&program, &index));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SEGMENT_SHORT, segment_length_check_all(&program, &index));
     return index;
 }
 
 static void test_the_program_as_it_is(void)
 {
     uint32_t index = 77;
-    TEST_ASSERT_EQUAL_INT(0, crossing_check_all(&program, &index));
+    TEST_ASSERT_EQUAL_INT(0, segment_length_check_all(&program, &index));
     TEST_ASSERT_EQUAL_UINT32(0, index);
 }
 

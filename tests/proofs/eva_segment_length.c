@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rule that needs segments and pieces together, for six segments and six pieces that have passed their own checks:
- * nothing overflows, no division by 0, and no segment or piece is asked for that the image does not have.
+ * Minimum segment length, for six segments and six pieces that have passed their own checks: nothing overflows, no
+ * division by 0, and no segment or piece is read that the image does not have.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000
  * assumes: program_piece_get program_segment_start feed_bounds_within
- * shows: crossing_check_all crossing_slow_enough
- * mutant: core/crossing_check.c: *index + 2u < p->header => *index + 1u < p->header
- * mutant: core/crossing_check.c: *first + 1 < p->header => *first < p->header
- * mutant: core/crossing_check.c: (length_q40 >> 16) => length_q40
+ * shows: segment_length_check_all length_exceeds_tick
+ * mutant: core/segment_length_check.c: *index + 2u < p->header => *index + 1u < p->header
+ * mutant: core/segment_length_check.c: *first + 1 < p->header => *first < p->header
+ * mutant: core/segment_length_check.c: (length_q40 >> 16) => length_q40
  */
 #include "piece_bounds.h"
 #include "proof.h"
@@ -24,7 +24,7 @@ void program_piece_get(const struct program *p, uint32_t i, struct program_piece
     ensures 0 <= \result < (1 << 62); */
 int64_t program_segment_start(const struct program *p, uint32_t i);
 
-#include "core/crossing_check.c"
+#include "core/segment_length_check.c"
 
 static void count_of(uint32_t segments, uint32_t pieces)
 {
@@ -34,7 +34,7 @@ static void count_of(uint32_t segments, uint32_t pieces)
     p.header.segment_count = segments;
     p.header.piece_count = pieces;
     p.header.period_us = (uint32_t)any_between(1000, 8000);
-    if (crossing_check_all(&p, &index) == 0) {
+    if (segment_length_check_all(&p, &index) == 0) {
         reached();
     }
 }

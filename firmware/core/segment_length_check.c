@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/crossing_check.h (see there): the check that no tick crosses more than two segment ends. */
-#include "core/crossing_check.h"
+/* Implements core/segment_length_check.h (see there): minimum segment length. */
+#include "core/segment_length_check.h"
 
 #include "core/feed_bounds.h"
 
@@ -15,17 +15,17 @@ static int64_t piece_start(const struct program *p, uint32_t i)
 }
 
 /* Feed at which a tick of twice the period covers this length: length 10^6 / (2 period_us). */
-static int64_t crossing_feed_q24(const struct program *p, int64_t length_q40)
+static int64_t covering_feed_q24(const struct program *p, int64_t length_q40)
 {
     uint32_t half_frequency =
         4000000u / p->header.period_us; /* times 8: an integer for each period */
     return (length_q40 >> 16) * (int64_t)half_frequency / 8 - 1;
 }
 
-int crossing_slow_enough(const struct program *p, int64_t from_q40_mm, int64_t to_q40_mm,
-                         uint32_t *first)
+int length_exceeds_tick(const struct program *p, int64_t from_q40_mm, int64_t to_q40_mm,
+                        uint32_t *first)
 {
-    int64_t feed = crossing_feed_q24(p, to_q40_mm - from_q40_mm);
+    int64_t feed = covering_feed_q24(p, to_q40_mm - from_q40_mm);
     if (feed < FEED_LEAST_Q24) {
         return 0;
     }
@@ -46,13 +46,13 @@ int crossing_slow_enough(const struct program *p, int64_t from_q40_mm, int64_t t
     return 1;
 }
 
-int crossing_check_all(const struct program *p, uint32_t *index)
+int segment_length_check_all(const struct program *p, uint32_t *index)
 {
     uint32_t piece = 0;
     for (*index = 1; (uint64_t)*index + 2u < p->header.segment_count; (*index)++) {
         int64_t from = program_segment_start(p, *index);
         int64_t to = program_segment_start(p, *index + 2u);
-        if (!crossing_slow_enough(p, from, to, &piece)) {
+        if (!length_exceeds_tick(p, from, to, &piece)) {
             (*index)++;
             return PROGRAM_ERR_SEGMENT_SHORT;
         }
