@@ -3,8 +3,8 @@
  * The feed override: what the plan of a program and the commands make of the next tick. Feed hold, resume, override 0 to
  * 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never leaves the curve.
  *
- * Override and resume change the rate of program time (core/override_plan): along jerk-limited ramps inside the override
- * bounds of every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
+ * Override and resume change the override (core/override_plan) along jerk-limited ramps inside the override bounds of
+ * every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
  * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
  * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4). A hold or stop

@@ -33,7 +33,7 @@ enum interpolator_result {
 /* Unrounded output of a tick, the same units for all kernels. */
 struct interpolator_point {
     int64_t arc_length_q40_mm;
-    int64_t feed_q32_mm_s; /* F' at rate 1 */
+    int64_t feed_q32_mm_s; /* F' at override 100 % */
     int64_t position_q40
         [PROGRAM_AXES]; /* machine coordinates of the program's path axes; the others are not written. In
                                          * mm, in degrees for an extra axis that turns */

@@ -81,10 +81,10 @@ static void in_level(const struct program_override *own, uint32_t level,
         real_add(real_add(real_mul(f3, at_one[JERK]), mixed), real_mul(second, at_one[VELOCITY]));
 }
 
-/* At the rates that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
+/* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
  * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/theory/numerics.md section 7. */
-static void at_all_rates(const struct way *way, const struct real at_one[QUANTITIES],
-                         struct real out[QUANTITIES])
+static void at_all_overrides(const struct way *way, const struct real at_one[QUANTITIES],
+                             struct real out[QUANTITIES])
 {
     struct real magnitude[QUANTITIES];
     struct real own[QUANTITIES];
@@ -117,7 +117,7 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
     motion_at(cell, x, &found);
     for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
-        at_all_rates(cell->way, found.of[axis], values);
+        at_all_overrides(cell->way, found.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
             if (passes(values[k], check->limit.of[axis][k])) {
                 return codes[k];
@@ -155,7 +155,7 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
     path_motion_bend(cell->path, cell->c, cell->per_s, cell->offset_mm, &bend);
     for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
-        at_all_rates(cell->way, bend.of[axis], values);
+        at_all_overrides(cell->way, bend.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
             bend.of[axis][k] = values[k];
         }

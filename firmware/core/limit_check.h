@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * limit_check: proves that a program keeps the limits of its path axes (velocity, acceleration, jerk) at every instant,
- * at every rate of program time that its override bounds allow. docs/guides/limits.md says what is proved and what is
+ * at every feed override that its override bounds allow. docs/guides/limits.md says what is proved and what is
  * not.
  *
  * It uses nothing of the image but its coefficients. Time is cut into cells: one feed piece on one segment. In a cell

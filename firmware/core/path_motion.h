@@ -43,7 +43,7 @@ struct way {
     struct real end_mm;
 };
 
-/* Velocity, acceleration and jerk of each axis at an instant, at rate 1. */
+/* Velocity, acceleration and jerk of each axis at an instant, at override 100 %. */
 struct motion {
     struct real of[PROGRAM_AXES][QUANTITIES];
 };

@@ -98,11 +98,11 @@ static inline uint32_t program_curve_axes(uint32_t axis_count)
     return axis_count > PROGRAM_PLANE ? PROGRAM_SPACE : PROGRAM_PLANE;
 }
 
-#define PROGRAM_LEVELS 7u /* of the override bounds: rates of program time up to which they hold */
+#define PROGRAM_LEVELS     7u /* of the override bounds: overrides up to which they hold */
 #define PROGRAM_LEVEL_FULL (PROGRAM_LEVELS - 1u) /* the factor */
 
-/* Override bounds, protocol.md 1.3: program_number of a code is the greatest slope of the rate of program time in
- * 2^-32 /s, its greatest second derivative in 2^-24 /s^2, as long as the rate is at most that of the level. */
+/* Override bounds, protocol.md 1.3: program_number of a code is the greatest override rate in 2^-32 /s, and the
+ * greatest override acceleration in 2^-24 /s^2, as long as the override is at most that of the level. */
 struct program_override {
     uint16_t factor_q14;
     uint8_t rate[PROGRAM_LEVELS];

@@ -139,7 +139,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_FEED, "above the feed limit of the controller"},
     {PROGRAM_ERR_ACCELERATION, "above its acceleration limit"},
     {PROGRAM_ERR_JERK, "above its jerk limit"},
-    {PROGRAM_ERR_OVERRIDE, "override factor not in 1.0 ... 2.0, rate or second rate 0"},
+    {PROGRAM_ERR_OVERRIDE, "override factor not in 1.0 ... 2.0, or an override bound is 0"},
     {PROGRAM_ERR_STOP_ENTRY,
      "some codes of a stop are 0 and some are not, or a reserved field is not 0"},
     {PROGRAM_ERR_STOP_NUMBERS, "a brake would be above the limits of the controller"},

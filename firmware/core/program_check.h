@@ -65,7 +65,7 @@ enum program_error {
     PROGRAM_ERR_FEED = -52,         /* above the feed limit of the controller */
     PROGRAM_ERR_ACCELERATION = -53, /* above its acceleration limit */
     PROGRAM_ERR_JERK = -54,         /* above its jerk limit */
-    PROGRAM_ERR_OVERRIDE = -55,     /* override factor not in 1.0 ... 2.0, rate or second rate 0 */
+    PROGRAM_ERR_OVERRIDE = -55, /* override factor not in 1.0 ... 2.0, or an override bound is 0 */
     /* axes (core/limit_check.h): index = the piece in which it can happen */
     PROGRAM_ERR_AXIS_VELOCITY = -70,     /* above the velocity limit of an axis */
     PROGRAM_ERR_AXIS_ACCELERATION = -71, /* above its acceleration limit */
@@ -115,7 +115,7 @@ struct program_limits {
     /* Of the path axes, those of the program; mm are degrees for an extra axis that turns. */
     int64_t min_q40_mm[PROGRAM_AXES]; /* travel */
     int64_t max_q40_mm[PROGRAM_AXES];
-    uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every rate of program time; 0: no limit */
+    uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every override; 0: no limit */
     uint32_t axis_acceleration_um_s2[PROGRAM_AXES];
     uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */

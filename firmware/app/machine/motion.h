@@ -76,7 +76,7 @@ bool motion_rests(struct motion *motion);
 void motion_stop(struct motion *motion);
 void motion_fault_stop(struct motion *motion);
 
-/* Feed hold, the end of it, the rate wanted (0 ... 200 %). Under the lock. */
+/* Feed hold, its end, the commanded override (0 ... 200 %). Under the lock. */
 void motion_hold(struct motion *motion);
 void motion_resume(struct motion *motion);
 void motion_override(struct motion *motion, uint32_t percent);

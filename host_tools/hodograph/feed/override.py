@@ -34,7 +34,7 @@ from .limits import ControllerLimits, Limits, Plant
 from .override_levels import (
     FACTOR_ONE_Q14,
     FULL,
-    LEVEL_RATES,
+    LEVEL_OVERRIDES,
     LEVELS,
     Codes,
     rate_codes,
@@ -100,7 +100,7 @@ class _Piece:
     headrooms: Sequence[Headroom]
 
     def rate(self, at: Real, share: float) -> Real:
-        """R (M,) for rates up to `at`, with `share` of the headroom of the jerks."""
+        """Override rate R (M,) for overrides up to `at`, with `share` of the headroom of the jerks."""
         left_a = self.controller.acceleration_mm_s2 - at**2 * self.a
         left_j = self.controller.jerk_mm_s3 - at**3 * self.j
         rate = np.minimum(left_a / self.v, share * left_j / (3.0 * at * self.a))
@@ -109,7 +109,7 @@ class _Piece:
         return rate
 
     def second(self, at: Real, rate: Real) -> Real:
-        """Q (M,) for these rates and slopes."""
+        """Override acceleration Q (M,) for these overrides and override rates."""
         left_j = self.controller.jerk_mm_s3 - at**3 * self.j
         second: Real = (left_j - 3.0 * at * rate * self.a) / self.v
         for headroom in self.headrooms:
@@ -129,7 +129,7 @@ def override_bounds(
     program: Limits,
     headrooms: Sequence[Headroom] = (),
 ) -> OverrideBounds:
-    """Bounds from the peaks of each piece (M,), such that in each level, for every lambda up to its rate,
+    """Bounds from the peaks of each piece (M,), such that in each level, for every override lambda of the level,
     |lambda'| <= rate and |lambda''| <= second, the controller's limits hold, and at constant
     lambda <= factor the program's too. `headrooms` are those along the path; where the plan keeps the limits of one,
     they hold for every motion of lambda as the controller's do.
@@ -150,7 +150,7 @@ def override_bounds(
     binding = [headroom for headroom in headrooms if headroom.bounds.kept]
     if binding:
         factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
-    # Rounded first: the rates then use the headroom that the stored factor really leaves.
+    # Rounded first: the override rates then use the headroom that the stored factor really leaves.
     factor_q14 = np.floor(np.clip(factor * _MARGIN, 1.0, GREATEST_FACTOR) * FACTOR_ONE_Q14)
     factor = factor_q14 / FACTOR_ONE_Q14
     piece = _Piece(v, a, j, controller, binding)
@@ -158,27 +158,27 @@ def override_bounds(
     seconds = np.zeros_like(rates)
     below = 0.0
     for level in range(LEVELS):
-        at = factor if level == FULL else np.full_like(v, LEVEL_RATES[level])
-        way = np.maximum(at - 1.0, 1.0 - below) if level == FULL else at - below
-        rates[:, level], seconds[:, level] = _best(piece, at, way)
-        below = LEVEL_RATES[min(level, FULL - 1)]
+        at = factor if level == FULL else np.full_like(v, LEVEL_OVERRIDES[level])
+        change = np.maximum(at - 1.0, 1.0 - below) if level == FULL else at - below
+        rates[:, level], seconds[:, level] = _best(piece, at, change)
+        below = LEVEL_OVERRIDES[min(level, FULL - 1)]
     return OverrideBounds(factor_q14.astype(np.uint32), rates, seconds)
 
 
-def _best(piece: _Piece, at: Real, way: Real) -> tuple[Codes, Codes]:
-    """Codes for rates up to `at`, of the share of the jerks with which they change by `way` soonest."""
+def _best(piece: _Piece, at: Real, change: Real) -> tuple[Codes, Codes]:
+    """Codes for overrides up to `at`, of the share of the jerks with which they change by `change` soonest."""
     rate, second = piece.codes(at, RATE_SHARES[0])
     for share in RATE_SHARES[1:] if piece.headrooms else ():
         other = piece.codes(at, share)
-        better = _move_s(way, *other) < _move_s(way, rate, second)
+        better = _move_s(change, *other) < _move_s(change, rate, second)
         rate, second = np.where(better, other[0], rate), np.where(better, other[1], second)
     return rate, second
 
 
-def _move_s(way: Real, rate: Codes, second: Codes) -> Real:
-    """Time in which the rate goes this way from rest to rest; inf where a bound is 0."""
+def _move_s(change: Real, rate: Codes, second: Codes) -> Real:
+    """Time of an override ramp by this change; inf where a bound is 0."""
     r, q = np.maximum(rates_per_s(rate), 1e-9), np.maximum(seconds_per_s2(second), 1e-9)
-    time_s = np.where(way * q < r**2, 2.0 * np.sqrt(way / q), way / r + r / q)
+    time_s = np.where(change * q < r**2, 2.0 * np.sqrt(change / q), change / r + r / q)
     return np.asarray(np.where((rate > 0) & (second > 0), time_s, np.inf))
 
 

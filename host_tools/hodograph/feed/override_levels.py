@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Override levels, and the codes of override bounds; docs/reference/protocol.md 1.3 and 1.4.
 
-Each override of `LEVEL_RATES` ends a level with its own bounds of override rate and override acceleration: at an
+Each override of `LEVEL_OVERRIDES` ends a level with its own bounds of override rate and override acceleration: at an
 override below 1 much of acceleration and jerk is free. The last level, `FULL`, is that of all overrides up to the
 factor. A bound is stored as a code of 8 bits, in steps of an eighth of an octave.
 """
@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
 
-LEVEL_RATES = tuple(q9 / 512 for q9 in (320, 448, 488, 504, 509, 511))
-LEVELS = len(LEVEL_RATES) + 1
+LEVEL_OVERRIDES = tuple(q9 / 512 for q9 in (320, 448, 488, 504, 509, 511))
+LEVELS = len(LEVEL_OVERRIDES) + 1
 FULL = LEVELS - 1
 
 FACTOR_ONE_Q14 = 1 << 14

@@ -75,11 +75,11 @@ class FeedPieces:
         return self.override_factor_q14 / FACTOR_ONE_Q14
 
     def override_rate_per_s(self, level: int = FULL) -> Real:
-        """Greatest slope of the rate of program time (M,) up to the rate of a level."""
+        """Greatest override rate (M,) up to the override of a level."""
         return rates_per_s(self.override_rate_codes[:, level])
 
     def override_second_per_s2(self, level: int = FULL) -> Real:
-        """Its greatest second derivative (M,)."""
+        """Greatest override acceleration (M,) up to the override of a level."""
         return seconds_per_s2(self.override_second_codes[:, level])
 
     @property

@@ -24,23 +24,23 @@ class State(IntEnum):
 
 @dataclass(frozen=True)
 class PlanStep:
-    """Where a setpoint of the plan is from: program time, its rate, the slope of that per second."""
+    """Where a setpoint of the plan is from: program time, override (1: 100 %), override rate per second."""
 
     time_s: float
-    rate: float
+    override: float
     slope_per_s: float
 
 
 @dataclass(frozen=True)
 class Step:
     """A tick: arc length of the setpoint (mm), position of each path axis (mm, or degrees), feed along the path (mm/s),
-    rate of program time.
+    override (1: 100 %).
     """
 
     arc_mm: float
     position: tuple[float, ...]
     feed_mm_s: float
-    rate: float
+    override: float
 
 
 class FeedCommands:
@@ -73,7 +73,7 @@ class FeedCommands:
         self._lib.feed_override_resume(self._feed)
 
     def override(self, percent: int) -> None:
-        """The rate wanted, 0 to 200; before the last chunk of a job above 100 counts as 100."""
+        """Commands an override in percent, 0 to 200; before the last chunk of a job above 100 counts as 100."""
         self._lib.feed_override_set(self._feed, percent)
 
     def stop(self) -> None:

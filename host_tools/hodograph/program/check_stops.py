@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..feed.override_levels import FULL, LEVEL_RATES, LEVELS
+from ..feed.override_levels import FULL, LEVEL_OVERRIDES, LEVELS
 from ..feed.pieces import part_bounds
 from .codes import ProgramError
 from .image import Program, ProgramLimits
@@ -135,7 +135,9 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
     rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0)
     time_s, way_mm = np.zeros(speed.size), np.zeros(speed.size)
     for level in range(LEVELS):
-        rate = pieces.override_factor if level == FULL else np.full_like(speed, LEVEL_RATES[level])
+        rate = (
+            pieces.override_factor if level == FULL else np.full_like(speed, LEVEL_OVERRIDES[level])
+        )
         second = pieces.override_second_per_s2(level)
         # It rises from 0 and falls to 0 again within a change of the rate by that of the level at most.
         steepest = np.minimum(pieces.override_rate_per_s(level), np.sqrt(rate * second))

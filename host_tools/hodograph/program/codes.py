@@ -133,7 +133,7 @@ _TEXTS = {
     ProgramError.FEED: "above the feed limit of the controller",
     ProgramError.ACCELERATION: "above its acceleration limit",
     ProgramError.JERK: "above its jerk limit",
-    ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, rate or second rate 0",
+    ProgramError.OVERRIDE: "override factor not in 1.0 ... 2.0, or an override bound is 0",
     ProgramError.AXIS_VELOCITY: "above the velocity limit of an axis",
     ProgramError.AXIS_ACCELERATION: "above the acceleration limit of an axis",
     ProgramError.AXIS_JERK: "above the jerk limit of an axis",

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hodograph.feed import ControllerLimits, FeedRequest, Limits, plan_feed
 from hodograph.feed.override_levels import (
     FULL,
-    LEVEL_RATES,
+    LEVEL_OVERRIDES,
     LEVELS,
     rate_codes,
     rates_per_s,
@@ -36,7 +36,7 @@ def test_no_motion_of_the_override_breaks_a_limit(profile, feed, time, reserve, 
     i = np.minimum(np.searchsorted(ends, t), len(pieces) - 1)
     level = seed % LEVELS
     factor = pieces.override_factor[i]
-    most = factor if level == FULL else np.full_like(factor, LEVEL_RATES[level])
+    most = factor if level == FULL else np.full_like(factor, LEVEL_OVERRIDES[level])
     rate = pieces.override_rate_per_s(level)[i]
     second = pieces.override_second_per_s2(level)[i]
     v, a, j = plan.feed(t), plan.acceleration(t), plan.jerk(t)

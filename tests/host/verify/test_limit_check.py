@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 from programs import random_program
 
-from hodograph.feed.override_levels import FACTOR_ONE_Q14, FULL, LEVEL_RATES, LEVELS
+from hodograph.feed.override_levels import FACTOR_ONE_Q14, FULL, LEVEL_OVERRIDES, LEVELS
 from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
 from hodograph.pipeline import load_pipeline
 from hodograph.program import Program, encode
@@ -52,7 +52,7 @@ class Rates:
 def levels_of(program: Program) -> Iterator[Rates]:
     pieces = program.pieces
     for level in range(LEVELS):
-        most = np.full(len(pieces), (*LEVEL_RATES, 0.0)[level])
+        most = np.full(len(pieces), (*LEVEL_OVERRIDES, 0.0)[level])
         yield Rates(
             pieces.override_factor if level == FULL else most,
             pieces.override_rate_per_s(level),
