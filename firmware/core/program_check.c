@@ -101,7 +101,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_CRC, "CRC-32 of the contents is wrong"},
     {PROGRAM_ERR_COUNT, "no segment or no piece"},
     {PROGRAM_ERR_STORE, "the program store did not keep it"},
-    {PROGRAM_ERR_ROOM, "with what is prepared from it too large for the program store"},
+    {PROGRAM_ERR_ROOM, "with its precomputed coefficients too large for the program store"},
     {PROGRAM_ERR_KERNEL, "the controller does not have the kernel configured"},
     {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
     {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},

@@ -414,13 +414,13 @@ static void harness(struct fuzz_input *in)
     FUZZ_CHECK(exact != NULL);
     memcpy(exact, image.bytes, image.size);
     if (program_open(&p, exact, image.size) == 0 && program_check(&p, &limits, &fault) == 0) {
-        struct golden_prepared prepared;
-        golden_prepare(&prepared, &p, KERNEL_DOUBLE);
-        set_limits(&limits, &prepared.program, scale);
+        struct golden_precomputed precomputed;
+        golden_precompute(&precomputed, &p, KERNEL_DOUBLE);
+        set_limits(&limits, &precomputed.program, scale);
         if (program_check(&p, &limits, &fault) == 0) {
-            run_accepted(&prepared.program, &limits, &commands);
+            run_accepted(&precomputed.program, &limits, &commands);
         }
-        golden_discard(&prepared);
+        golden_discard(&precomputed);
     }
     free(exact);
 }

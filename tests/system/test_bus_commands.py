@@ -250,7 +250,7 @@ def test_a_program_that_no_bank_can_hold_is_refused_before_it_is_sent(
     image = bytearray(program("alpha_quintic"))
     image[24:28] = (2**20).to_bytes(4, "little")  # pieces: 268 MB of records
     sent: list[int] = []
-    with pytest.raises(RefusedError, match=r"takes 268.* with what is prepared from it"):
+    with pytest.raises(RefusedError, match=r"takes 268.* with its precomputed coefficients"):
         controller.upload(bytes(image), sent.append)
     assert sent == []
 

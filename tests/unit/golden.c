@@ -61,7 +61,8 @@ void golden_close(struct program *p)
     p->image = NULL;
 }
 
-void golden_prepare(struct golden_prepared *out, const struct program *p, enum kernel_number kernel)
+void golden_precompute(struct golden_precomputed *out, const struct program *p,
+                       enum kernel_number kernel)
 {
     const struct kernel *made_for = kernel_find((uint32_t)kernel);
     const uint64_t size = coefficients_size(p, made_for);
@@ -73,10 +74,10 @@ void golden_prepare(struct golden_prepared *out, const struct program *p, enum k
     }
 }
 
-void golden_discard(struct golden_prepared *prepared)
+void golden_discard(struct golden_precomputed *precomputed)
 {
-    free(prepared->records);
-    prepared->records = NULL;
+    free(precomputed->records);
+    precomputed->records = NULL;
 }
 
 uint64_t golden_random(uint64_t *state)

@@ -21,16 +21,16 @@ void golden_open(struct program *p, const char *name);
 void golden_close(struct program *p);
 
 /* A program with coefficient records on the heap. */
-struct golden_prepared {
+struct golden_precomputed {
     struct program program;
     void *records;
 };
 
 /* A copy of an opened program, with records for a kernel; ends the process when there is no memory. The image has to stay.
  * Free with golden_discard. */
-void golden_prepare(struct golden_prepared *out, const struct program *p,
-                    enum kernel_number kernel);
-void golden_discard(struct golden_prepared *prepared);
+void golden_precompute(struct golden_precomputed *out, const struct program *p,
+                       enum kernel_number kernel);
+void golden_discard(struct golden_precomputed *precomputed);
 
 /* Seeded 64-bit generator (splitmix64), for tests with random cases. */
 uint64_t golden_random(uint64_t *state);

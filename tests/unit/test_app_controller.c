@@ -205,12 +205,12 @@ static void test_setpoints_are_those_of_the_interpolator(void)
     const uint32_t ticks = app_bench_until(&bench, MACHINE_READY, 2000);
     TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS + MACHINE_SETTLE_TICKS, ticks);
     struct program program;
-    struct golden_prepared prepared;
+    struct golden_precomputed precomputed;
     struct interpolator interp;
     struct interpolator_point point;
     TEST_ASSERT_EQUAL_INT(0, program_open(&program, image, sizeof image));
-    golden_prepare(&prepared, &program, KERNEL_FIXED);
-    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &prepared.program));
+    golden_precompute(&precomputed, &program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &precomputed.program));
     for (uint32_t k = 0; k < APP_IMAGE_TICKS; ++k) {
         const uint64_t time_q42_s = ((uint64_t)k * 4398046511104u + 500u) / 1000u;
         TEST_ASSERT_TRUE(interpolator_at_q42(&interp, time_q42_s, &point) >= 0);
@@ -219,7 +219,7 @@ static void test_setpoints_are_those_of_the_interpolator(void)
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(point.position_q40[1], 1000000),
                                 bench.targets[1][k]);
     }
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
     TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, bench.drives[0].position_counts);
     TEST_ASSERT_EQUAL_UINT32(APP_IMAGE_TICKS - 1u, app_bench_read(&bench, 0x2008, 2));
     TEST_ASSERT_EQUAL_UINT32(0, app_bench_read(&bench, 0x2008, 6));

@@ -213,13 +213,13 @@ struct motion {
 
 static struct interpolator_point right[MOST_TICKS]; /* setpoints of the whole program */
 static uint32_t right_count;
-static struct golden_prepared exact;
+static struct golden_precomputed exact;
 
 static void run_whole(enum kernel_number kernel, uint32_t percent)
 {
     struct feed_override feed;
     struct interpolator it;
-    golden_prepare(&exact, &whole.program, kernel);
+    golden_precompute(&exact, &whole.program, kernel);
     feed_override_begin(&feed, &exact.program, whole.program.header.period_us, 0);
     feed_override_set(&feed, percent);
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &exact.program));
@@ -453,7 +453,7 @@ static void test_the_tail_ends_at_rest_and_the_motion_goes_on_from_there(void)
     int64_t last_q40 = 0;
     cut_in_two();
     accept_all(KERNEL_FIXED);
-    golden_prepare(&exact, &whole.program, KERNEL_DOUBLE);
+    golden_precompute(&exact, &whole.program, KERNEL_DOUBLE);
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&path, &exact.program));
     begin(&m);
     while (!feed_override_waits(&m.feed)) {

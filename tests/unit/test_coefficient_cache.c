@@ -24,7 +24,7 @@ struct motion {
 
 static uint64_t memory[MOST_BYTES / 8u];
 static struct coefficient_cache cache;
-static struct golden_prepared all;
+static struct golden_precomputed all;
 static struct program plain;
 static struct chunk whole; /* the program as a job of one chunk */
 
@@ -39,7 +39,7 @@ void tearDown(void)
 static void open(const char *name, enum kernel_number kernel)
 {
     golden_open(&plain, name);
-    golden_prepare(&all, &plain, kernel);
+    golden_precompute(&all, &plain, kernel);
     whole = (struct chunk){.flags = CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST, .program = plain};
 }
 

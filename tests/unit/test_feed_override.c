@@ -8,7 +8,7 @@
 enum { TICKS = 100 };
 
 static struct program p;
-static struct golden_prepared prepared;
+static struct golden_precomputed precomputed;
 static struct interpolator it;
 static struct feed_override feed;
 static struct interpolator_point point;
@@ -16,20 +16,20 @@ static struct interpolator_point point;
 void setUp(void)
 {
     golden_open(&p, "heart_minimax.hdgp");
-    golden_prepare(&prepared, &p, KERNEL_FIXED);
+    golden_precompute(&precomputed, &p, KERNEL_FIXED);
 }
 
 void tearDown(void)
 {
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
     golden_close(&p);
 }
 
 /* To the middle of the program, at 100 %. */
 static void run(void)
 {
-    feed_override_begin(&feed, &prepared.program, p.header.period_us, 0);
-    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &prepared.program));
+    feed_override_begin(&feed, &precomputed.program, p.header.period_us, 0);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &precomputed.program));
     for (int k = 0; k < TICKS; k++) {
         TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &point));
     }
@@ -39,8 +39,8 @@ static void run(void)
 static int brakes_at_once(uint32_t worst_um, uint32_t worst_us)
 {
     run();
-    prepared.program.header.hold_worst_um = worst_um;
-    prepared.program.header.hold_worst_us = worst_us;
+    precomputed.program.header.hold_worst_um = worst_um;
+    precomputed.program.header.hold_worst_us = worst_us;
     feed_override_hold(&feed);
     TEST_ASSERT_EQUAL_INT(0, feed_override_next(&feed, &it, &point));
     return feed_override_actual_q30(&feed) == 0u;

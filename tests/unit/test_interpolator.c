@@ -14,7 +14,7 @@ static const char *const names[] = {"alpha_exponential.hdgp", "heart_minimax.hdg
 #define NAMES (sizeof names / sizeof names[0])
 
 static struct program p;
-static struct golden_prepared prepared[KERNELS];
+static struct golden_precomputed precomputed[KERNELS];
 static struct interpolator it;
 static struct interpolator_point a, b;
 
@@ -22,14 +22,14 @@ static void open(const char *name)
 {
     golden_open(&p, name);
     for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
-        golden_prepare(&prepared[kernel], &p, (enum kernel_number)kernel);
+        golden_precompute(&precomputed[kernel], &p, (enum kernel_number)kernel);
     }
 }
 
 static void close(void)
 {
     for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
-        golden_discard(&prepared[kernel]);
+        golden_discard(&precomputed[kernel]);
     }
     golden_close(&p);
 }
@@ -65,7 +65,7 @@ static void test_begins_at_the_start(void)
     struct program_segment first;
     program_segment_get(&p, 0, &first);
     for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
-        interpolator_begin(&it, &prepared[kernel].program);
+        interpolator_begin(&it, &precomputed[kernel].program);
         TEST_ASSERT_EQUAL_INT(INTERPOLATOR_OK, interpolator_at_q42(&it, 0, &a));
         TEST_ASSERT_EQUAL_INT64(0, a.arc_length_q40_mm);
         TEST_ASSERT_INT64_WITHIN(10 * NANOMETRE_Q40, first.point_q40_mm[0], a.position_q40[0]);
@@ -77,7 +77,7 @@ static void test_begins_at_the_start(void)
 static void test_ends_exactly(void)
 {
     for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
-        interpolator_begin(&it, &prepared[kernel].program);
+        interpolator_begin(&it, &precomputed[kernel].program);
         TEST_ASSERT_EQUAL_INT(INTERPOLATOR_END, interpolator_at(&it, p.header.duration_q32_s, &a));
         TEST_ASSERT_EQUAL_INT(INTERPOLATOR_END, interpolator_at(&it, UINT64_MAX, &b));
         assert_same_point();
@@ -93,7 +93,7 @@ static void test_ends_are_those_of_a_run(void)
 {
     for (uint32_t kernel = 0; kernel < KERNELS; kernel++) {
         struct interpolator_point first, last;
-        interpolator_begin(&it, &prepared[kernel].program);
+        interpolator_begin(&it, &precomputed[kernel].program);
         interpolator_ends(&p, kernel_find(kernel), &first, &last);
         interpolator_at(&it, 0, &a);
         b = first;
@@ -110,8 +110,8 @@ static void test_point_depends_on_time_only(void)
     static struct interpolator other;
     uint64_t random = 1;
     for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
-        interpolator_begin(&it, &prepared[kernel].program);
-        interpolator_begin(&other, &prepared[kernel].program);
+        interpolator_begin(&it, &precomputed[kernel].program);
+        interpolator_begin(&other, &precomputed[kernel].program);
         uint64_t duration = p.header.duration_q32_s << 10;
         uint64_t time = 0;
         while (time < duration) {
@@ -127,7 +127,7 @@ static void test_point_depends_on_time_only(void)
 
 static void test_jumps_are_refused(void)
 {
-    interpolator_begin(&it, &prepared[KERNEL_FIXED].program);
+    interpolator_begin(&it, &precomputed[KERNEL_FIXED].program);
     TEST_ASSERT_EQUAL_INT(INTERPOLATOR_ERR_JUMP,
                           interpolator_at(&it, p.header.duration_q32_s - 1u, &a));
     TEST_ASSERT_EQUAL_INT(0, interpolator_seek(&it, p.header.duration_q32_s - 1u));
@@ -150,10 +150,10 @@ static void compare_kernels(void)
     struct interpolator_point c;
     struct program_clock clock;
     struct override_plan plan;
-    interpolator_begin(&it, &prepared[KERNEL_FIXED].program);
-    interpolator_begin(&floating, &prepared[KERNEL_FLOAT].program);
-    interpolator_begin(&exact, &prepared[KERNEL_DOUBLE].program);
-    program_clock_begin(&clock, &prepared[KERNEL_FIXED].program, p.header.period_us, 0);
+    interpolator_begin(&it, &precomputed[KERNEL_FIXED].program);
+    interpolator_begin(&floating, &precomputed[KERNEL_FLOAT].program);
+    interpolator_begin(&exact, &precomputed[KERNEL_DOUBLE].program);
+    program_clock_begin(&clock, &precomputed[KERNEL_FIXED].program, p.header.period_us, 0);
     override_plan_begin(&plan, &p);
     for (uint32_t tick = 0; tick < program_ticks(&p); tick++) {
         const uint64_t time = override_plan_tick(&plan, &clock);

@@ -37,7 +37,7 @@ enum phase { PLAN, BRAKE, REST }; /* of feed_override.c */
 
 static struct override_program bank[4][LINES];
 static struct override_program goldens[GOLDENS];
-static struct golden_prepared fixed, exact; /* the program that runs, for two kernels */
+static struct golden_precomputed fixed, exact; /* the program that runs, for two kernels */
 
 static struct {
     struct override_program *p;
@@ -368,10 +368,10 @@ static void choose(uint64_t random)
     chosen.p = chosen.line ? &bank[period][which % LINES] : &goldens[which % GOLDENS];
     override_program_limits(chosen.p, &random);
     golden_discard(&fixed);
-    golden_prepare(&fixed, &chosen.p->program, KERNEL_FIXED);
+    golden_precompute(&fixed, &chosen.p->program, KERNEL_FIXED);
     if (!chosen.line) {
         golden_discard(&exact);
-        golden_prepare(&exact, &chosen.p->program, KERNEL_DOUBLE);
+        golden_precompute(&exact, &chosen.p->program, KERNEL_DOUBLE);
     }
 }
 

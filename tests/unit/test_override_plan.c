@@ -9,7 +9,7 @@
 #include "unity.h"
 
 static struct program p;
-static struct golden_prepared prepared; /* the same with coefficient records */
+static struct golden_precomputed precomputed; /* the same with coefficient records */
 static struct program_clock clock;
 static struct override_plan plan;
 
@@ -20,16 +20,16 @@ void setUp(void)
 
 void tearDown(void)
 {
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
     golden_close(&p);
 }
 
 static void begin_at(uint32_t period_us, uint64_t time_q42_s)
 {
-    golden_discard(&prepared);
-    golden_prepare(&prepared, &p, KERNEL_FIXED);
-    program_clock_begin(&clock, &prepared.program, period_us, time_q42_s);
-    override_plan_begin(&plan, &prepared.program);
+    golden_discard(&precomputed);
+    golden_precompute(&precomputed, &p, KERNEL_FIXED);
+    program_clock_begin(&clock, &precomputed.program, period_us, time_q42_s);
+    override_plan_begin(&plan, &precomputed.program);
 }
 
 static uint64_t step(void)

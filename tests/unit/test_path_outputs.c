@@ -177,15 +177,15 @@ static void test_random_tables_act_in_the_right_tick(void)
 {
     enum { MOST_TICKS = 20000 };
     static struct interpolator_point points[MOST_TICKS];
-    struct golden_prepared prepared;
+    struct golden_precomputed precomputed;
     struct interpolator it;
     struct feed_override feed;
     uint64_t random = 42;
     uint32_t count = 0;
     TEST_ASSERT_EQUAL_INT(0, open_with(0));
-    golden_prepare(&prepared, &program, KERNEL_FIXED);
-    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &prepared.program));
-    feed_override_begin(&feed, &prepared.program, 1000, 0);
+    golden_precompute(&precomputed, &program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &precomputed.program));
+    feed_override_begin(&feed, &precomputed.program, 1000, 0);
     while (feed_override_state(&feed) != FEED_ENDED && count < MOST_TICKS) {
         if (count % 97u == 0u) {
             feed_override_set(&feed, (uint32_t)(golden_random(&random) % 201u));
@@ -228,7 +228,7 @@ static void test_random_tables_act_in_the_right_tick(void)
         TEST_ASSERT_EQUAL_INT16(events, outputs.values.analogue[0]);
         TEST_ASSERT_NULL(outputs.program);
     }
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
 }
 
 static void test_a_start_and_a_takeover_find_the_next_event(void)

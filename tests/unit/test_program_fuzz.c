@@ -145,13 +145,13 @@ static int try_image(uint8_t *image, uint32_t size, uint64_t random)
         return 0;
     }
     for (int kernel = KERNEL_FIXED; kernel <= KERNEL_DOUBLE; kernel++) {
-        struct golden_prepared prepared;
-        golden_prepare(&prepared, &p, (enum kernel_number)kernel);
-        run_accepted(&prepared.program, &limits);
+        struct golden_precomputed precomputed;
+        golden_precompute(&precomputed, &p, (enum kernel_number)kernel);
+        run_accepted(&precomputed.program, &limits);
         if (kernel == KERNEL_DOUBLE && limits.axis_jerk_mm_s3[0] != 0u) {
-            run_within_axis_limits(&prepared.program, &limits);
+            run_within_axis_limits(&precomputed.program, &limits);
         }
-        golden_discard(&prepared);
+        golden_discard(&precomputed);
     }
     return 1;
 }

@@ -7,20 +7,20 @@
 #include "unity.h"
 
 static struct program p;
-static struct golden_prepared prepared;
+static struct golden_precomputed precomputed;
 static struct interpolator it;
 static struct interpolator_point point;
 
 void setUp(void)
 {
     golden_open(&p, "heart_minimax.hdgp");
-    golden_prepare(&prepared, &p, KERNEL_FIXED);
-    interpolator_begin(&it, &prepared.program);
+    golden_precompute(&precomputed, &p, KERNEL_FIXED);
+    interpolator_begin(&it, &precomputed.program);
 }
 
 void tearDown(void)
 {
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
     golden_close(&p);
 }
 

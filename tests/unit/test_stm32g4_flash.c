@@ -202,11 +202,11 @@ static void test_what_the_store_refuses(void)
 static uint32_t run(const struct program *program)
 {
     static struct interpolator interp;
-    struct golden_prepared prepared;
+    struct golden_precomputed precomputed;
     uint32_t crc = 0;
     const uint32_t ticks = program_ticks(program);
-    golden_prepare(&prepared, program, KERNEL_FIXED);
-    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &prepared.program));
+    golden_precompute(&precomputed, program, KERNEL_FIXED);
+    TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&interp, &precomputed.program));
     for (uint32_t k = 0; k < ticks; ++k) {
         struct interpolator_point point;
         const uint64_t time_q32_s = ((uint64_t)k << 32) / 1000u;
@@ -216,7 +216,7 @@ static uint32_t run(const struct program *program)
         crc = crc32_update(crc, (const uint8_t *)&point.position_q40[1],
                            sizeof point.position_q40[1]);
     }
-    golden_discard(&prepared);
+    golden_discard(&precomputed);
     return crc;
 }
 

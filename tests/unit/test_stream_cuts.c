@@ -50,7 +50,7 @@ struct chain {
 };
 
 static struct {
-    struct golden_prepared exact;
+    struct golden_precomputed exact;
     struct override_program program;
     struct chain chains[CHAINS];
     struct interpolator_point right[MOST_TICKS]; /* its setpoints at 100 % */
@@ -113,11 +113,11 @@ static void at_most(const char *what, double a, double most)
 
 static void run_whole(uint32_t w)
 {
-    struct golden_prepared fixed;
+    struct golden_precomputed fixed;
     struct feed_override feed;
     struct interpolator it;
-    golden_prepare(&fixed, &wholes[w].program.program, KERNEL_FIXED);
-    golden_prepare(&wholes[w].exact, &wholes[w].program.program, KERNEL_DOUBLE);
+    golden_precompute(&fixed, &wholes[w].program.program, KERNEL_FIXED);
+    golden_precompute(&wholes[w].exact, &wholes[w].program.program, KERNEL_DOUBLE);
     feed_override_begin(&feed, &fixed.program, fixed.program.header.period_us, 0);
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&it, &fixed.program));
     while (feed_override_state(&feed) != FEED_ENDED) {

@@ -236,7 +236,7 @@ def _warn_of_size(image: bytes, machine: Machine) -> None:
         room, whose = LARGEST_BANK, "the largest controller there is"
     if needed > room:
         note(
-            f"takes {needed} bytes of a controller with what is prepared from it, more than the {room} of {whose}: "
+            f"takes {needed} bytes of a controller with its precomputed coefficients, more than the {room} of {whose}: "
             "upload will refuse it; split the path"
         )
 

@@ -97,9 +97,9 @@ class FeedOverride(FeedCommands):
         self._interp = ffi.new("struct interpolator *")
         self._point = ffi.new("struct interpolator_point *")
         self._feed = ffi.new("struct feed_override *")
-        prepared = program.prepared(kernel)
-        self._lib.interpolator_begin(self._interp, prepared)
-        self._lib.feed_override_begin(self._feed, prepared, program.period_us, 0)
+        precomputed = program.precomputed(kernel)
+        self._lib.interpolator_begin(self._interp, precomputed)
+        self._lib.feed_override_begin(self._feed, precomputed, program.period_us, 0)
 
     def step(self) -> Step:
         """The next tick."""

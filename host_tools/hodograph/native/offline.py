@@ -108,7 +108,7 @@ class OfflineSimulation:
         Raises InputError: unknown kernel, figures out of range, program not acceptable.
         """
         ffi, lib = library()
-        prepared = program.prepared(kernel)
+        precomputed = program.precomputed(kernel)
         self._program = program  # keeps the image alive
         self._segments = ffi.new("struct contour_segment[]", program.segment_count)
         self._rig = ffi.new("struct offline *")
@@ -119,7 +119,7 @@ class OfflineSimulation:
         ]
         error = lib.offline_begin(
             self._rig,
-            prepared,
+            precomputed,
             ffi.new("struct drive_config[]", configs),
             self._segments,
         )

@@ -92,7 +92,7 @@ class NativeProgram:
                 f"program image: {text(lib.program_error_text(code))}: compile it again (code {code})"
             )
         self._accepted = False
-        self._prepared: dict[int, tuple[Any, Any]] = {}
+        self._precomputed: dict[int, tuple[Any, Any]] = {}
 
     @property
     def period_us(self) -> int:
@@ -149,7 +149,7 @@ class NativeProgram:
                 f"program image: {fault.text} (code {fault.code}, number {fault.index}): compile it again"
             )
 
-    def prepared(self, kernel: str) -> Any:
+    def precomputed(self, kernel: str) -> Any:
         """The program with precomputed coefficients for a kernel, `struct program *`; valid as long as this object.
 
         The coefficients are made once (core/coefficients.h). Raises InputError for an unknown kernel and for a
@@ -157,7 +157,7 @@ class NativeProgram:
         """
         self.require()
         code = kernel_code(kernel)
-        if code not in self._prepared:
+        if code not in self._precomputed:
             ffi, lib = library()
             made_for = lib.kernel_find(code)
             size = lib.coefficients_size(self.pointer, made_for)
@@ -165,8 +165,8 @@ class NativeProgram:
             own = ffi.new("struct program *", self.pointer[0])
             if lib.coefficients_make_in(own, made_for, records, size) != 0:
                 raise HodographError("coefficients: their size is not what it was: report a bug")
-            self._prepared[code] = (own, records)
-        return self._prepared[code][0]
+            self._precomputed[code] = (own, records)
+        return self._precomputed[code][0]
 
     def tick_times_q42_s(self, tick0: int = 0, count: int | None = None) -> NDArray[np.uint64]:
         """Program times of `count` ticks from `tick0` on (default: to the last), s * 2^42, (count,)."""
@@ -182,7 +182,7 @@ class NativeProgram:
         Raises InputError for an unknown kernel and for a program that does not pass `check`.
         """
         ffi, lib = library()
-        program = self.prepared(kernel)
+        program = self.precomputed(kernel)
         times = np.ascontiguousarray(times_q42_s, dtype=np.uint64)
         points = np.zeros(times.size, dtype=POINT)
         interp = ffi.new("struct interpolator *")

@@ -61,15 +61,15 @@ def run_trials(
     Raises InputError: a program that is refused, no such kernel.
     """
     ffi, lib = library()
-    prepared = program.prepared(kernel)
+    precomputed = program.precomputed(kernel)
     trial = ffi.new("struct stop_trial *")
     trial.seed, trial.trials = seed, trials
     own = [limits_struct(limits) for limits in (hold, fault)]
     trial.hold, trial.fault = own[0][0][0], own[1][0][0]
     if tick is None:
-        error = lib.stop_trial_run(prepared, trial)
+        error = lib.stop_trial_run(precomputed, trial)
     else:
-        error = lib.stop_trial_again(prepared, trial, tick)
+        error = lib.stop_trial_again(precomputed, trial, tick)
     if error != 0:
         raise InputError("stop trials: the interpolator refused the program")
     names = ("velocity", "acceleration", "jerk", "path_acceleration", "path_jerk")

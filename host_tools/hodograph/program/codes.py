@@ -95,7 +95,7 @@ _TEXTS = {
     ProgramError.CRC: "CRC-32 of the contents is wrong",
     ProgramError.COUNT: "no segment or no piece",
     ProgramError.STORE: "the program store did not keep it",
-    ProgramError.ROOM: "with what is prepared from it too large for the program store",
+    ProgramError.ROOM: "with its precomputed coefficients too large for the program store",
     ProgramError.KERNEL: "the controller does not have the kernel configured",
     ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
     ProgramError.PERIOD_USED: "period is not the one configured in the controller",

@@ -175,7 +175,7 @@ def test_compile_warns_of_what_the_machines_controller_cannot_hold(
     needed = memory_bytes(output.read_bytes(), RECORD_BYTES["fixed"])
     assert told(needed) == ""
     assert (
-        f"takes {needed} bytes of a controller with what is prepared from it, more than the {needed - 1} of "
+        f"takes {needed} bytes of a controller with its precomputed coefficients, more than the {needed - 1} of "
         "[controller] program_bytes of machine.toml: upload will refuse it" in told(needed - 1)
     )
 

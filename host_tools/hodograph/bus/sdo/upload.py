@@ -54,7 +54,7 @@ def require_room(node: Node, image: bytes) -> None:
     needed = memory_bytes(image, RecordBytes(*records))
     if needed > bank:
         raise RefusedError(
-            f"{node.who()} has {bank} bytes for a program, this one takes {needed} with what is prepared from it: "
+            f"{node.who()} has {bank} bytes for a program, this one takes {needed} with its precomputed coefficients: "
             "split the path, or use a controller with more memory; the old program stays"
         )
 
