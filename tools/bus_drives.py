@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What one drive says and is told: legal statuswords and transitions of CiA 402, setpoints within the feed limit."""
+"""What one drive sends and receives: legal statuswords and transitions of CiA 402, setpoints within the feed limit."""
 
 from __future__ import annotations
 

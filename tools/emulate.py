@@ -37,8 +37,8 @@ _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
 _GRACE_S = 60.0
 """For the board to notice that its bridge is gone, and the other way round: at once, if they get the processor."""
 _UNBEGUN_S = 5.0
-"""For a board that was told to end, or has SLCAN: one that waits for a bridge to open its FIFO, or for datagrams, would
-wait for ever.
+"""For a board that was commanded to end, or has SLCAN: one that waits for a bridge to open its FIFO, or for datagrams,
+would wait for ever.
 """
 _LOOK_S = 0.1
 """Between two looks whether the time for an end is over."""
@@ -221,9 +221,9 @@ class Board:
             return _BUS_STATUS
         asked = self._stopping_since is not None
         if self.bridge is not None and self.qemu.poll() is not None and not asked:
-            self.bridge.terminate()  # what waits for a FIFO, or for datagrams, is not told of the end
-        told = not asked and self._options.link == "fifo"
-        qemu = _end(self.qemu, _GRACE_S if told else _UNBEGUN_S)
+            self.bridge.terminate()  # what waits for a FIFO, or for datagrams, does not notice the end
+        notified = not asked and self._options.link == "fifo"
+        qemu = _end(self.qemu, _GRACE_S if notified else _UNBEGUN_S)
         bridge = 0 if self.bridge is None else _end(self.bridge, _GRACE_S)
         if bridge == _BUS_STATUS:
             return _BUS_STATUS

@@ -44,14 +44,14 @@ def run_target(target: str, build: Path, seconds: int, seed: int) -> Result:
             timeout=seconds + EXTRA_S,
             check=False,
         )
-        told = json.loads(done.stdout.splitlines()[-1])
+        reported = json.loads(done.stdout.splitlines()[-1])
     except (subprocess.TimeoutExpired, ValueError, IndexError):
         case = (folder / target / "case").read_text(encoding="utf-8").strip()
         return Result(
             name, 0, None, [f"{name}: hangs or ended in {case}; files in {folder / target}"]
         )
-    findings = [f"{name} --seed {seed}: {finding}" for finding in told["findings"]]
-    return Result(name, told["cases"], None, findings)
+    findings = [f"{name} --seed {seed}: {finding}" for finding in reported["findings"]]
+    return Result(name, reported["cases"], None, findings)
 
 
 def show(result: Result) -> None:

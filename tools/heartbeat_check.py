@@ -67,7 +67,7 @@ class Beats:
             if state == _BOOT_UP:
                 self._boots[node] += 1
                 if self._boots[node] > 1:
-                    yield f"node {node} booted without being told to"
+                    yield f"node {node} booted without a command"
                 self._last_s[node] = time_s
                 self._told[node] = {_PRE}
                 continue

@@ -17,7 +17,7 @@ from testing.cache import ABSENT, Stamps, content, digest
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = ("firmware", "sim", "host_tools", "tools", "tests", "benchmarks", ".ci")
-# What linters are told, and the linters: with other settings every file that differs is linted again.
+# The settings of linters, and the linters: with other settings every file that differs is linted again.
 SETTINGS = ("pyproject.toml", "requirements.lock", ".clang-tidy", ".clang-format", "Makefile")
 
 

@@ -69,7 +69,7 @@ class Soak:
 
     def run(self, seconds: float) -> None:
         """Runs until so much bus time has passed and the last program has ended. Raises HodographError."""
-        begun = told = time.monotonic()
+        begun = reported = time.monotonic()
         with (
             Recorder(self.address) as recorder,
             run_session(self.machine, self.address, "fast", 10.0, self.note) as at,
@@ -88,8 +88,8 @@ class Soak:
                 for finding in self.checker.findings[known:]:
                     self.note(finding)
                 self.wall_s = time.monotonic() - begun
-                if time.monotonic() - told > _REPORT_S:
-                    told = time.monotonic()
+                if time.monotonic() - reported > _REPORT_S:
+                    reported = time.monotonic()
                     self.note(self.line())
             self.dropped = recorder.dropped
         if self.dropped:

@@ -108,11 +108,11 @@ def _printed(
     only: list[str], peer: klipper.Klipper | None, motions: dict[str, Motion]
 ) -> list[Row]:
     """Measures and prints row by row; keeps the motions that the figure shows."""
-    told = "" if peer is None else f", Klipper {peer.version}"
+    klipper_part = "" if peer is None else f", Klipper {peer.version}"
     print(
         f"axes: {LIMITS.velocity_mm_s:g} mm/s, {LIMITS.acceleration_mm_s2:g} mm/s^2, {LIMITS.jerk_mm_s3:g} mm/s^3 "
         f"(those that limit it); tolerance {1000 * TOLERANCE_MM:g} um; LinuxCNC {linuxcnc.version()}, TOPP-RA "
-        f"{toppra_spline.version()}, Ruckig {ruckig_stops.version()}{told}"
+        f"{toppra_spline.version()}, Ruckig {ruckig_stops.version()}{klipper_part}"
     )
     print(_HEAD)
     rows = []

@@ -37,16 +37,16 @@ def run_measured(
 ) -> tuple[subprocess.CompletedProcess[str], Cost]:
     """How a command ended, and what it took."""
     with tempfile.TemporaryDirectory(prefix="peer-") as folder:
-        told = Path(folder, "cost")
+        report = Path(folder, "cost")
         done = subprocess.run(
-            [*_WITH_US, sys.executable, "-I", __file__, str(told), *map(str, command)],
+            [*_WITH_US, sys.executable, "-I", __file__, str(report), *map(str, command)],
             env=environment,
             capture_output=True,
             text=True,
             timeout=limit_s,
             check=False,
         )
-        processor_s, memory_kib = told.read_text().split()
+        processor_s, memory_kib = report.read_text().split()
         return done, Cost(float(processor_s), int(memory_kib) / 1024.0)
 
 

@@ -160,10 +160,10 @@ def main() -> int:
             row = measured(printed, file)
             rows.append(row)
             shares = f"{100 * row['acceleration_usage']:.1f}, {100 * row['jerk_usage']:.1f}"
-            told = "" if row["possible"] else "  printed time is shorter than length/feed"
+            remark = "" if row["possible"] else "  printed time is shorter than length/feed"
             print(
                 f"{row['row']:<10}{row['printed_s']:>10.2f}{row['cited_s']:>9.2f}{row['ours_s']:>8.2f}"
-                f"{row['least_s']:>15.2f}{shares:>18}{told}",
+                f"{row['least_s']:>15.2f}{shares:>18}{remark}",
                 flush=True,
             )
     print(

@@ -4,7 +4,7 @@
 Each span of the path is a phase of its own length in time, cut into equal intervals. Arc length is a quartic in each
 (jerk linear, free to jump at the ends of intervals); the curve's parameter xi is a variable at every node, tied to arc
 length by s(xi) = s, so that the curve is exact. Limits hold at five points of every interval; how far they are passed
-in between is told. Nothing here is used by the planner or the verifier.
+in between is reported. Nothing here is used by the planner or the verifier.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@
  * 
  * A command to stop gets through: an expedited write of one byte that the dictionary's hook `urgent` names is carried
  * out and answered beside the transfer under way, which goes on. Its client has to disregard that answer, which names
- * another object than its own. Within a block, segments are told from such a write by all its eight bytes.
+ * another object than its own. Within a block, such a write is distinguished from segments by all its eight bytes.
  * 
  * Within a block each frame is a segment by its number. A frame that has the form of a request for an existing object,
  * and whose number is not one of the next two, is refused as the request of another client. A frame of another client

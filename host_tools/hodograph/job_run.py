@@ -217,7 +217,7 @@ def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: O
 
 
 def say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
-    """Tells the messages among commands. Those on the way of a section are told at its end."""
+    """Reports the messages among commands. Those within a section are reported at its end."""
     for command in commands:
         if isinstance(command, Message):
             at.note(f"{file}:{command.line}: {command.text}")

@@ -158,12 +158,12 @@ static void offline_order(struct offline *sim, const struct offline_order *order
     case OFFLINE_ORDER_STOP:
         offline_order_stop(sim, PROGRAM_STOP_HOLD);
         feed_override_stop(&sim->feed);
-        path_outputs_clear(&sim->outputs); /* as a controller that is not told otherwise */
+        path_outputs_clear(&sim->outputs); /* as a controller that has no other command */
         break;
     case OFFLINE_ORDER_FAULT_STOP:
         offline_order_stop(sim, PROGRAM_STOP_FAULT);
         feed_override_fault_stop(&sim->feed);
-        path_outputs_clear(&sim->outputs); /* as a controller that is not told otherwise */
+        path_outputs_clear(&sim->outputs); /* as a controller that has no other command */
         break;
     case OFFLINE_ORDER_RESUME:
         feed_override_resume(&sim->feed);

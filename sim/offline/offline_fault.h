@@ -35,8 +35,8 @@ struct offline_fault {
     double value;
 };
 
-/* Tick number `tick` begins: the fault begins, ends, or nothing changes. Every tick from 0 on has to
- * be told. */
+/* Tick number `tick` begins: the fault begins, ends, or nothing changes. To be called for every tick
+ * from 0 on. */
 void offline_fault_tick(const struct offline_fault *fault, int64_t tick,
                         struct influence *influence, const struct drive *drive);
 

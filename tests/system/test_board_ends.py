@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A board that ends in the middle of a motion: told to, it stops the axes first; its plug pulled, the drives stop."""
+"""A board that ends in the middle of a motion: by a signal, it stops the axes first; without power, the drives stop."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_with_its_plug_pulled_the_drives_stop_by_themselves(running: Running) ->
 
 def _is_told(frames: Frames, node: int, is_virtual: bool) -> None:
     control, _ = targets(frames, node)
-    assert (control[-1] & ENABLED) == ENABLED  # nobody told it to stop
+    assert (control[-1] & ENABLED) == ENABLED  # nobody commanded a stop
     said = frames[frames["id"] == 0x80 + node]
     codes = said["data"][:, :2].copy().view("<u2")[:, 0].tolist()
     if is_virtual:

@@ -68,10 +68,10 @@ def test_refusals(controller: Controller, capsys: pytest.CaptureFixture[str]) ->
     assert main(["goto", str(ALPHA), "--to", "5", "5"]) == 0
     capsys.readouterr()
     assert main(["upload", str(ALPHA), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    reported = json.loads(capsys.readouterr().out)
     assert main(["status", "--json"]) == 0
-    assert told["program"] == json.loads(capsys.readouterr().out)["program"]
-    assert (told["node"], told["bytes"]) == (1, told["program"]["size"])
+    assert reported["program"] == json.loads(capsys.readouterr().out)["program"]
+    assert (reported["node"], reported["bytes"]) == (1, reported["program"]["size"])
     status, line = status_line(capsys, "start")
     assert (status, "away from the program's start: hodograph goto" in line) == (5, True), line
     status, line = status_line(capsys, "goto", str(ALPHA), "--to", "500", "0")

@@ -55,14 +55,14 @@ class Listened:
         until(self.node.network, lambda: len(self.beats) >= count)
         return [state for _, state in self.beats]
 
-    def told(self, state: int) -> bool:
+    def reported(self, state: int) -> bool:
         return any(beat == state for _, beat in self.beats)
 
     def command(self, name: str, state: int) -> None:
         """An NMT command, until a heartbeat tells the state."""
         self.beats.clear()
         self.node.nmt.state = name
-        until(self.node.network, lambda: self.told(state))
+        until(self.node.network, lambda: self.reported(state))
 
 
 @pytest.fixture
@@ -109,8 +109,8 @@ def test_resets_from_every_state(drive: Listened, command: str, before: str) -> 
     drive.command(before, states[before])
     drive.command(command, BOOT_UP)
     until(drive.node.network, lambda: len(drive.beats) >= 4)
-    told = [state for _, state in drive.beats]
-    assert told[told.index(BOOT_UP) :] == [BOOT_UP, *[PRE_OPERATIONAL] * 3]
+    reported = [state for _, state in drive.beats]
+    assert reported[reported.index(BOOT_UP) :] == [BOOT_UP, *[PRE_OPERATIONAL] * 3]
     assert drive.node.sdo[0x1000].raw == 0x00020192
 
 

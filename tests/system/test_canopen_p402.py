@@ -149,7 +149,7 @@ def test_through_the_states(master: Master, path: list[str]) -> None:
 
 
 def test_quick_stop_and_back(master: Master) -> None:
-    """0x605A = 6: the drive stays in Quick stop active, until told to go on or to give up."""
+    """0x605A = 6: the drive stays in Quick stop active, until commanded to go on or to give up."""
     node = master.node
     node.sdo[0x605A].raw = 6
     hold_target(node)

@@ -484,7 +484,7 @@ def test_a_number_is_not_given_where_it_would_reach_two(
 
 
 def test_two_nodes_of_one_identity(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> None:
-    """They cannot be told apart: both answer every bit alike."""
+    """They cannot be distinguished: both answer every bit alike."""
     with DurandDevices(hub, [(NO_NUMBER, SERVO_ID), (NO_NUMBER, SERVO_ID)]):
         assert result(capsys, "scan", "--json")["unconfigured"] == [as_json(SERVO_ID)]
 

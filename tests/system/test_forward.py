@@ -59,7 +59,7 @@ def serving(port: int, *options: str, inside: int = INSIDE) -> Iterator[subproce
 
 @contextlib.contextmanager
 def running(command: list[str]) -> Iterator[subprocess.Popen[bytes]]:
-    """A command that runs a server, until it is told to end."""
+    """A command that runs a server, until a signal ends it."""
     with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         try:

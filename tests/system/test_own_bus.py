@@ -120,7 +120,7 @@ def test_demo(environment: Mapping[str, str], tmp_path: Path) -> None:
     )
     simulated = hodograph(environment, "simulate", str(ALPHA), "--json")
     assert setpoints(demo) == setpoints(simulated)
-    told = json.loads(demo.stdout)
-    assert told["page"].startswith("http://127.0.0.1:")
-    assert Path(told["report"]).stat().st_size > 100_000
-    assert told["page"] in demo.stderr
+    reported = json.loads(demo.stdout)
+    assert reported["page"].startswith("http://127.0.0.1:")
+    assert Path(reported["report"]).stat().st_size > 100_000
+    assert reported["page"] in demo.stderr

@@ -73,7 +73,7 @@ def test_simulated_drives_bear_it(
 
 
 FEED_COUNTS = 40_000
-"""Way of a period of 1 ms at 40 mm/s: what an axis may be told to go from one SYNC to the next."""
+"""Distance of 1 ms at 40 mm/s: the largest step of a setpoint from one SYNC to the next."""
 
 
 def full_bus(bench: Bench, hub: LocalHub, path: str, seconds: float) -> tuple[int, int]:

@@ -98,11 +98,11 @@ def test_a_recording_from_beside(
         command.signal(signal.SIGINT)
         assert command.wait() == 0
         out = command.out
-    told = json.loads(out)
-    assert told["jumps"] == []
+    reported = json.loads(out)
+    assert reported["jumps"] == []
     frames = read_recording(file)
     assert frames.dtype == RECORD_DTYPE
-    assert told["frames"] == frames.size > live["frames"]
+    assert reported["frames"] == frames.size > live["frames"]
     again = result(capsys, "replay", str(file), heart, "--json")
     for key in ("ticks", "setpoints_sha256", "encoders_sha256", "max_contour_error_um"):
         assert again[key] == live[key], key
@@ -133,21 +133,21 @@ def test_a_jump_on_the_bus_is_told(
             status = command.wait()
             return status, json.loads(command.out), command.err
 
-    status, told, err = record("jump.log", "--machine", MACHINE)
-    assert told["frames"] == 1300 * 5
-    assert told["seconds"] == pytest.approx(1.5, abs=1e-6)
+    status, reported, err = record("jump.log", "--machine", MACHINE)
+    assert reported["frames"] == 1300 * 5
+    assert reported["seconds"] == pytest.approx(1.5, abs=1e-6)
     if jump_at < 0:
-        assert (status, told["jumps"], err) == (0, [], "")
+        assert (status, reported["jumps"], err) == (0, [], "")
         return
     assert status == 6
     assert f"setpoint jump at SYNC {jump_at} of the recording, axis 1 and 2: speed" in err
     assert "the file is complete" in err.splitlines()[-1]
     assert (
-        len(told["jumps"]) == 5
+        len(reported["jumps"]) == 5
     )  # speed, acceleration; speed, acceleration, jerk of the first axis
     assert read_recording(tmp_path / "jump.log").size == 1300 * 5
-    status, told, err = record("unchecked.log")
-    assert (status, told["jumps"]) == (0, None)
+    status, reported, err = record("unchecked.log")
+    assert (status, reported["jumps"]) == (0, None)
     assert "setpoints were not checked" in err
 
 
@@ -159,10 +159,10 @@ def test_without_a_machine_file_the_controller_is_asked(
 ) -> None:
     make_bench()
     with running(clock, "goto", ALPHA, "--to", "3", "4") as command:
-        told = result(capsys, "record", str(tmp_path / "goto.log"), "--seconds", "4", "--json")
+        reported = result(capsys, "record", str(tmp_path / "goto.log"), "--seconds", "4", "--json")
         assert command.wait() == 0
-    assert told["jumps"] == []
-    assert told["frames"] > 4000
+    assert reported["jumps"] == []
+    assert reported["frames"] > 4000
 
 
 def test_for_some_seconds(

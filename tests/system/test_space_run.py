@@ -60,7 +60,7 @@ def made_for(machine: Machine, extras: int = 0) -> bytes:
 
 
 def setpoints_of(whole: bytes, machine: Machine) -> NDArray[np.int32]:
-    """What the drives are to be told, by axis, each in its own counts."""
+    """The setpoints of the drives, by axis, each in its own counts."""
     program = NativeProgram(whole)
     points = program.points("fixed", program.tick_times_q42_s())["position_q40"]
     columns = [

@@ -53,8 +53,8 @@ def test_four_commands_say_the_same(
     for command in (("compile", file, "-o", image), ("inspect", image), ("feed", file)):
         lines = text(capsys, *command)
         for kind, words in (("hold", "hold, stop at most"), ("fault", "fault stop at most")):
-            told = f"{words} {compiled[kind]['time_s']:.4g} s and"
-            assert any(line.startswith(told) for line in lines), command
+            reported = f"{words} {compiled[kind]['time_s']:.4g} s and"
+            assert any(line.startswith(reported) for line in lines), command
     lines = text(capsys, "status")
     assert any(f"hold, stop at most {compiled['hold']['time_s']:.4g} s" in line for line in lines)
     assert any(f"fault stop at most {compiled['fault']['time_s']:.4g} s" in line for line in lines)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How a moving machine is left, at any instant of an optimal program: by signals, once and twice, and by its host.
 
-The frames on the bus are the evidence: setpoints rest within the bound of the stop, or the drives were told to stop
-quickly; and a drive whose axis moves is never told to switch off.
+The frames on the bus are the evidence: setpoints rest within the bound of the stop, or the drives were commanded
+a quick stop; and a drive whose axis moves is never switched off.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ LATE_US = 7000
 
 @dataclass(frozen=True)
 class Heard:
-    """What one axis was told and what its drive answered, in time order; times in us."""
+    """The commands to one axis and the answers of its drive, in time order; times in us."""
 
     told_us: NDArray[np.int64]
     word: NDArray[np.int64]
@@ -60,12 +60,12 @@ class Heard:
         return powered and int(np.ptp(near)) > STANDS_COUNTS
 
     def first_us(self, value: int, after_us: int) -> int | None:
-        """When it was told this controlword for the first time after an instant."""
+        """When this controlword was sent for the first time after an instant."""
         found = np.flatnonzero((self.word == value) & (self.told_us >= after_us))
         return int(self.told_us[found[0]]) if found.size else None
 
     def last_step_us(self, after_us: int) -> int:
-        """When its target changed last while it was told to follow."""
+        """When its target changed last while its controlword was that of operation."""
         follows = (self.word[1:] & 0x0F) == 0x0F
         steps = np.flatnonzero((np.diff(self.target) != 0) & follows)
         return max(int(self.told_us[steps[-1] + 1]), after_us) if steps.size else after_us
@@ -86,7 +86,7 @@ def heard(frames: Frames, node: int) -> Heard:
 
 
 def never_coasts(frames: Frames) -> None:
-    """Asserts that no drive whose axis moves is told to take its power away."""
+    """Asserts that no drive whose axis moves is commanded to take its power away."""
     for node in NODES:
         axis = heard(frames, node)
         falls = np.flatnonzero(
@@ -146,7 +146,7 @@ def signalled(way: Way, end: signal.Signals, again_s: float | None = None) -> tu
 
 
 def switched_off(frames: Frames, at_us: int) -> bool:
-    """Whether both drives were told to switch off after an instant."""
+    """Whether both drives were commanded to switch off after an instant."""
     return all(heard(frames, node).first_us(0, at_us) is not None for node in NODES)
 
 

@@ -150,9 +150,9 @@ def test_from_cpp(standard: str, prefix: Path, tmp_path: Path) -> None:
     program = tmp_path / "program"
     options = [f"-I{prefix}/include", f"-L{prefix}/lib", "-lhodograph", f"-Wl,-rpath,{prefix}/lib"]
     run("g++", f"-std={standard}", *STRICT, source, *options, "-o", program)
-    told = run(program).stdout.split()
-    assert told[0] == "-1"
-    assert told[-1] == version()
+    reported = run(program).stdout.split()
+    assert reported[0] == "-1"
+    assert reported[-1] == version()
 
 
 def test_each_program_has_a_man_page(prefix: Path) -> None:

@@ -98,8 +98,8 @@ def test_the_place_of_the_wheel_is_forgotten(tmp_path: Path) -> None:
     information.mkdir()
     (information / "direct_url.json").write_text('{"url": "file:///tmp/x"}')
     first, last = b"hodograph/__init__.py,sha256=a,1\r\n", b"hodograph-1.dist-info/RECORD,,\r\n"
-    told = b"hodograph-1.dist-info/direct_url.json,sha256=b,24\r\n"
-    (information / "RECORD").write_bytes(first + told + last)
+    reported = b"hodograph-1.dist-info/direct_url.json,sha256=b,24\r\n"
+    (information / "RECORD").write_bytes(first + reported + last)
     forget_origin(information)
     assert (information / "RECORD").read_bytes() == first + last
     assert [file.name for file in information.iterdir()] == ["RECORD"]
@@ -131,14 +131,14 @@ def test_manifests_by_the_tools_of_their_formats(tmp_path: Path) -> None:
     """PlatformIO reads both manifests and finds them valid; Kconfig is read as Zephyr does."""
     make(str((TOOLS.parent / ".ready").relative_to(ROOT)))
     make_library(tmp_path)
-    told = subprocess.run(
+    reported = subprocess.run(
         [TOOLS / "python", "-c", PLATFORMIO, tmp_path],
         check=True,
         capture_output=True,
         text=True,
         env=os.environ | {"PLATFORMIO_CORE_DIR": str(tmp_path / "platformio")},
     )
-    assert told.stdout.split() == [version()] * 2
+    assert reported.stdout.split() == [version()] * 2
     (tmp_path / "Kconfig").write_text(
         f'config CPU_HAS_FPU\n\tbool "stands in"\n\nsource "{tmp_path}/zephyr/Kconfig"\n'
     )

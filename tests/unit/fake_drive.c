@@ -161,18 +161,18 @@ static int answers(struct fake_drive *drive, const struct pdo_actual *actual, st
 /* Homing mode: begins with the edge of bit 4, tells of its end in bits 10, 12, 13. */
 static void seek_home(struct fake_drive *drive)
 {
-    const uint16_t told =
+    const uint16_t acknowledged =
         CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED | CIA402_STATUS_HOMING_ERROR;
     if ((drive->state.controlword & CIA402_CONTROL_START_HOMING) == 0u) {
         drive->homing_left = drive->homing_syncs;
-        drive->state.flags &= (uint16_t)~told;
+        drive->state.flags &= (uint16_t)~acknowledged;
         drive->state.flags |=
             drive->homed ? CIA402_STATUS_TARGET_REACHED | CIA402_STATUS_HOMING_ATTAINED : 0u;
         return;
     }
     drive->homed = drive->homed && drive->homing_left == 0u;
     if (drive->homing_left > 0u) {
-        drive->state.flags &= (uint16_t)~told;
+        drive->state.flags &= (uint16_t)~acknowledged;
         drive->homing_left--;
     } else if (drive->homing_fails) {
         drive->state.flags |= CIA402_STATUS_HOMING_ERROR;

@@ -18,7 +18,7 @@ enum flash_model_remains {
     FLASH_MODEL_BEFORE, /* it has not begun */
     FLASH_MODEL_HALF, /* some of its bits have changed, anywhere; error correction fails for these words */
     FLASH_MODEL_QUIET, /* the same, but error correction sees nothing */
-    FLASH_MODEL_AFTER, /* it is complete, but nobody was told */
+    FLASH_MODEL_AFTER, /* it is complete, but no status was returned */
     FLASH_MODEL_REMAINS,
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Configuration of the drives by SDO: order, what is optional, what is told when it fails. */
+/* Configuration of the drives by SDO: order, what is optional, what is reported when it fails. */
 #include "app/drives/drive_boot.h"
 
 #include "canopen/pdo.h"

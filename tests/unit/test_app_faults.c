@@ -936,7 +936,7 @@ static void test_a_reset_with_one_more_axis_leads_to_boot(void)
     (void)app_bench_until(&bench, MACHINE_BOOT, 10);
 }
 
-/* The same fault of another drive is told again. */
+/* The same fault of another drive is reported again. */
 static void test_each_fault_is_told(void)
 {
     switch_on();

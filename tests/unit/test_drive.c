@@ -310,7 +310,7 @@ static double following_um(void)
     return worst;
 }
 
-/* With the velocity feedforward of a screw of 1.59 mm/rad, a stiff loop that is told the speed without steps errs
+/* With the velocity feedforward of a screw of 1.59 mm/rad, a stiff loop that receives the speed without steps errs
  * only by what the acceleration needs. */
 static void test_cubic_interpolation_follows_more_closely(void)
 {

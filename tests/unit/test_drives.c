@@ -128,11 +128,11 @@ static int frames_with(uint32_t id)
 /* The next message about filters, of a kind. */
 static struct local_bus_filters next_filters(uint16_t kind)
 {
-    struct local_bus_filters told = {.count = 0};
+    struct local_bus_filters reported = {.count = 0};
     do {
-        TEST_ASSERT_GREATER_THAN(0, recv(bus, &told, sizeof told, MSG_DONTWAIT));
-    } while (told.mark != LOCAL_BUS_MARK || told.kind != kind);
-    return told;
+        TEST_ASSERT_GREATER_THAN(0, recv(bus, &reported, sizeof reported, MSG_DONTWAIT));
+    } while (reported.mark != LOCAL_BUS_MARK || reported.kind != kind);
+    return reported;
 }
 
 static void expect_match(const struct can_match *match, uint16_t id, uint16_t mask)

@@ -75,10 +75,11 @@ static void send_frame(const struct other *who, uint32_t id, uint8_t length)
 static void want_no_frames(const struct other *who)
 {
     const struct can_filter none = {0x7FF, 0x7FF};
-    struct local_bus_filters told = {.mark = LOCAL_BUS_MARK, .kind = LOCAL_BUS_FILTER, .count = 1};
+    struct local_bus_filters reported = {
+        .mark = LOCAL_BUS_MARK, .kind = LOCAL_BUS_FILTER, .count = 1};
     const size_t size = offsetof(struct local_bus_filters, filters) + sizeof none;
-    told.filters[0] = none;
-    TEST_ASSERT_EQUAL(size, send(who->member, &told, size, 0));
+    reported.filters[0] = none;
+    TEST_ASSERT_EQUAL(size, send(who->member, &reported, size, 0));
 }
 
 static uint64_t frame_ns(uint32_t id, uint8_t length)
@@ -261,7 +262,7 @@ static void test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once(vo
     TEST_ASSERT_EQUAL(0x100, got[0].id);
 }
 
-/* Frames that wait are told of at their last bit; that wakes nobody. */
+/* Frames that wait are announced at their last bit; that wakes nobody. */
 static void test_tracked_frames_are_waited_for_until_their_last_bit(void)
 {
     struct can_msg got[CAN_SOCKET_BATCH];
@@ -311,9 +312,9 @@ static void test_a_descriptor_of_ones_own_ends_the_wait_at_once(void)
     TEST_ASSERT_EQUAL(POLLIN, fds.revents);
     TEST_ASSERT_EQUAL_UINT64(begin_ns, clock_ns());
     (void)close(fds.fd);
-    const struct local_bus_control told = next_message(&other);
-    TEST_ASSERT_EQUAL(LOCAL_BUS_INTERRUPTED, told.kind);
-    TEST_ASSERT_EQUAL_STRING("mine", told.name);
+    const struct local_bus_control reported = next_message(&other);
+    TEST_ASSERT_EQUAL(LOCAL_BUS_INTERRUPTED, reported.kind);
+    TEST_ASSERT_EQUAL_STRING("mine", reported.name);
 }
 
 static volatile sig_atomic_t alarms;

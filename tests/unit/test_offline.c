@@ -167,7 +167,7 @@ static void test_times_do_not_drift_in_long_programs(void)
     TEST_ASSERT_EQUAL_UINT64((UINT64_C(3999999) << 42) + UINT64_C(4362862139015), time);
 }
 
-/* The drive is told what it would have to find out: with the velocity's missing share it follows more closely,
+/* With what the drive would otherwise have to find out: with the velocity's missing share it follows more closely,
  * and with no gains the bits are the plain ones. */
 static void test_feedforward(void)
 {

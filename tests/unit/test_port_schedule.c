@@ -17,7 +17,7 @@ void tearDown(void)
 {
 }
 
-/* Runs the tick that is due, late_ns late; returns the lateness told. */
+/* Runs the tick that is due, late_ns late; returns the lateness reported. */
 static uint64_t tick(uint64_t late_ns)
 {
     const uint64_t now_ns = schedule.due_ns + late_ns;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The integer helpers against plain 128-bit-free identities and small cases that can be told by hand. */
+/* The integer helpers against plain 128-bit-free identities and small cases that can be computed by hand. */
 #include "core/qmath.h"
 
 #include "core/bernstein.h"

@@ -307,7 +307,7 @@ static void test_an_abort_midway_is_told_to_the_domain(void)
     expect_abort(SDO_ABORT_COMMAND);
 }
 
-/* Whoever asks while a transfer is under way is told so, with the object that it asked for; the transfer goes on. */
+/* A request during a transfer is refused, with the object that it names; the transfer goes on. */
 static void test_a_second_client_is_refused(void)
 {
     static const uint8_t asks[] = {0x20, 0x21, 0x23, 0x2F, 0x40, 0xA0, 0xA4, 0xC0, 0xC6};

@@ -52,29 +52,33 @@ def command(*words: str | Path) -> Outcome:
     from hodograph.cli.main import main
 
     out, errors = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors), _warnings() as told:
+    with (
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(errors),
+        _warnings() as reported,
+    ):
         try:
             status = main(list(map(str, words)))
         except SystemExit as ended:  # of argparse
             status = int(ended.code or 0)
-    _judge(" ".join(map(str, words)), status, errors.getvalue(), told)
+    _judge(" ".join(map(str, words)), status, errors.getvalue(), reported)
     return Outcome(status, out.getvalue(), errors.getvalue())
 
 
 @contextlib.contextmanager
 def _warnings() -> Iterator[list[str]]:
-    told: list[str] = []
+    reported: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        yield told
-    told += [f"{w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in caught]
+        yield reported
+    reported += [f"{w.category.__name__}: {w.message} ({w.filename}:{w.lineno})" for w in caught]
 
 
-def _judge(what: str, status: int, errors: str, told: list[str]) -> None:
+def _judge(what: str, status: int, errors: str, reported: list[str]) -> None:
     if status not in STATUSES or "Traceback" in errors:
         raise Finding(f"{what}: status {status}: {errors[-2000:]}")
-    if told:
-        raise Finding(f"{what}: {told[0]}")
+    if reported:
+        raise Finding(f"{what}: {reported[0]}")
     lines = [line for line in errors.splitlines() if line.startswith("hodograph: error")]
     if status != 0 and not errors.strip():
         raise Finding(f"{what}: status {status} without a word")
@@ -86,14 +90,14 @@ def loaded(load: Callable[[Path], object], file: Path) -> Outcome:
     """The same for a function of the package: what `main` would make of it. Raises Finding."""
     from hodograph.errors import HodographError
 
-    with _warnings() as told:
+    with _warnings() as reported:
         try:
             outcome = Outcome(0, repr(load(file)), "")
         except HodographError as error:
             outcome = Outcome(error.exit_status, "", str(error))
         except Exception as error:
             raise Finding(f"{type(error).__name__}: {error}") from error
-    _judge(str(file), outcome.status, outcome.errors, told)
+    _judge(str(file), outcome.status, outcome.errors, reported)
     return outcome
 
 

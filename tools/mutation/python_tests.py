@@ -52,7 +52,7 @@ class PythonTests:
     def _write(self, path: str, text: str) -> None:
         file = self.tree / path
         file.write_text(text, encoding="utf-8")
-        # Compiled modules are told apart by second and size only: two mutants may have both in common.
+        # Compiled modules are distinguished by second and size only: two mutants may have both in common.
         for compiled in (file.parent / "__pycache__").glob(f"{file.stem}.*.pyc"):
             compiled.unlink()
 

@@ -54,8 +54,10 @@ def switch_on():
 def peak_memory_kib():
     """Of milltask and rtapi_app together."""
     total = 0
-    for told in Path("/proc").glob("[0-9]*/status"):
-        lines = dict(line.split(":", 1) for line in told.read_text().splitlines() if ":" in line)
+    for status_file in Path("/proc").glob("[0-9]*/status"):
+        lines = dict(
+            line.split(":", 1) for line in status_file.read_text().splitlines() if ":" in line
+        )
         if lines["Name"].strip().startswith(("milltask", "rtapi_app")):
             total += int(lines["VmHWM"].split()[0])
     return total

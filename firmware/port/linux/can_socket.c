@@ -37,13 +37,13 @@ static void raw_filters(struct can_filter *raw, const struct can_match *filters,
 static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct can_match *filters,
                     size_t count)
 {
-    struct local_bus_filters told = {
+    struct local_bus_filters message = {
         .mark = LOCAL_BUS_MARK, .kind = kind, .count = (uint16_t)count};
     const size_t size =
-        offsetof(struct local_bus_filters, filters) + count * sizeof told.filters[0];
-    raw_filters(told.filters, filters, count);
+        offsetof(struct local_bus_filters, filters) + count * sizeof message.filters[0];
+    raw_filters(message.filters, filters, count);
     clock_note_sent();
-    return send(socket->fd, &told, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
+    return send(socket->fd, &message, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
 }
 
 /* Frames of ours that are tracked pass as well; with no filter all do. */

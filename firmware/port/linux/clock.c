@@ -187,7 +187,7 @@ static int poll_virtually(struct pollfd *fds, size_t buses, size_t count, uint64
     if (error == 0) {
         error = await_grant(fds + buses, count - buses, &interrupted);
     }
-    signal_noted = 0; /* the hub has been told of those that ended the wait */
+    signal_noted = 0; /* the hub has been notified of those that ended the wait */
     (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
     if (error != 0) {
         return error;

@@ -181,7 +181,7 @@ def load_job(
     unit_mm: float | None = None,
     closed: bool = False,
 ) -> Job:
-    """The job of a toolpath file: G-code, DXF, SVG or points, told apart by the end of its name.
+    """The job of a toolpath file: G-code, DXF, SVG or points; the end of its name shows which.
 
     tolerance_mm   greatest distance between programmed path and curves; 0: stop at the end of each move
     feed_mm_s      in place of the feeds of the file; drawings need it

@@ -60,8 +60,8 @@ def tune(options: Namespace) -> None:
 def _with_feedforward(machine: Machine, forward: tuple[Feedforward, Feedforward]) -> Machine:
     """The machine as it is to be: offsets take room on the bus."""
     plane = zip(machine.require_plane("tune"), forward, strict=True)
-    told = tuple(replace(axis, feedforward=own) for axis, own in plane)
-    return replace(machine, axes=(*told, *machine.axes[len(told) :]))
+    with_feedforward = tuple(replace(axis, feedforward=own) for axis, own in plane)
+    return replace(machine, axes=(*with_feedforward, *machine.axes[len(with_feedforward) :]))
 
 
 def _check(options: Namespace) -> None:

@@ -84,12 +84,12 @@ def _identity(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
     for sub, (name, wanted) in enumerate(zip(names, expected, strict=True), start=1):
         value = reader.number(0x1018, sub)
         if wanted and value != wanted:
-            told = "none" if value is None else f"0x{value:08X}"
+            reported = "none" if value is None else f"0x{value:08X}"
             yield Finding(
                 0x1018,
                 sub,
                 FAULT,
-                f"{name} is {told}, the machine file has 0x{wanted:08X}: correct [axis.identity], or connect "
+                f"{name} is {reported}, the machine file has 0x{wanted:08X}: correct [axis.identity], or connect "
                 "the right drive",
                 value,
             )
@@ -287,8 +287,8 @@ def _present(reader: NodeReader) -> Iterator[Finding]:
     status = reader.number(0x6041)
     if status is not None and status & 0x4F == 0x08:
         code = reader.number(0x603F)
-        told = "" if code is None else f" (error code 0x{code:04X})"
-        yield Finding(0x6041, 0, NOTE, f"the drive is in fault{told}: see its manual", status)
+        reported = "" if code is None else f" (error code 0x{code:04X})"
+        yield Finding(0x6041, 0, NOTE, f"the drive is in fault{reported}: see its manual", status)
     else:
         yield Finding(0x6041, 0, OK, "the drive is not in fault", status)
 

@@ -40,8 +40,8 @@ class Identity:
     serial: int
 
     def __str__(self) -> str:
-        told = (f"{name} 0x{value:08X}" for name, value in asdict(self).items())
-        return ", ".join(told)
+        fields = (f"{name} 0x{value:08X}" for name, value in asdict(self).items())
+        return ", ".join(fields)
 
 
 @dataclass(frozen=True)

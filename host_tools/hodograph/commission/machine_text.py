@@ -63,8 +63,10 @@ def _keys(drive: DriveFacts, name: str) -> Iterator[str]:
     yield f"node = {drive.node}"
     yield f"counts_per_mm = {COUNTS_PER_MM}         # SET, the same for all axes{_screw(drive)}"
     low, high = _travel(drive)
-    told = "the drive's software limits" if _has_limits(drive) else "the drive reports no limits"
-    yield f"travel_mm = [{low:.10g}, {high:.10g}]          # SET; {told}"
+    reported = (
+        "the drive's software limits" if _has_limits(drive) else "the drive reports no limits"
+    )
+    yield f"travel_mm = [{low:.10g}, {high:.10g}]          # SET; {reported}"
     yield f"velocity_mm_s = {_FEED}              # SET; low to begin with"
     yield f"acceleration_mm_s2 = {_ACCELERATION}        # SET"
     yield f"jerk_mm_s3 = {_JERK}               # SET"

@@ -98,8 +98,8 @@ def test_a_lost_frame_is_found(identifier: int, at: float) -> None:
         assert ticks.count == lost
         assert_right(ticks)
         return
-    told = "SYNC counter jumps" if identifier == 0x80 else f"no frame for SYNC {lost}: "
-    with pytest.raises(RunError, match=told):
+    reported = "SYNC counter jumps" if identifier == 0x80 else f"no frame for SYNC {lost}: "
+    with pytest.raises(RunError, match=reported):
         decode_ticks(packed(frames), NODES)
 
 

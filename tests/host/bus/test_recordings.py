@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recordings as files: what is written comes back; what is broken is told, with its place."""
+"""Recordings as files: what is written comes back; what is broken is reported, with its place."""
 
 from __future__ import annotations
 

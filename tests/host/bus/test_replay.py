@@ -108,10 +108,10 @@ def test_the_figures_of_the_simulation(
     assert found.frames == frames.size
     assert found.wall_s == pytest.approx(motion.ticks * PERIOD_US / 1e6, rel=1e-3)
     assert main(["replay", str(file), str(ALPHA), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told | motion.summary() == told
-    assert told["deadline_misses"] is None
-    assert told["bus_load"]["kinds"]["SYNC"]["frames"] == len(motion.rows) + 2 * STANDING - 1
+    reported = json.loads(capsys.readouterr().out)
+    assert reported | motion.summary() == reported
+    assert reported["deadline_misses"] is None
+    assert reported["bus_load"]["kinds"]["SYNC"]["frames"] == len(motion.rows) + 2 * STANDING - 1
 
 
 def test_a_run_among_other_things(frames: Frames, pipeline: Pipeline, motion: Motion) -> None:

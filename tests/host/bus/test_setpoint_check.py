@@ -127,7 +127,7 @@ def test_a_start_away_from_where_the_drive_is() -> None:
     assert find_rough_starts(begun(-101).packed(), NODES, 100) == [
         "node 2 began to follow 101 counts from where it was"
     ]
-    once = begun(101)  # the drive has told its position once only
+    once = begun(101)  # the drive has reported its position once only
     del once.frames[6], once.frames[1]
     assert find_rough_starts(once.packed(), NODES, 100) == [
         "node 2 began to follow 101 counts from where it was"

@@ -127,12 +127,12 @@ def test_a_cluster_gives_the_same_table(
         far = campaign(file, tmp_path / "far", "--scheduler", address)
         with under_way(file, tmp_path / "lost", "--scheduler", address) as child:
             worker.kill()
-            _, told = child.communicate(timeout=HANGS_S)
-            assert child.returncode == 0, told.decode()
+            _, reported = child.communicate(timeout=HANGS_S)
+            assert child.returncode == 0, reported.decode()
     assert far == campaign(file, tmp_path / "near", "--workers", "1")
     assert (tmp_path / "lost" / "runs.csv").read_bytes() == far
     assert far.count(b"plant figures must be positive") == 600
-    assert "Traceback" not in capfd.readouterr().err + told.decode()
+    assert "Traceback" not in capfd.readouterr().err + reported.decode()
 
 
 def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
@@ -140,9 +140,11 @@ def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
     endless = TEXT.replace("samples = 600", "samples = 50000")
     with under_way(write(endless), tmp_path / "out") as child:
         os.killpg(child.pid, signal.SIGINT)
-        _, told = child.communicate(timeout=HANGS_S)
+        _, reported = child.communicate(timeout=HANGS_S)
     assert child.returncode == 130
-    assert all(line.startswith("hodograph: ") for line in told.decode().splitlines()), told.decode()
+    assert all(line.startswith("hodograph: ") for line in reported.decode().splitlines()), (
+        reported.decode()
+    )
 
 
 def test_no_scheduler(
@@ -155,6 +157,6 @@ def test_no_scheduler(
     file = write(TEXT)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         assert main(["campaign", str(file), "-o", str(tmp_path), "--scheduler", address]) == 2
-        told = capsys.readouterr().err
-        assert f"--scheduler {address}: no Dask scheduler answers" in told
-        assert "Traceback" not in told
+        reported = capsys.readouterr().err
+        assert f"--scheduler {address}: no Dask scheduler answers" in reported
+        assert "Traceback" not in reported

@@ -85,9 +85,9 @@ def test_summary_and_report(
         assert group["contour_error_um"]["max"] == max(errors)
         assert min(errors) <= group["contour_error_um"]["median"] <= max(errors)
     assert run(file, folder) == 0
-    told = capsys.readouterr()
-    assert "path, quintic, load" in told.out
-    assert "48 of 48 runs are done: going on" in told.err
+    reported = capsys.readouterr()
+    assert "path, quintic, load" in reported.out
+    assert "48 of 48 runs are done: going on" in reported.err
     html = (folder / "report.html").read_text()
     assert html.count("<img ") == 2
     for name in ("spread", "dependence"):

@@ -163,7 +163,7 @@ def test_compile_warns_of_what_the_machines_controller_cannot_hold(
     text = text.replace('"../drives/', f'"{EXAMPLES}/drives/')
     output = tmp_path / "a.hdgp"
 
-    def told(room: int | None) -> str:
+    def reported(room: int | None) -> str:
         machine = tmp_path / "machine.toml"
         line = "" if room is None else f"program_bytes = {room}\n"
         machine.write_text(text.replace("[controller]\n", f"[controller]\n{line}"))
@@ -171,12 +171,12 @@ def test_compile_warns_of_what_the_machines_controller_cannot_hold(
         assert main([*words, "-o", str(output)]) == 0
         return capsys.readouterr().err
 
-    assert told(None) == ""
+    assert reported(None) == ""
     needed = memory_bytes(output.read_bytes(), RECORD_BYTES["fixed"])
-    assert told(needed) == ""
+    assert reported(needed) == ""
     assert (
         f"takes {needed} bytes of a controller with its precomputed coefficients, more than the {needed - 1} of "
-        "[controller] program_bytes of machine.toml: upload will refuse it" in told(needed - 1)
+        "[controller] program_bytes of machine.toml: upload will refuse it" in reported(needed - 1)
     )
 
 

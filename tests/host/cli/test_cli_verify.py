@@ -77,8 +77,8 @@ def test_a_little_beyond_is_told_and_kept(
     assert found["kept"]
     assert found["excesses"][0]["ratio"] == pytest.approx(1.0005, abs=1e-4)  # verify.peaks.GAP
     assert main(["verify", str(file)]) == 0
-    told = f"({len(found['excesses'])}, none by more than 0.1 %):"
-    assert f"worst place of each stretch {told}" in capsys.readouterr().out
+    reported = f"({len(found['excesses'])}, none by more than 0.1 %):"
+    assert f"worst place of each stretch {reported}" in capsys.readouterr().out
 
 
 def test_a_given_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -162,16 +162,16 @@ def on_terminal(*words: str) -> tuple[int, str, str]:
         env={**os.environ, "TERM": "xterm", "FORCE_COLOR": "1"},
     )
     os.close(follower)
-    told = b""
+    reported = b""
     try:
         while part := os.read(leader, 4096):
-            told += part
+            reported += part
     except OSError:  # how Linux tells the end of a terminal
         pass
     finally:
         os.close(leader)
     out, _ = process.communicate()
-    return process.returncode, out.decode(), told.decode()
+    return process.returncode, out.decode(), reported.decode()
 
 
 COLOUR = re.compile(r"\x1b\[[0-9;]*m")

@@ -30,9 +30,9 @@ def test_what_init_writes_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["init", "new"]) == 0
-    told = capsys.readouterr().out.splitlines()
+    reported = capsys.readouterr().out.splitlines()
     written = sorted(str(file.relative_to(tmp_path)) for file in tmp_path.rglob("*.*"))
-    assert told == [*written, "next: hodograph simulate new/path.toml"]
+    assert reported == [*written, "next: hodograph simulate new/path.toml"]
     assert len(written) == 6
     motion = result(capsys, "simulate", "new/path.toml", "--json")
     assert motion["max_contour_error_um"] < 1

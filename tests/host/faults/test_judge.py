@@ -140,13 +140,13 @@ def test_a_fault_beside_the_expected_one() -> None:
     both = recording(stopped(60), 60, 200)
     both = np.concatenate([both, both[-1:]])
     both[-1]["id"], both[-1]["length"] = 0x81, 8
-    for code, told in (
+    for code, reported in (
         (0x4210, True),
         (0x1000, False),
     ):  # the second only until a drive tells its own
         both[-1]["data"] = list(struct.pack("<H6x", code))
         words = f"fault 0x{code:04X} was raised, which is none of those expected"
-        assert (words in violations(record(both))) is told
+        assert (words in violations(record(both))) is reported
 
 
 def test_axes_that_move_on() -> None:
@@ -202,11 +202,11 @@ def test_a_rest_that_nobody_saw_is_no_rest() -> None:
     assert "nobody saw when node 3 came to rest" in violations(record(silent))
     never = seen[seen["id"] != 0x182]
     assert "nobody saw when node 2 came to rest" in violations(record(never))
-    told = record(silent)
-    told.rest_us = BEGAN_US + 100_000  # somebody asked the drives
+    reported = record(silent)
+    reported.rest_us = BEGAN_US + 100_000  # somebody asked the drives
     excused = record(silent, replace(EXPECT, unseen=True))
     unlimited = record(silent, replace(EXPECT, rest_ticks=FOREVER))
-    for made in (record(seen), told, excused, unlimited):
+    for made in (record(seen), reported, excused, unlimited):
         assert not any(words.startswith("nobody saw") for words in violations(made))
     nobody = seen[(seen["id"] != 0x182) & (seen["id"] != 0x183)]
     assert len(violations(record(nobody, replace(EXPECT, unseen=True)))) >= 2

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits that have no effect are told, and only those."""
+"""Limits that have no effect are reported, and only those."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
 
 @pytest.mark.parametrize(
-    ("profile", "limits", "told"),
+    ("profile", "limits", "reported"),
     [
         ('"optimal"', 'policy = "report"', ['policy "report" does nothing']),
         ('"optimal"', 'policy = "respect"\nvolts = 5', []),
@@ -28,7 +28,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
     ],
 )
 def test_what_has_no_effect_is_told(
-    tmp_path: Path, profile: str, limits: str, told: list[str]
+    tmp_path: Path, profile: str, limits: str, reported: list[str]
 ) -> None:
     file = tmp_path / "path.toml"
     file.write_text(
@@ -39,5 +39,5 @@ def test_what_has_no_effect_is_told(
     )
     pipeline = load_pipeline(file)
     notes = [note for note in pipeline.notes(pipeline.plan) if note.startswith("limits:")]
-    assert len(notes) == len(told)
-    assert all(text in note for text, note in zip(told, notes, strict=True))
+    assert len(notes) == len(reported)
+    assert all(text in note for text, note in zip(reported, notes, strict=True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Planning: what lowers the feed, what is told, what is refused; and the pattern search."""
+"""Planning: what lowers the feed, what is reported, what is refused; and the pattern search."""
 
 from itertools import pairwise
 

@@ -60,11 +60,11 @@ def test_figures_and_histogram() -> None:
     assert (0, 1, 90) in rows
     assert (10, 20, 9) in rows
     assert rows[-1] == (5000, None, 1)
-    told = found.json()
-    assert told["lateness_us"]["median"] == 0
-    assert told["lateness_us"]["greatest"] == 6000
-    assert told["missed"] == 2
-    assert told["load"]["load_average_end"] == 1.5
+    reported = found.json()
+    assert reported["lateness_us"]["median"] == 0
+    assert reported["lateness_us"]["greatest"] == 6000
+    assert reported["missed"] == 2
+    assert reported["load"]["load_average_end"] == 1.5
 
 
 def test_a_controller_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:

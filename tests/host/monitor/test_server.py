@@ -238,22 +238,22 @@ def test_what_is_no_command_is_refused(request_: dict[str, Any]) -> None:
 
 
 def test_commands_are_the_controllers() -> None:
-    class Told:
+    class Recorded:
         def __init__(self) -> None:
-            self.told: list[Any] = []
+            self.reported: list[Any] = []
 
         def command(self, number: int) -> None:
-            self.told.append(number)
+            self.reported.append(number)
 
         def override(self, percent: int) -> None:
-            self.told.append(("override", percent))
+            self.reported.append(("override", percent))
 
-    controller: Any = Told()
+    controller: Any = Recorded()
     names = ("enable", "start", "stop", "disable", "reset", "hold", "resume", "quick-stop", "home")
     for name in names:
         read_command({"name": name})(controller)
     read_command({"name": "override", "percent": 150})(controller)
-    assert controller.told == [1, 2, 3, 4, 5, 6, 7, 9, 10, ("override", 150)]
+    assert controller.reported == [1, 2, 3, 4, 5, 6, 7, 9, 10, ("override", 150)]
 
 
 def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -287,7 +287,7 @@ async def nobody(request: dict[str, Any]) -> str:
 
 
 def test_a_browser_that_leaves_in_the_middle(caplog: pytest.LogCaptureFixture) -> None:
-    """With a reset, while the page or messages are on their way: nobody is told, least of all in tracebacks."""
+    """With a reset, while the page or messages are on their way: nothing is printed, least of all a traceback."""
     case = Case()
 
     def leave(writer: asyncio.StreamWriter) -> None:
