@@ -96,9 +96,9 @@ def circles(count: int) -> PHSpline:
         2.0 * np.stack((turn[:-1:2], turn[1::2], turn[2::2]), axis=1), dtype=np.complex128
     )
     a, b, c = w[:, 0], w[:, 1], w[:, 2]
-    ways = (3 * a * a + 3 * a * b + 2 * b * b + a * c + 3 * b * c + 3 * c * c) / 15
+    distances = (3 * a * a + 3 * a * b + 2 * b * b + a * c + 3 * b * c + 3 * c * c) / 15
     return PHSpline(
-        np.concatenate((np.zeros(1, dtype=np.complex128), np.cumsum(ways)[:-1])), w, False
+        np.concatenate((np.zeros(1, dtype=np.complex128), np.cumsum(distances)[:-1])), w, False
     )
 
 
@@ -139,7 +139,7 @@ def main() -> int:
     errors = piece_errors(arguments.feed, arguments.ramp)
     for name, row in errors.items():
         print(
-            f"pieces of {name:26s} {row['pieces']:4d}: way within {row['length_mm']:.2g} mm, "
+            f"pieces of {name:26s} {row['pieces']:4d}: distance within {row['length_mm']:.2g} mm, "
             f"jerk within {row['jerk_mm_s3']:.2g} mm/s^3"
         )
     spent = {str(count): times(count) for count in (1_000, 10_000, 100_000)}

@@ -11,7 +11,7 @@ Compiles firmware/core as a shared object of its own. Prints the figures and wri
   same for the feed (first differences of the chord);
 - speed: time of a tick relative to the double kernel, and instructions of a tick where `valgrind` is there (the
   motion part, to counts, with coefficient records, as in the controller; on microcontrollers: benchmarks/counts.py);
-- override: instructions of a tick of the fixed kernel at a constant override, while the rate is on its way all
+- override: instructions of a tick of the fixed kernel at a constant override, while the override changes all
   the time, and above the factor that every piece allows.
 """
 
@@ -161,13 +161,13 @@ def exact_point(segment: Segment, arc: Any) -> tuple[Any, Any]:
     )
     a, b, c = w0, 2 * (w1 - w0), w0 - 2 * w1 + w2
     ca, cb, cc = mpmath.conj(a), mpmath.conj(b), mpmath.conj(c)
-    way = [a * ca, a * cb, (b * cb + 2 * a * cc) / 3, b * cc / 2, c * cc / 5]
-    way = [mpmath.re(v) for v in way]
+    distance = [a * ca, a * cb, (b * cb + 2 * a * cc) / 3, b * cc / 2, c * cc / 5]
+    distance = [mpmath.re(v) for v in distance]
     curve = [a * a, a * b, (b * b + 2 * a * c) / 3, b * c / 2, c * c / 5]
     local = arc - mpmath.ldexp(mpmath.mpf(segment.start), -40)
-    xi = local / sum(way)
+    xi = local / sum(distance)
     for _ in range(12):
-        rest = sum(v * xi ** (k + 1) for k, v in enumerate(way)) - local
+        rest = sum(v * xi ** (k + 1) for k, v in enumerate(distance)) - local
         xi -= rest / abs(a + b * xi + c * xi * xi) ** 2
     r = sum(v * xi ** (k + 1) for k, v in enumerate(curve))
     x = mpmath.ldexp(mpmath.mpf(segment.x), -40) + mpmath.re(r)

@@ -111,8 +111,10 @@ def space_cases(machines: Path) -> Iterator[Case]:
     for seed in SPACE_SEEDS:
         rng = np.random.default_rng([seed, 6])
         legs = rng.uniform(8.0, 20.0, (int(rng.integers(5, 9)), 1))
-        way = np.cumsum(rng.uniform(-0.7, 0.7, (len(legs), 3)), axis=0) + np.array([1.0, 0.0, 0.0])
-        walk = np.cumsum(legs * way / np.linalg.norm(way, axis=1)[:, None], axis=0)
+        distance = np.cumsum(rng.uniform(-0.7, 0.7, (len(legs), 3)), axis=0) + np.array(
+            [1.0, 0.0, 0.0]
+        )
+        walk = np.cumsum(legs * distance / np.linalg.norm(distance, axis=1)[:, None], axis=0)
         yield Case(f"space {seed}", _through(walk, closed=False), SPACE, machines / "mill.toml")
 
 

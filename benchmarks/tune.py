@@ -111,14 +111,23 @@ def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> tuple[Fl
     setpoints = motion.rows["set_counts"][:, axis].tolist()
     commanded = motion.cmd_mm[:, axis]
     by_speed, by_acceleration = offset_volts(drive, forward[axis]) if forward else (0.0, 0.0)
-    ways = np.diff(np.concatenate([commanded[:1], commanded])) / period_s
-    volts_ahead = by_speed * ways + by_acceleration * np.diff(ways, prepend=0.0) / period_s
+    distances = np.diff(np.concatenate([commanded[:1], commanded])) / period_s
+    volts_ahead = (
+        by_speed * distances + by_acceleration * np.diff(distances, prepend=0.0) / period_s
+    )
     volts_ahead[motion.ticks :] = 0.0
-    x, speed, integral, last, slope, way = setpoints[0] * 1e-6, 0.0, 0.0, setpoints[0], 0.0, 0.0
+    x, speed, integral, last, slope, distance = (
+        setpoints[0] * 1e-6,
+        0.0,
+        0.0,
+        setpoints[0],
+        0.0,
+        0.0,
+    )
     places, limited = np.empty((len(setpoints), per)), 0
     for k, target in enumerate(setpoints):
         step = float(target - last)
-        end = 1.5 * step - 0.5 * way if drive.interpolation == "cubic" else step
+        end = 1.5 * step - 0.5 * distance if drive.interpolation == "cubic" else step
         begin = slope if drive.interpolation == "cubic" else step
         for i in range(per):
             u = i / per
@@ -137,7 +146,7 @@ def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> tuple[Fl
             x += loop.position_from_speed * speed + loop.position_from_volts * volts
             speed = loop.speed_from_speed * speed + loop.speed_from_volts * volts
             places[k, i] = x
-        last, way, slope = target, step, end
+        last, distance, slope = target, step, end
     return places, limited
 
 

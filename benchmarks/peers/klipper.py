@@ -143,6 +143,6 @@ def _sampled(moves: Real) -> Real:
     t1 = np.clip(since, 0.0, up[at])
     t2 = np.clip(since - up[at], 0.0, level[at])
     t3 = np.clip(since - up[at] - level[at], 0.0, down[at])
-    way = slow[at] * t1 + acceleration[at] * t1**2 / 2.0 + fast[at] * (t2 + t3)
-    way -= acceleration[at] * t3**2 / 2.0
-    return np.asarray(start[at] + way[:, None] * direction[at])
+    distance = slow[at] * t1 + acceleration[at] * t1**2 / 2.0 + fast[at] * (t2 + t3)
+    distance -= acceleration[at] * t3**2 / 2.0
+    return np.asarray(start[at] + distance[:, None] * direction[at])

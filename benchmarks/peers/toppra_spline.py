@@ -33,8 +33,10 @@ def run(point_mm: Real, feed_mm_s: float, limits: AxisLimits) -> Motion:
     at = np.concatenate(([0.0], np.cumsum(chord)))
     curve = CubicSpline(at, point_mm)
     fine = np.linspace(0.0, at[-1], 16 * at.size)
-    way = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1))))
-    nodes = np.column_stack((curve(at), np.interp(at, fine, way)))
+    distance = np.concatenate(
+        ([0.0], np.cumsum(np.linalg.norm(np.diff(curve(fine), axis=0), axis=1)))
+    )
+    nodes = np.column_stack((curve(at), np.interp(at, fine, distance)))
     path = toppra.SplineInterpolator(at, nodes)
     velocity = np.array([*(limits.velocity_mm_s,) * 3, feed_mm_s])
     acceleration = np.array([*(limits.acceleration_mm_s2,) * 3, 1e7])

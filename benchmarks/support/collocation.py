@@ -145,8 +145,8 @@ class _Program:
             inner = self._variable(f"i{k}_{part:.2f}", n, -0.01, 1.01)
             acc_u = acc[:-1] + left * u + slope * u**2 / 2
             feed_u = feed_now[:-1] + acc[:-1] * u + left * u**2 / 2 + slope * u**3 / 6
-            way = feed_now[:-1] * u + acc[:-1] * u**2 / 2 + left * u**3 / 6 + slope * u**4 / 24
-            self._equal(curve.arc(inner) - s[:-1] - way)
+            distance = feed_now[:-1] * u + acc[:-1] * u**2 / 2 + left * u**3 / 6 + slope * u**4 / 24
+            self._equal(curve.arc(inner) - s[:-1] - distance)
             self._limits(curve, inner, feed_u, acc_u, left + slope * u)
 
     def _limits(self, curve: _Curve | _SpaceCurve, xi: Any, feed: Any, acc: Any, jerk: Any) -> None:

@@ -28,11 +28,11 @@ static float slope_at(const float s[6], float z)
 static void set_inverse(struct kernel_float_inverse *inverse, const float s[6], float z0, float z1)
 {
     float low = arc_at(s, z0);
-    float way = arc_at(s, z1) - low;
-    float first = way / slope_at(s, z0);
-    float last = way / slope_at(s, z1);
+    float distance = arc_at(s, z1) - low;
+    float first = distance / slope_at(s, z0);
+    float last = distance / slope_at(s, z1);
     inverse->s0 = low;
-    inverse->scale = 1.0f / way;
+    inverse->scale = 1.0f / distance;
     inverse->z0 = z0;
     inverse->g[0] = first;
     inverse->g[1] = 3.0f * (z1 - z0) - 2.0f * first - last;

@@ -472,7 +472,7 @@ static void first_tick(struct override_plan *plan, struct program_clock *clock)
     }
     plan->now.override_q57 = qmath_lesser(wanted_override(plan), OVERRIDE_ONE);
     if (plan->now.override_q57 != OVERRIDE_ONE) { /* at 1 a tick is a period exactly */
-        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+        clock->even_q62_s = program_clock_step_q62_s(clock, &plan->now, 0);
     }
     (void)comes_steady(plan);
 }
@@ -480,7 +480,7 @@ static void first_tick(struct override_plan *plan, struct program_clock *clock)
 static void tick_of_ramp(struct override_plan *plan, struct program_clock *clock)
 {
     const int64_t slope_q56 = next_slope(plan, clock);
-    program_clock_advance_q62(clock, program_clock_way_q62_s(clock, &plan->now, slope_q56));
+    program_clock_advance_q62(clock, program_clock_step_q62_s(clock, &plan->now, slope_q56));
     override_tick(&plan->now, slope_q56);
     clock->even_q62_s = 0;
 }
@@ -496,7 +496,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
         return;
     }
     if (clock->even_q62_s == 0) { /* after a ramp: not in its last tick, which takes long itself */
-        clock->even_q62_s = program_clock_way_q62_s(clock, &plan->now, 0);
+        clock->even_q62_s = program_clock_step_q62_s(clock, &plan->now, 0);
     }
     if (!comes_steady(plan)) {
         tick_of_decision(plan, clock);

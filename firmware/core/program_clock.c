@@ -3,13 +3,13 @@
  * in. */
 #include "core/program_clock.h"
 
-uint64_t program_clock_way_q62_s(const struct program_clock *clock,
-                                 const struct override_state *from, int64_t slope_q56)
+uint64_t program_clock_step_q62_s(const struct program_clock *clock,
+                                  const struct override_state *from, int64_t slope_q56)
 {
     int64_t six_q56 = 3 * from->override_q57 + 2 * from->slope_q56 + slope_q56;
-    int64_t way = qmath_mul_unsigned(six_q56, (uint32_t)(clock->sixth_q70_s >> 32)) +
-                  (qmath_mul_unsigned(six_q56, (uint32_t)clock->sixth_q70_s) >> 32);
-    return (uint64_t)(way > 0 ? way : 0);
+    int64_t step = qmath_mul_unsigned(six_q56, (uint32_t)(clock->sixth_q70_s >> 32)) +
+                   (qmath_mul_unsigned(six_q56, (uint32_t)clock->sixth_q70_s) >> 32);
+    return (uint64_t)(step > 0 ? step : 0);
 }
 
 static void set_period(struct program_clock *clock, uint32_t period_us)

@@ -66,8 +66,8 @@ void program_clock_carry(struct program_clock *clock, const struct program *p, u
 
 /* Program time of a tick in 2^-62 s, in which the override changes from `from` to the slope at its end (2^-56 a tick):
  * six times its mean is 3 override + 2 slope + next slope. */
-uint64_t program_clock_way_q62_s(const struct program_clock *clock,
-                                 const struct override_state *from, int64_t slope_q56);
+uint64_t program_clock_step_q62_s(const struct program_clock *clock,
+                                  const struct override_state *from, int64_t slope_q56);
 
 /* Program time of the last tick in 2^-42 s, rounded to nearest: for interpolator_at_q42. */
 static inline uint64_t program_clock_time_q42(const struct program_clock *clock)
@@ -87,9 +87,9 @@ static inline uint64_t program_clock_time_q42(const struct program_clock *clock)
 /* --- A tick: one of the two that advance, then program_clock_enter. --- */
 
 /* A tick of this program time. */
-static inline void program_clock_advance_q62(struct program_clock *clock, uint64_t way_q62_s)
+static inline void program_clock_advance_q62(struct program_clock *clock, uint64_t step_q62_s)
 {
-    uint64_t sum = clock->fine + way_q62_s;
+    uint64_t sum = clock->fine + step_q62_s;
     clock->time_q42_s += sum >> PROGRAM_CLOCK_FINE_BITS;
     clock->fine = (uint32_t)sum & ((1u << PROGRAM_CLOCK_FINE_BITS) - 1u);
 }

@@ -133,11 +133,12 @@ static int meets(int64_t end_q48, int64_t target_q40, int64_t tolerance_q48)
     return apart <= tolerance_q48 && apart >= -tolerance_q48;
 }
 
-/* A way that no segment has is refused first: no overflow in meets. */
+/* A distance that no segment has is refused first: no overflow in meets. */
 static int meets_arc(int64_t start_q40, int64_t end_q48, int64_t target_q40)
 {
-    int64_t way_q40 = target_q40 - start_q40;
-    return way_q40 > 0 && way_q40 < ((int64_t)1 << 50) && meets(end_q48, way_q40, JOIN_Q48);
+    int64_t distance_q40 = target_q40 - start_q40;
+    return distance_q40 > 0 && distance_q40 < ((int64_t)1 << 50) &&
+           meets(end_q48, distance_q40, JOIN_Q48);
 }
 
 static int meets_point(const struct program_segment *a, const int64_t end_q48[PH_AXES],

@@ -36,7 +36,7 @@ int drive_init(struct drive *d, const struct drive_config *c)
     d->cubic = c->interpolation == DRIVE_CUBIC;
     d->steps = c->interpolation == DRIVE_NO_INTERPOLATION;
     d->delayed = c->delay_samples != 0;
-    d->speed_per_way =
+    d->speed_per_distance =
         c->speed == DRIVE_SPEED_EXACT ? 0.0 : d->samples_per_s / c->plant.screw_mm_rad;
     d->plain = !d->cubic && !d->delayed && c->speed == DRIVE_SPEED_EXACT;
     drive_place(d, 0);
@@ -50,8 +50,8 @@ static void drive_rest(struct drive *d)
     d->state.volts = 0.0;
     d->state.next_volts = 0.0;
     d->state.read_mm = encoder_read_mm(&d->encoder, d->state.motor.position_mm);
-    d->way_counts = 0.0;
-    d->end_way_counts = 0.0;
+    d->distance_counts = 0.0;
+    d->end_distance_counts = 0.0;
 }
 
 void drive_place(struct drive *d, int32_t target_counts)
@@ -99,14 +99,14 @@ bool drive_stays_parked(struct drive *d, int32_t target_counts, bool may_park)
  * there of the parabola through the last three setpoints. */
 static void drive_cubic(struct drive *d, struct drive_command *c, double counts)
 {
-    const double start = d->end_way_counts;
-    const double end = 1.5 * counts - 0.5 * d->way_counts;
+    const double start = d->end_distance_counts;
+    const double end = 1.5 * counts - 0.5 * d->distance_counts;
     c->per_s = d->samples_per_s * d->sample_fraction;
-    c->way_mm[0] = start * d->mm_per_count;
-    c->way_mm[1] = (3.0 * counts - 2.0 * start - end) * d->mm_per_count;
-    c->way_mm[2] = (start + end - 2.0 * counts) * d->mm_per_count;
-    d->way_counts = counts;
-    d->end_way_counts = end;
+    c->distance_mm[0] = start * d->mm_per_count;
+    c->distance_mm[1] = (3.0 * counts - 2.0 * start - end) * d->mm_per_count;
+    c->distance_mm[2] = (start + end - 2.0 * counts) * d->mm_per_count;
+    d->distance_counts = counts;
+    d->end_distance_counts = end;
 }
 
 /* The step is one multiplication of the exact difference in counts: a difference of two rounded

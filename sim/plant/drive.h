@@ -57,10 +57,11 @@ struct drive {
     bool cubic; /* interpolation */
     bool steps; /* no interpolation */
     bool delayed;
-    double speed_per_way; /* rad/s for a mm of difference between two samples; 0: exact speed */
     double
-        way_counts; /* of the last period, and what the command does in a period at the speed it */
-    double end_way_counts; /* had at the end of that; both for cubic interpolation */
+        speed_per_distance; /* rad/s for a mm of difference between two samples; 0: exact speed */
+    double
+        distance_counts; /* of the last period, and what the command does in a period at the speed it */
+    double end_distance_counts; /* had at the end of that; both for cubic interpolation */
     int32_t target_counts;
     uint32_t same_target_periods; /* up to DRIVE_PARK_PERIODS */
     bool parked;
@@ -96,7 +97,7 @@ bool drive_parked(const struct drive *drive);
 
 /* Setpoints of one period, at the beginning of sample i. Linear: start + i * step, at a constant speed; without
  * interpolation the step is 0.
- * Cubic: with u = i / samples, start + u (way[0] + u (way[1] + u way[2])). */
+ * Cubic: with u = i / samples, start + u (distance[0] + u (distance[1] + u distance[2])). */
 struct drive_command {
     double start_mm;
     double step_mm;
@@ -104,7 +105,7 @@ struct drive_command {
     bool cubic;
     double fraction; /* 1 / samples per period */
     double per_s;    /* periods a second */
-    double way_mm[3];
+    double distance_mm[3];
 };
 
 static inline void drive_command_at(const struct drive_command *c, uint32_t i,
@@ -116,17 +117,20 @@ static inline void drive_command_at(const struct drive_command *c, uint32_t i,
         return;
     }
     const double u = (double)i * c->fraction;
-    input->command_mm = c->start_mm + u * (c->way_mm[0] + u * (c->way_mm[1] + u * c->way_mm[2]));
+    input->command_mm =
+        c->start_mm + u * (c->distance_mm[0] + u * (c->distance_mm[1] + u * c->distance_mm[2]));
     input->command_mm_s =
-        (c->way_mm[0] + u * (2.0 * c->way_mm[1] + 3.0 * u * c->way_mm[2])) * c->per_s;
+        (c->distance_mm[0] + u * (2.0 * c->distance_mm[1] + 3.0 * u * c->distance_mm[2])) *
+        c->per_s;
 }
 
 /* The speed that the loop sees at a sample, rad/s; notes the reading. */
 static inline double drive_speed(const struct drive *d, struct drive_state *state, double read_mm)
 {
-    const double way_mm = read_mm - state->read_mm;
+    const double distance_mm = read_mm - state->read_mm;
     state->read_mm = read_mm;
-    return d->speed_per_way == 0.0 ? state->motor.speed_rad_s : way_mm * d->speed_per_way;
+    return d->speed_per_distance == 0.0 ? state->motor.speed_rad_s
+                                        : distance_mm * d->speed_per_distance;
 }
 
 /* The volts of the sample that begins, when these have been computed in it. */

@@ -25,7 +25,7 @@ struct drive_pdff {
  * cubic, or not at all: the setpoint is the command from the beginning of its period. */
 enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1, DRIVE_NO_INTERPOLATION = 2 };
 
-/* Where the loop has its speed from: the motor itself, or the way of the last servo sample by the encoder. */
+/* Where the loop has its speed from: the motor itself, or the difference of the last two encoder samples. */
 enum drive_speed { DRIVE_SPEED_EXACT = 0, DRIVE_SPEED_DIFFERENCES = 1 };
 
 /* Which errors of the speed the loop's integral counts: those of all samples with the present one (backward Euler), or

@@ -52,9 +52,9 @@ static void test_every_period(void)
 {
     for (uint32_t period_ms = 1; period_ms <= 8u; period_ms *= 2u) {
         gains.period_us = 1000u * period_ms;
-        const int64_t way = Q40 / 20 * (int64_t)period_ms;                   /* 50 mm/s */
+        const int64_t distance = Q40 / 20 * (int64_t)period_ms;              /* 50 mm/s */
         const int64_t change = Q40 / 500 * (int64_t)(period_ms * period_ms); /* 2 m/s^2 */
-        const struct feedforward_offset result = feedforward_offset(&gains, way, change);
+        const struct feedforward_offset result = feedforward_offset(&gains, distance, change);
         TEST_ASSERT_INT32_WITHIN(1, 50000000, result.velocity_counts_s);
         TEST_ASSERT_EQUAL_INT16(25, result.torque_permille);
     }

@@ -166,8 +166,8 @@ def _feed(
     rng: random.Random, adversary: Adversary, durations: Iterable[int], length_q40: int
 ) -> list[_Piece]:
     """A ramp, the constant pieces and a ramp that ends at the path's end."""
-    way = _FEED_MM_S * _RAMP_Q32 / _Q32 * _Q40
-    up = (0, 0, 0, round(2.5 * way), round(-3 * way), round(way), 0)
+    distance = _FEED_MM_S * _RAMP_Q32 / _Q32 * _Q40
+    up = (0, 0, 0, round(2.5 * distance), round(-3 * distance), round(distance), 0)
     ramp_bounds = (2.0, 300.0, 1e6)
     pieces = [_Piece(_RAMP_Q32, 0, up, ramp_bounds)]
     at = sum(up)
@@ -176,8 +176,8 @@ def _feed(
         slope = round(_FEED_MM_S * 2.0**exponent * _Q40)
         pieces.append(_Piece(duration, at, (slope, *[0] * 6), adversary.bounds(rng, index)))
         at += (slope * duration) >> (32 + exponent)
-    way = 2.0 * (length_q40 - at)
-    down = (round(way), 0, 0, round(-2.5 * way), round(3 * way), round(-way), 0)
+    distance = 2.0 * (length_q40 - at)
+    down = (round(distance), 0, 0, round(-2.5 * distance), round(3 * distance), round(-distance), 0)
     return [*pieces, _Piece(_RAMP_Q32, at, down, ramp_bounds)]
 
 
@@ -225,7 +225,7 @@ def steady() -> list[tuple[int, int]]:
 
 
 def restless(ticks: int = 3000) -> list[tuple[int, int]]:
-    """The rate is on its way nearly always, mostly high up; holds and resumes in between."""
+    """The override changes nearly always, mostly near its maximum; holds and resumes in between."""
     rng = random.Random(_SEED)
     commands: list[tuple[int, int]] = [(0, 200)]
     tick = 30

@@ -84,7 +84,7 @@ class Controller:
         self._node.upload(program.image)
 
     def goto_start(self, program: Program, *, unhomed: bool = False) -> float:
-        """Moves straight to the start of a program, with the drives on, then loads it; returns the way in mm.
+        """Moves straight to the start of a program, with the drives on, then loads it; returns the distance in mm.
 
         unhomed   also where axes with a homing method are not homed
         """
@@ -92,9 +92,9 @@ class Controller:
         native = NativeProgram(program.image)
         _, first = native.setpoints(machine.kernel, machine.path_counts, 0, 1)
         start = tuple(int(counts) for counts in first[0])
-        way_mm = goto(self._node, machine, start, unhomed=unhomed)
+        distance_mm = goto(self._node, machine, start, unhomed=unhomed)
         self.upload(program)
-        return way_mm
+        return distance_mm
 
     def start(self, *, from_mm: float | None = None, unhomed: bool = False) -> None:
         """Starts the loaded program; returns at once.

@@ -28,10 +28,10 @@ from .sdo.objects import OVERRIDE, READY
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
 SHORTEST_MOVE_MM = 0.002
-"""Shorter moves (the format ends near 1 um) go by way of a point DETOUR_MM away."""
+"""Shorter moves (the format ends near 1 um) go through a point DETOUR_MM away."""
 DETOUR_MM = 0.1
 DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
-"""The same where axes after x, y, z move and these do not: mm for each degree, or mm, of the longest of those ways."""
+"""The same where axes after x, y, z move and these do not: mm for each degree or mm of the longest of those moves."""
 FOLLOWING_SHARE = 0.5
 """Of the axis limits, for moves of axes after x, y, z: at their full speed they could not stop within stop_time_ms."""
 
@@ -75,13 +75,13 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
 
 
 def _along(machine: Machine, start_mm: Place, end_mm: Place) -> Machine:
-    """The machine with limits along the straight way at which the axes after x, y, z keep theirs.
+    """The machine with limits along the straight line at which the axes after x, y, z keep theirs.
 
-    Stops are looked for down to a share of the limits along the way, which such axes may be far below.
+    Stops are looked for down to a share of the limits along the distance, which such axes may be far below.
     """
-    way_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
+    distance_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
     axes = zip(machine.path_axes, start_mm, end_mm, strict=True)
-    moving = [(axis, abs(b - a) / way_mm) for axis, a, b in axes if a != b]
+    moving = [(axis, abs(b - a) / distance_mm) for axis, a, b in axes if a != b]
     acceleration = [axis.acceleration_mm_s2 / slope for axis, slope in moving if slope > 1.0]
     jerk = [axis.jerk_mm_s3 / slope for axis, slope in moving if slope > 1.0]
     return replace(
@@ -100,16 +100,16 @@ def _line(start_mm: Place, end_mm: Place) -> PHSpline | SpatialPHSpline:
 
 
 def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, Place]]:
-    """The straight moves that lead from one point to another: none, one, or two for a tiny way of x, y, z.
+    """The straight moves that lead from one point to another: none, one, or two for a tiny move of x, y, z.
 
     Axes after x, y, z move on the first of two.
     """
     if start_mm == end_mm:
         return []
-    way_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
+    distance_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
     turns = [abs(b - a) for a, b in zip(start_mm, end_mm, strict=True)][SPACE_AXES:]
     detour_mm = min(max(DETOUR_MM, DETOUR_SHARE * max(turns, default=0.0)), LONGEST_DETOUR_MM)
-    if way_mm >= (detour_mm if any(turns) else SHORTEST_MOVE_MM):
+    if distance_mm >= (detour_mm if any(turns) else SHORTEST_MOVE_MM):
         return [(start_mm, end_mm)]
     axis = machine.path_axes[0]
     middle = (axis.travel_min_mm + axis.travel_max_mm) / 2
@@ -127,8 +127,8 @@ def goto(
     unhomed: bool = False,
 ) -> float:
     """Moves from the present setpoint to a point in counts of the path's axes, in the order of the path; returns the
-    way in mm, at standstill. Axes that it does not name hold their position. Where axes after x, y, z move and these
-    do not, x makes a small way and comes back: a program has no motion without a way.
+    distance in mm, at standstill. Axes that it does not name hold their position. Where axes after x, y, z move and
+    these do not, x moves a small distance and comes back: a program has no motion without a distance.
 
     The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes
     with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move.
@@ -149,7 +149,7 @@ def goto(
     start_mm, end_mm = (
         tuple(place[k] / own for k, own in enumerate(scales)) for place in (here, end_counts)
     )
-    way_mm = 0.0
+    distance_mm = 0.0
     moves = legs(start_mm, end_mm, machine)
     if moves and controller.read(OVERRIDE, 1) == 0:
         raise RefusedError(
@@ -159,5 +159,5 @@ def goto(
         controller.upload(line_image(a, b, machine))
         controller.start(unhomed=unhomed)
         controller.wait_for((READY,), math.inf, tick)
-        way_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])
-    return way_mm
+        distance_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])
+    return distance_mm

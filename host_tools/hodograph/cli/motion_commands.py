@@ -81,12 +81,14 @@ def goto(options: Namespace) -> None:
         with stopping(controller):
             controller.enable()
             follower = Follower(controller, note)
-            way_mm = goto_point(controller, machine, end, follower, unhomed=options.unhomed)
+            distance_mm = goto_point(controller, machine, end, follower, unhomed=options.unhomed)
         if image is not None:
             controller.upload(image)
     drawn = zip(end, machine.path_axes[:SPACE_AXES], strict=False)
     place = ", ".join(f"{counts / axis.counts_per_unit:g}" for counts, axis in drawn)
-    print(f"at ({place}) mm after {way_mm:.6g} mm" if way_mm else f"at ({place}) mm already")
+    print(
+        f"at ({place}) mm after {distance_mm:.6g} mm" if distance_mm else f"at ({place}) mm already"
+    )
 
 
 def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> list[int]:

@@ -188,14 +188,14 @@ def _scaling(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
         text = f"counts for a turn are not reported: check in the drive's tool that 1 {unit} is {axis.counts_per_unit}"
         yield Finding(0x6092, 1, NOTE, text, feed)
         return
-    way = feed / turns / axis.counts_per_unit
-    text = f"a turn of the shaft is {way:g} {unit} by {key}"
+    distance = feed / turns / axis.counts_per_unit
+    text = f"a turn of the shaft is {distance:g} {unit} by {key}"
     if axis.drive is None:
         text += f": if that is not so, add [axis.scaling] or correct {key}"
         yield Finding(0x6092, 1, NOTE, text, feed)
         return
     screw = 2.0 * math.pi * axis.drive.screw_mm_rad
-    if abs(way - screw) <= _SCREW_SHARE * screw:
+    if abs(distance - screw) <= _SCREW_SHARE * screw:
         yield Finding(0x6092, 1, OK, f"{text}, as in the drive file", feed)
     else:
         text += f", but {screw:g} in the drive file: add [axis.scaling], or correct {key} or the drive file"

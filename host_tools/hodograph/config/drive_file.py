@@ -96,10 +96,10 @@ def drive_of(file: Path, contents: Mapping[str, Any]) -> Drive:
         screw_mm_rad=screw_mm_rad,
         torque_to_volts=plant.number("torque_to_volts", low=1e-6, high=1e6),
         volts_limit=plant.number("volts_limit", low=1e-3, high=32.767),
-        k_pp_rad_s_mm=_by_way(pdff, "k_pp_rad_s_mm", screw_mm_rad),
+        k_pp_rad_s_mm=_by_distance(pdff, "k_pp_rad_s_mm", screw_mm_rad),
         k_pv_nm_s_rad=pdff.number("k_pv_nm_s_rad", low=0, high=1e6),
         k_iv_per_s=pdff.number("k_iv_per_s", low=0, high=1e6),
-        k_pf_rad_mm=_by_way(pdff, "k_pf_rad_mm", screw_mm_rad),
+        k_pf_rad_mm=_by_distance(pdff, "k_pf_rad_mm", screw_mm_rad),
         k_vf=pdff.number("k_vf", low=0, high=1e3),
         encoder_counts_per_rev=encoder.integer("counts_per_rev", 2**20, low=16, high=2**26),
         loop_rate_hz=_loop_rate(servo),
@@ -111,8 +111,8 @@ def drive_of(file: Path, contents: Mapping[str, Any]) -> Drive:
     )
 
 
-def _by_way(pdff: Table, name: str, screw_mm_rad: float) -> float:
-    """A gain per mm of way, given so or in radians of the motor."""
+def _by_distance(pdff: Table, name: str, screw_mm_rad: float) -> float:
+    """A gain per mm, given in this unit or in radians of the motor."""
     by_motor = MOTOR_GAINS[name]
     if not pdff.has(by_motor):
         return pdff.number(name, low=0, high=1e6)

@@ -118,7 +118,7 @@ class _ArcLength:
     """Arc length of M pieces: `start` mm, and powers (M, 8) of u = t / seconds."""
 
     start: Real
-    way: Real
+    distance: Real
     seconds: Real
 
 
@@ -134,19 +134,21 @@ class _Cells:
 def _track(pieces: Pieces) -> _ArcLength:
     seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
     stretch = np.ldexp(seconds, -exponents(pieces.duration_q32_s))
-    way = np.zeros((seconds.size, 8))
-    way[:, 1:] = np.ldexp(pieces.c_q40.astype(np.float64), -40)
-    way[:, 1:] *= stretch[:, None] ** np.arange(1, 8)
-    return _ArcLength(np.ldexp(pieces.start_q40.astype(np.float64), -40), way, seconds)
+    distance = np.zeros((seconds.size, 8))
+    distance[:, 1:] = np.ldexp(pieces.c_q40.astype(np.float64), -40)
+    distance[:, 1:] *= stretch[:, None] ** np.arange(1, 8)
+    return _ArcLength(np.ldexp(pieces.start_q40.astype(np.float64), -40), distance, seconds)
 
 
 def _evaluate(spline: Curve, track: _ArcLength, cells: _Cells) -> PathKinematics:
     piece = cells.piece
     share = np.linspace(_BESIDE, 1.0 - _BESIDE, INTERVALS + 1)
     u = cells.low[:, None] + (cells.high - cells.low)[:, None] * share
-    s = np.clip(track.start[piece, None] + _value(track.way[piece], u, 0), 0.0, spline.length_mm)
+    s = np.clip(
+        track.start[piece, None] + _value(track.distance[piece], u, 0), 0.0, spline.length_mm
+    )
     per_s = 1.0 / track.seconds[piece, None]
-    f1, f2, f3 = (_value(track.way[piece], u, n) * per_s**n for n in (1, 2, 3))
+    f1, f2, f3 = (_value(track.distance[piece], u, n) * per_s**n for n in (1, 2, 3))
     frame = frames(spline, s)
     return PathKinematics(piece, s, f1, frame.curvature * f1 * f1, *axis_motion(frame, f1, f2, f3))
 
@@ -202,7 +204,7 @@ def _cells(track: _ArcLength, cuts: Real) -> _Cells:
     low, high = np.zeros(cuts.size), np.ones(cuts.size)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        below = track.start[at] + _value(track.way[at], middle[:, None], 0)[:, 0] < cuts
+        below = track.start[at] + _value(track.distance[at], middle[:, None], 0)[:, 0] < cuts
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     piece = np.concatenate((np.arange(track.start.size), at))
     begin = np.concatenate((np.zeros(track.start.size), high))
@@ -214,12 +216,12 @@ def _cells(track: _ArcLength, cuts: Real) -> _Cells:
     return _Cells(piece[keep], begin[keep], end[keep])
 
 
-def _value(way: Real, u: Real, order: int) -> Real:
+def _value(distance: Real, u: Real, order: int) -> Real:
     """Derivative `order` of rows of powers (C, 8) at u (C, K)."""
     out = np.zeros_like(u)
     for power in range(7, order - 1, -1):
         factor = float(np.prod(np.arange(power - order + 1, power + 1)))
-        out = out * u + factor * way[:, power, None]
+        out = out * u + factor * distance[:, power, None]
     return out
 
 

@@ -126,11 +126,11 @@ def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
     stretch = np.ldexp(1.0, e + 32) / duration
     k = np.arange(1, DEGREE + 1)
     c = np.rint(shapes[:, 1:] * stretch[:, None] ** k * 2.0**40).astype(np.int64)
-    way = np.diff(starts)
+    distance = np.diff(starts)
     curved = np.any(c[:, 1:] != 0, axis=1)
     for i in range(duration.size):
         d, shift = int(duration[i]), int(e[i]) + 32
-        rest = int(way[i]) << (shift * DEGREE)
+        rest = int(distance[i]) << (shift * DEGREE)
         if curved[i]:
             rest -= sum(
                 int(c[i, n - 1]) * d**n << (shift * (DEGREE - n)) for n in range(2, DEGREE + 1)
@@ -188,15 +188,15 @@ def derivative_extremes(
     return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])
 
 
-def way_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
+def distance_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
     """How far (M,) each piece goes at most before its start or beyond its end, in mm, of its bounds after halving."""
     seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)
     feed = derivative_bounds(duration_q32_s, c_q40)[0]
-    way = np.zeros((len(seconds), DEGREE + 1))
-    way[:, 1:] = np.cumsum(feed, axis=1) * (seconds / DEGREE)[:, None]
-    low, high = np.minimum(way[:, -1], 0.0), np.maximum(way[:, -1], 0.0)
+    distance = np.zeros((len(seconds), DEGREE + 1))
+    distance[:, 1:] = np.cumsum(feed, axis=1) * (seconds / DEGREE)[:, None]
+    low, high = np.minimum(distance[:, -1], 0.0), np.maximum(distance[:, -1], 0.0)
     curved = np.flatnonzero(c_q40[:, 1:].any(axis=1))
-    parts = way[curved]
+    parts = distance[curved]
     for _ in range(halvings):
         parts = _halved(parts)
     axes = tuple(range(1, parts.ndim))

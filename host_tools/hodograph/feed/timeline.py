@@ -20,7 +20,7 @@ _COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128)
 _TIGHT = 1.01
 _LEAST_FEED_MM_S = -(2.0**-11)
 
-# A piece in its own s = 0 … 1: Hermite data F', F'' at both ends and the way, by quintic; the two free
+# A piece in its own s = 0 … 1: Hermite data F', F'' at both ends and the distance, by quintic; the two free
 # coefficients of degree 6 and 7 by least squares on the jerk at Chebyshev points.
 _SAMPLES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
 _GAUSS_X, _GAUSS_W = np.polynomial.legendre.leggauss(12)
@@ -34,7 +34,7 @@ _FIT = np.linalg.pinv((_FREE * _THIRD) @ _POWERS.T)
 class Timeline:
     """A ramp up, constant feed for `constant_s` and the mirrored ramp down, over `length_mm`.
 
-    `length_mm` and `constant_s` are exact; without a constant stretch the way of the two ramps is
+    `length_mm` and `constant_s` are exact; without a constant stretch the distance of the two ramps is
     the length but for the rounding of the feed.
     """
 
@@ -115,9 +115,9 @@ class Timeline:
 
 def timeline(ramp: Ramp, length_mm: Fraction) -> Timeline:
     """The timeline of `ramp` over a length; the ramp's feed must not be above length / time."""
-    ways = Fraction(ramp.feed_mm_s) * Fraction(ramp.time_s)
-    rest = length_mm - ways
-    if rest <= ways * Fraction(1, 2**40):
+    distances = Fraction(ramp.feed_mm_s) * Fraction(ramp.time_s)
+    rest = length_mm - distances
+    if rest <= distances * Fraction(1, 2**40):
         rest = Fraction(0)
     return Timeline(ramp, length_mm, rest / Fraction(ramp.feed_mm_s))
 
@@ -140,9 +140,9 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
         down_cuts = end - _ramp_cuts(line, end - down_start, cuts)[::-1]
         up = _fit_ramp(line, up_cuts, 0.0, False)
         down = _fit_ramp(line, down_cuts, float(line.duration_s), True)
-        up_starts = np.append(_way_sums(up)[:-1], middle_starts[0])
+        up_starts = np.append(_distance_sums(up)[:-1], middle_starts[0])
         down_starts = np.append(
-            middle_starts[-1], length_q40 - _way_sums(down)[-1] + _way_sums(down)[1:]
+            middle_starts[-1], length_q40 - _distance_sums(down)[-1] + _distance_sums(down)[1:]
         )
         raw = RawPieces(
             np.concatenate((np.diff(up_cuts), np.diff(middle), np.diff(down_cuts))),
@@ -155,7 +155,7 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
                 )
             ),
             max(up.jerk_error, down.jerk_error),
-            max(up.way_error, down.way_error),
+            max(up.distance_error, down.distance_error),
         )
         if raw.faithful and _tight(raw, line):
             break
@@ -164,10 +164,10 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
 
 @dataclass(frozen=True, eq=False)
 class _Ramp:
-    way: Real  # mm, of each piece
+    distance: Real  # mm, of each piece
     shape: Real  # (n, 8), powers of s, mm
     jerk_error: float
-    way_error: float
+    distance_error: float
 
 
 def _cut_counts(line: Timeline, ramp_q32: int, period_us: int) -> list[int]:
@@ -185,8 +185,8 @@ def _ramp_cuts(line: Timeline, end: int, count: int) -> Int:
     starts of pieces have to rise.
     """
     cuts = _even(0, end, count)
-    way = line.ramp.value(DISPLACEMENT, cuts * 2.0**-32)
-    keep = way > 2.0**-38
+    distance = line.ramp.value(DISPLACEMENT, cuts * 2.0**-32)
+    keep = distance > 2.0**-38
     keep[0] = keep[-1] = True
     return cuts[keep]
 
@@ -208,24 +208,24 @@ def _fit_ramp(line: Timeline, cuts: Int, origin_s: float, backwards: bool) -> _R
 
     ends = np.array([0.0, 1.0])
     v, a = ramp(FEED, ends) * h, ramp(ACCELERATION, ends) * h**2
-    way = 0.5 * h[:, 0] * (ramp(FEED, 0.5 + 0.5 * _GAUSS_X) @ _GAUSS_W)
-    shape = _hermite(way, v[:, 0], v[:, 1], a[:, 0], a[:, 1])
+    distance = 0.5 * h[:, 0] * (ramp(FEED, 0.5 + 0.5 * _GAUSS_X) @ _GAUSS_W)
+    shape = _hermite(distance, v[:, 0], v[:, 1], a[:, 0], a[:, 1])
     target = ramp(JERK, _SAMPLES) * h**3
     shape = shape + (target - (shape * _THIRD) @ _POWERS.T) @ _FIT @ _FREE
     jerk = ramp(JERK, _CHECK) * h**3 - (shape * _THIRD) @ _CHECK_POWERS.T
-    # The way's error is the jerk's integrated three times from both ends: below jerk h^3 / 100.
+    # The distance's error is the jerk's integrated three times from both ends: below jerk h^3 / 100.
     worst = np.abs(jerk).max(axis=1)
-    return _Ramp(way, shape, float((worst / h[:, 0] ** 3).max()), float(worst.max() / 100.0))
+    return _Ramp(distance, shape, float((worst / h[:, 0] ** 3).max()), float(worst.max() / 100.0))
 
 
 _CHECK = np.linspace(0.0, 1.0, 33)
 _CHECK_POWERS = _CHECK[:, None] ** np.maximum(np.arange(8) - 3, 0)
 
 
-def _hermite(way: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
-    out = np.zeros((way.size, 8))
+def _hermite(distance: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
+    out = np.zeros((distance.size, 8))
     out[:, 1], out[:, 2] = v0, a0 / 2.0
-    p = way - v0 - a0 / 2.0
+    p = distance - v0 - a0 / 2.0
     v = v1 - v0 - a0
     a = a1 - a0
     out[:, 3] = 10.0 * p - 4.0 * v + a / 2.0
@@ -234,17 +234,17 @@ def _hermite(way: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
     return out
 
 
-def _way_sums(ramp: _Ramp) -> Int:
+def _distance_sums(ramp: _Ramp) -> Int:
     """Ways from the start of the ramp to the ends of its pieces, 0 first; 2^-40 mm."""
-    total = np.concatenate((np.zeros(1), np.cumsum(ramp.way)))
+    total = np.concatenate((np.zeros(1), np.cumsum(ramp.distance)))
     return np.rint(total * 2.0**40).astype(np.int64)
 
 
 def _constant_cuts(line: Timeline, start: int, end: int) -> Int:
     if end == start:
         return np.array([start], dtype=np.int64)
-    way = line.ramp.feed_mm_s * (end - start) / 2**32
-    return _even(start, end, int(np.ceil(way / LONGEST_PIECE_MM)))
+    distance = line.ramp.feed_mm_s * (end - start) / 2**32
+    return _even(start, end, int(np.ceil(distance / LONGEST_PIECE_MM)))
 
 
 def _constant_starts(line: Timeline, cuts: Int) -> Int:

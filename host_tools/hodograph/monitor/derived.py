@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What the plots show, from samples and the curve of the program (sim/offline/contour, docs/theory/numerics.md).
 
-Feed, tangential acceleration and jerk are those of the setpoints: derivatives of the way along them, by a
+Feed, tangential acceleration and jerk are those of the setpoints: derivatives of the distance along them, by a
 polynomial fitted to a window of some 21 ms around each tick (Savitzky and Golay), since third differences of counts
 of 1 nm would be noise of 4000 mm/s^3; the fit leaves some 2 mm/s^3 of it. A setpoint k is compared with what the drives
 report for SYNC k+2 (docs/reference/protocol.md section 2).
@@ -31,7 +31,7 @@ _ON_PATH_UM = 1.0
 class ProgramPath:
     """Follows setpoints along the curve, so that it knows the arc length of each.
 
-    The arc length is not on the bus: it is the way along the setpoints, corrected by the projection on the curve.
+    The arc length is not on the bus: it is the distance along the setpoints, corrected by the projection on the curve.
     Where the setpoints are not on the curve (a move to the start, say), it is looked for anew. Raises InputError for
     an image that is not a program.
     """
@@ -94,20 +94,22 @@ class ProgramPath:
     def _follow(self, counts: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Arc lengths of setpoints, and whether they are on the curve."""
         if self._last_mm is not None and self._last_counts is not None:
-            way = self._way(np.vstack([self._last_counts, counts]))[1:]
-            arcs, on_path = self._refine(self._last_mm + way, counts)
+            distance = self._distance(np.vstack([self._last_counts, counts]))[1:]
+            arcs, on_path = self._refine(self._last_mm + distance, counts)
             if on_path.all():
                 return arcs, on_path
         else:
             arcs, on_path = np.zeros(len(counts)), np.zeros(len(counts), dtype=bool)
         for here in (len(counts) - 1, 0):
-            way = self._way(counts)
-            again, good = self._refine(self._nearest(counts[here]) + way - way[here], counts)
+            distance = self._distance(counts)
+            again, good = self._refine(
+                self._nearest(counts[here]) + distance - distance[here], counts
+            )
             better = good & ~on_path
             arcs[better], on_path[better] = again[better], True
         return arcs, on_path
 
-    def _way(self, counts: Floats) -> Floats:
+    def _distance(self, counts: Floats) -> Floats:
         steps = np.hypot.reduce(np.diff(counts, axis=0), axis=1) / self._counts_per_mm
         return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -256,7 +258,7 @@ class Derivation:
         )
 
     def _motion(self, first: int, last: int) -> tuple[Floats, Floats, Floats]:
-        """Derivatives of the way along the setpoints, of the ticks from `first` to before `last`."""
+        """Derivatives of the distance along the setpoints, of the ticks from `first` to before `last`."""
         none = np.empty(0)
         if last <= first:
             return none, none, none
@@ -264,8 +266,8 @@ class Derivation:
         window = self._targets[drawn] / self._counts_per_unit[: self._drawn]
         chords = np.hypot.reduce(np.diff(window, axis=0), axis=1)
         missing = np.isnan(chords)
-        way = _windows(np.nancumsum(chords), self._half)
-        centred = way - way[:, [self._half]]
+        distance = _windows(np.nancumsum(chords), self._half)
+        centred = distance - distance[:, [self._half]]
         centred[np.ptp(_windows(np.cumsum(missing), self._half), axis=1) > 0] = np.nan
         feed, acceleration, jerk = (
             centred @ weights / self._dt_s**power

@@ -31,8 +31,8 @@ from ..feed.pieces import (
     FeedPieces,
     derivative_bounds,
     derivative_extremes,
+    distance_excess,
     exponents,
-    way_excess,
 )
 from ..spline.bernstein import square
 from ..spline.spatial.curve import hodograph_of
@@ -68,7 +68,7 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
     """Pairs of consecutive segments not longer than the distance of one tick at 200 %.
 
     joints_q40  (N + 1,) arc lengths of the joints
-    Returns the first segment (K,) of each such pair, the pair's way in mm and the highest feed in mm/s that
+    Returns the first segment (K,) of each such pair, the pair's distance in mm and the highest feed in mm/s that
     would be slow enough. Pairs with the first or last segment of the path are exempt.
     """
     if joints_q40.size < 5:
@@ -79,13 +79,13 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
     allowed: Real = np.ldexp(allowed_q24.astype(np.float64), -24)
     fast = ~(highest_feed(low, high, pieces) <= allowed)
     brief = np.flatnonzero(fast | (allowed_q24 < _LEAST_FEED_Q24))
-    way: Real = np.ldexp((high - low)[brief].astype(np.float64), -40)
-    return np.asarray(brief + 1, dtype=np.int64), way, allowed[brief]
+    distance: Real = np.ldexp((high - low)[brief].astype(np.float64), -40)
+    return np.asarray(brief + 1, dtype=np.int64), distance, allowed[brief]
 
 
-def _covering_feed_q24(way_q40: Int, period_us: int) -> Int:
-    """A feed in 2^-24 mm/s at which twice a period does not quite cover the way; rounded as the controller does."""
-    return np.asarray((way_q40 >> 16) * (4_000_000 // period_us) // 8 - 1)
+def _covering_feed_q24(distance_q40: Int, period_us: int) -> Int:
+    """A feed in 2^-24 mm/s at which twice a period does not quite cover the distance; rounded as in the controller."""
+    return np.asarray((distance_q40 >> 16) * (4_000_000 // period_us) // 8 - 1)
 
 
 def highest_feed(low_q40: Int, high_q40: Int, pieces: FeedPieces) -> Real:
@@ -137,15 +137,15 @@ def _preimage_limit_q44(program: Program) -> int:
 
 
 def segment_faults(
-    program: Program, ways: tuple[Wide, ...], limits: ProgramLimits | None
+    program: Program, distances: tuple[Wide, ...], limits: ProgramLimits | None
 ) -> list[Rule]:
     """What is wrong with the segments and their joints, in the order of the controller."""
     code = ProgramError
     limit = _preimage_limit_q44(program)
-    drawn = program.point_q40[: len(ways) - 1]
+    drawn = program.point_q40[: len(distances) - 1]
     outside = _bool((program.start_q40 < 0) | (program.start_q40 >= ARC_LIMIT_Q40))
     sigma = _sigma3(program.a_q44)
-    apart = [_apart(point, way) for point, way in zip(drawn, ways, strict=False)]
+    apart = [_apart(point, distance) for point, distance in zip(drawn, distances, strict=False)]
     backwards = program.start_q40[1:] <= program.start_q40[:-1]
     out: list[Rule] = [
         (_bool(_beyond(program.a_q44, limit).any(axis=(0, 2))), 0, code.W_RANGE),
@@ -153,7 +153,7 @@ def segment_faults(
         (outside, 0, code.ARC_RANGE),
         (_any(one <= wide(0) for one in sigma), 0, code.SIGMA),
         (_any(~(a <= b.doubled()) for a in sigma for b in sigma), 0, code.SIGMA_RATIO),
-        (_bool(~(ways[-1] <= LONGEST_WAY)), 0, code.SEGMENT_LONG),
+        (_bool(~(distances[-1] <= LONGEST_WAY)), 0, code.SEGMENT_LONG),
     ]
     if limits is not None:
         out.append((_leaves(program, limits), 0, code.TRAVEL))
@@ -161,20 +161,20 @@ def segment_faults(
         *out,
         (_bool(program.start_q40[:1] != 0), 0, code.SEGMENT_FIRST),
         (_any([*apart, _extras_apart(program)]), 1, code.JOIN_POINT),
-        (_bool(_apart(program.start_q40, ways[-1]) | backwards), 1, code.JOIN_ARC),
+        (_bool(_apart(program.start_q40, distances[-1]) | backwards), 1, code.JOIN_ARC),
         (_bool(_turned(program.a_q44) | _other_slopes(program)), 1, code.JOIN_DIRECTION),
     ]
 
 
-def end_faults(program: Program, ways: tuple[Wide, ...]) -> list[Rule]:
+def end_faults(program: Program, distances: tuple[Wide, ...]) -> list[Rule]:
     """What is wrong with the end of the path."""
     last = program.segment_count - 1
     missing = program.length_q40 - int(program.start_q40[last])
-    off = missing <= 0 or bool(_apart(np.array([0, missing]), ways[-1][last:])[0])
+    off = missing <= 0 or bool(_apart(np.array([0, missing]), distances[-1][last:])[0])
     away = program.point_q40[:, 0] - program.point_q40[:, last]
     open_end = [
-        _apart(np.array([0, way]), own[last:], CLOSE_WAY)[0]
-        for way, own in zip(away, ways[:-1], strict=False)
+        _apart(np.array([0, distance]), own[last:], CLOSE_WAY)[0]
+        for distance, own in zip(away, distances[:-1], strict=False)
     ]
     extra_end = program.extra_q40[:, last, 4] if program.extra_q40.size else away[:0]
     open_end += list(np.abs(extra_end - away[len(away) - len(extra_end) :]) > CLOSE_Q40)
@@ -209,11 +209,11 @@ def _sigma3(a_q44: Int) -> list[Wide]:
     return [reduce(add, (product(one, one, weights) for one in a_q44)) for weights in _SIGMA3]
 
 
-def _apart(starts_q40: Int, ways: Wide, most: Wide = JOIN_WAY) -> Bool:
-    """Whether each way ends further than `most` from where the next one starts."""
+def _apart(starts_q40: Int, distances: Wide, most: Wide = JOIN_WAY) -> Bool:
+    """Whether each distance ends further than `most` from where the next one starts."""
     far = np.abs(np.diff(starts_q40.astype(np.float64))) > _FAR_Q40
     step = np.where(far, 0, starts_q40[1:] - starts_q40[:-1])
-    gap = ways[: len(step)] - scaled(step, WAY_SCALE, 48)
+    gap = distances[: len(step)] - scaled(step, WAY_SCALE, 48)
     return _bool(far | ~gap.within(most))
 
 
@@ -317,9 +317,9 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
     duration, start, c = (
         a[:count] for a in (pieces.duration_q32_s, pieces.start_q40, pieces.c_q40)
     )
-    way = _ways_q44(duration, c)
+    distance = _distances_q44(duration, c)
     advance = np.diff(start.astype(object))
-    gaps = way[:-1].astype(object) - 16 * advance
+    gaps = distance[:-1].astype(object) - 16 * advance
     (feed_start, feed_end), (acceleration_start, acceleration_end) = _end_values(duration, c)
     bounds = _bound_faults(duration, c, limits)
     factor = pieces.override_factor_q14
@@ -327,7 +327,7 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
     override = (factor < FACTOR_ONE_Q14) | (factor > 2 * FACTOR_ONE_Q14)
     begins = (_starts_elsewhere(program), _moving(feed_start[0], acceleration_start[0]))
     return [
-        (np.asarray(np.abs(way) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
+        (np.asarray(np.abs(distance) > PIECE_Q40 << 4), 0, code.PIECE_LONG),
         *bounds,
         (np.asarray(override | (codes == 0).any(axis=1)), 0, code.OVERRIDE),
         (np.array([begins[0]]), 0, code.PIECE_FIRST),
@@ -366,7 +366,7 @@ def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[R
 
 def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: int) -> list[Rule]:
     lows, highs = derivative_extremes(duration, c, halvings)
-    excess = way_excess(duration, c, halvings)
+    excess = distance_excess(duration, c, halvings)
     backwards = (lows[0] < BACKWARDS_MM_S) | (excess > WAY_SLACK_MM)
     out: list[Rule] = [(np.asarray(backwards), 0, ProgramError.BACKWARDS)]
     if limits is None:
@@ -384,8 +384,10 @@ def last_piece_faults(program: Program) -> list[Rule]:
     pieces = program.pieces
     last = len(pieces) - 1
     duration, c = pieces.duration_q32_s[last:], pieces.c_q40[last:]
-    way = int(_ways_q44(duration, c)[0])
-    missed = abs(way + ((int(pieces.start_q40[last]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    distance = int(_distances_q44(duration, c)[0])
+    missed = (
+        abs(distance + ((int(pieces.start_q40[last]) - program.length_q40) << 4)) > JOIN_Q40 << 4
+    )
     feed, acceleration = _end_values(duration, c)
     return [
         (np.array([_moving(feed[1][0], acceleration[1][0])]), last, ProgramError.END_MOVING),
@@ -404,14 +406,16 @@ def _moving(feed_q24: float, acceleration_q16: float) -> bool:
     return abs(feed_q24) > JOIN_FEED_Q24 or abs(acceleration_q16) > JOIN_ACCELERATION_Q16
 
 
-def _ways_q44(duration: Int, c: Int) -> Int:
+def _distances_q44(duration: Int, c: Int) -> Int:
     """Way of each piece in 2^-44 mm, rounded down from the exact sum of its terms."""
     shift = exponents(duration) + 32
-    ways = [_way_q44(int(d), int(e), row) for d, e, row in zip(duration, shift, c, strict=True)]
-    return np.array(ways, dtype=np.int64)
+    distances = [
+        _distance_q44(int(d), int(e), row) for d, e, row in zip(duration, shift, c, strict=True)
+    ]
+    return np.array(distances, dtype=np.int64)
 
 
-def _way_q44(d: int, e: int, c: Int) -> int:
+def _distance_q44(d: int, e: int, c: Int) -> int:
     if not c[1:].any():
         return (int(c[0]) * d << 4) >> e
     total = 0
@@ -480,10 +484,10 @@ def _check(
     header = _header_fault(program, limits, reserved, chunk)
     if header is not None:
         return Fault(header, 0)
-    ways = segment_ways(program.a_q44)
+    distances = segment_ways(program.a_q44)
     return (
-        _first(segment_faults(program, ways, limits))
-        or _first(end_faults(program, ways))
+        _first(segment_faults(program, distances, limits))
+        or _first(end_faults(program, distances))
         or _first(piece_faults(program, limits))
         or _first(last_piece_faults(program))
         or _duration_fault(program)

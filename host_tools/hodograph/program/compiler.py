@@ -162,7 +162,7 @@ def _fit_feed(
     length_q40 = int(joints_q40[-1])
     for _ in range(_MOST_ROUNDS):
         pieces = plan.pieces_over(length_q40, joints_q40)
-        pairs, way_mm, allowed_mm_s = brief_pairs(joints_q40, pieces, plan.period_us)
+        pairs, distance_mm, allowed_mm_s = brief_pairs(joints_q40, pieces, plan.period_us)
         if not pairs.size:
             return plan, pieces
         worst = int(allowed_mm_s.argmin())
@@ -170,7 +170,7 @@ def _fit_feed(
         feed = float(feeds[worst])
         span, place_mm = _span(spline, joints_q40, int(pairs[worst]))
         where = (
-            f"the path has {way_mm[worst]:.4g} mm in two neighbouring segments at arc length "
+            f"the path has {distance_mm[worst]:.4g} mm in two neighbouring segments at arc length "
             f"{place_mm:.6g} mm (span {span}), less than one tick at 200 %"
         )
         if feed < LEAST_FEED_MM_S:

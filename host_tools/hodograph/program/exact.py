@@ -67,21 +67,21 @@ class ExactProgram:
         key = int(mpmath.floor(mpmath.ldexp(s, 40)))
         i = min(max(bisect_right(self._starts, key) - 1, 0), len(self._starts) - 1)
         a = [[mpmath.ldexp(int(b), -44) for b in one[i]] for one in p.a_q44]
-        way = s - mpmath.ldexp(self._starts[i], -40)
+        distance = s - mpmath.ldexp(self._starts[i], -40)
         direction, sigma = _direction(a), _sum(*(_product(one, one) for one in a))
-        xi = way / (sum(sigma) / 5)
+        xi = distance / (sum(sigma) / 5)
         for _ in range(12):
-            move = (_integral(sigma, xi) - way) / _bernstein(sigma, xi)
+            move = (_integral(sigma, xi) - distance) / _bernstein(sigma, xi)
             xi -= move
             if abs(move) < mpmath.mpf(10) ** (5 - DIGITS):
                 break
-        ways = [_integral(one, xi) for one in direction]
+        distances = [_integral(one, xi) for one in direction]
         for extra in p.extra_q40:
             own = [mpmath.mpf(0), *(mpmath.ldexp(int(b), -40) for b in extra[i])]
-            ways.append(_bernstein(own, xi))
+            distances.append(_bernstein(own, xi))
         return tuple(
             mpmath.ldexp(int(start), -40) + one
-            for start, one in zip(p.point_q40[:, i], ways, strict=True)
+            for start, one in zip(p.point_q40[:, i], distances, strict=True)
         )
 
 

@@ -46,10 +46,10 @@ def segment_ways(a_q44: Int) -> tuple[Wide, ...]:
     )
 
 
-def way_to_q40(way: Wide) -> Int:
+def way_to_q40(distance: Wide) -> Int:
     """Ways (integers over 15 * 2^88) rounded to 2^-40 mm."""
-    low = way.low + (WAY_SCALE << 47)
-    return np.asarray(way.high + (way.high + (low >> 48)) // WAY_SCALE)
+    low = distance.low + (WAY_SCALE << 47)
+    return np.asarray(distance.high + (distance.high + (low >> 48)) // WAY_SCALE)
 
 
 LONGEST_SEGMENT_MM = 31.875
@@ -84,10 +84,12 @@ def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) 
     if np.abs(preimage).max(initial=0.0) >= 2.0**6:
         raise InputError("path: a segment is too long for the format")
     a_q44 = np.rint(preimage * 2.0**44).astype(np.int64)
-    *ways, along = (way_to_q40(way.sums()) for way in segment_ways(a_q44))
+    *distances, along = (way_to_q40(distance.sums()) for distance in segment_ways(a_q44))
     columns = [
-        _anchored(way[:-1], ideal, by)
-        for way, ideal, by in zip(ways, origin, offset[: len(ways)].tolist(), strict=True)
+        _anchored(distance[:-1], ideal, by)
+        for distance, ideal, by in zip(
+            distances, origin, offset[: len(distances)].tolist(), strict=True
+        )
     ]
     drift = np.linalg.norm([apart for _, apart in columns], axis=0)
     points = np.stack([point for point, _ in columns])
@@ -127,11 +129,11 @@ def _extra(spline: SpatialPHSpline, offset: Real) -> tuple[Int, Int]:
     return b_q40[:, :, 0] + shift[:, None], b_q40[:, :, 1:] - b_q40[:, :, :1]
 
 
-def _anchored(way_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:
-    """Start points from exact ways, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
+def _anchored(distance_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:
+    """Start points from exact distances, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
     offset = round(offset_mm * 2**40)
     ideal = np.rint(ideal_mm * 2.0**40).astype(np.int64)
-    chained = ideal[0] + way_q40
+    chained = ideal[0] + distance_q40
     pull = ideal - chained
     if np.abs(np.diff(pull)).max(initial=0) > _ANCHOR_Q40:
         pull = np.zeros_like(pull)

@@ -128,9 +128,11 @@ def _bytes_text(found: dict[str, Any]) -> str:
 
 def end_point_q40(program: Program) -> NDArray[np.int64]:
     """Where it ends, (A,) in 2^-40 mm or degrees."""
-    *ways, _ = (int(way_to_q40(way)[0]) for way in segment_ways(program.a_q44[:, -1:]))
-    ways += [int(one) for one in program.extra_q40[:, -1, -1]]
-    return np.asarray(program.point_q40[:, -1] + np.array(ways, dtype=np.int64))
+    *distances, _ = (
+        int(way_to_q40(distance)[0]) for distance in segment_ways(program.a_q44[:, -1:])
+    )
+    distances += [int(one) for one in program.extra_q40[:, -1, -1]]
+    return np.asarray(program.point_q40[:, -1] + np.array(distances, dtype=np.int64))
 
 
 def inspect_text(program: Program, *, full: bool = False) -> str:

@@ -48,10 +48,10 @@ def code_below(column: int, value: float) -> int:
 
 @dataclass(frozen=True)
 class WorstStop:
-    """The longest stop of a kind: its bound, the way it takes at most, the piece it begins in."""
+    """The longest stop of a kind: its bound, the distance it takes at most, the piece it begins in."""
 
     time_s: float
-    way_mm: float
+    distance_mm: float
     piece: int
 
 
@@ -61,7 +61,7 @@ class Stops:
 
     codes      (M, 2, 3) of jerk, deceleration, jerk
     bound_us   (M, 2) from the command to rest, for a stop that is asked for in this piece
-    worst_us   (2,) the greatest of them; worst_um (2,) the longest way
+    worst_us   (2,) the greatest of them; worst_um (2,) the longest distance
     """
 
     codes: Codes
@@ -92,7 +92,7 @@ def no_stops(count: int) -> Stops:
 
 
 def stops_dict(stops: Stops, start_mm: Real) -> dict[str, Any]:
-    """The worst stops as plain numbers for JSON: by kind, time, way and where they begin.
+    """The worst stops as plain numbers for JSON: by kind, time, distance and where they begin.
 
     start_mm  (M,) arc length at the start of each piece
     """
@@ -101,7 +101,7 @@ def stops_dict(stops: Stops, start_mm: Real) -> dict[str, Any]:
         worst = stops.worst(kind)
         out[name] = {
             "time_s": worst.time_s,
-            "distance_mm": worst.way_mm,
+            "distance_mm": worst.distance_mm,
             "at_mm": float(start_mm[worst.piece]),
             "piece": worst.piece,
         }
@@ -113,6 +113,6 @@ def stops_text(stops: Stops, start_mm: Real) -> Iterator[str]:
     for kind, name in enumerate(("hold, stop", "fault stop")):
         worst = stops.worst(kind)
         yield (
-            f"{name:<10} at most {worst.time_s:.4g} s and {worst.way_mm:.4g} mm to rest, "
+            f"{name:<10} at most {worst.time_s:.4g} s and {worst.distance_mm:.4g} mm to rest, "
             f"longest from arc length {start_mm[worst.piece]:.6g} mm (piece {worst.piece})"
         )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs that are stopped on their way: feed hold, stop and fault stop, without a bus."""
+"""Runs that are stopped in motion: feed hold, stop and fault stop, without a bus."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class StoppedRun:
     kind          one of STOP_ORDERS
     at_s          time from the program's start at which it was commanded
     rest_after_s  time from then to the first setpoint at rest
-    distance_mm   way along the path in this time
+    distance_mm   distance along the path in this time
     bound_s       longest time by the program's stop table
     peak          greatest magnitudes from then to rest: of the setpoints, by their differences over one, two and three
                   periods, along the path and by axis; of the axes, volts and contour error, settling included

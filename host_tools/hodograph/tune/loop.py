@@ -38,7 +38,7 @@ class Loop:
     volts_per_speed: float
     newton_per_volt: float
     """Force at the table for a volt of load."""
-    speed_per_way: float = 0.0
+    speed_per_distance: float = 0.0
     """Speed of the loop for a mm between two samples; 0: the motor's own."""
     delay_samples: int = 0
 
@@ -56,8 +56,8 @@ class Loop:
         """Speed, as the loop sees it, and position for a volt."""
         speed = self.speed_from_volts / (z - self.speed_from_speed)
         position = (self.position_from_speed * speed + self.position_from_volts) / (z - 1)
-        if self.speed_per_way:
-            speed = self.speed_per_way * (1 - 1 / z) * position
+        if self.speed_per_distance:
+            speed = self.speed_per_distance * (1 - 1 / z) * position
         return speed, position
 
     def _by_ref(self, z: Complex) -> Complex:
@@ -113,8 +113,8 @@ class Loop:
         """
         h, k_pp = self.step_s, self.k_pp_rad_s_mm
         seen: Float = np.array([0.0, 1.0, 0.0, 0.0, 0.0])
-        if self.speed_per_way:
-            seen = self.speed_per_way * np.array([1.0, 0.0, 0.0, -1.0, 0.0])
+        if self.speed_per_distance:
+            seen = self.speed_per_distance * np.array([1.0, 0.0, 0.0, -1.0, 0.0])
         volts: Float = -self.volts_per_speed * seen
         volts[0] -= self.volts_per_ref * k_pp
         volts[2] += self.volts_per_integral
@@ -167,7 +167,7 @@ def loop_of(drive: Drive) -> Loop:
         volts_per_integral=volts * drive.k_iv_per_s,
         volts_per_speed=volts * (1 + present),
         newton_per_volt=1000.0 / (drive.torque_to_volts * g),
-        speed_per_way=0.0 if drive.speed == "exact" else 1 / (h * g),
+        speed_per_distance=0.0 if drive.speed == "exact" else 1 / (h * g),
         delay_samples=drive.delay_samples,
     )
 

@@ -26,16 +26,16 @@ _LEAST_WIDTH = 1e-6
 
 def bends(cells: Cells) -> Motion:
     """Bounds (C,) of the second derivative in time of each quantity of the motion, over each cell."""
-    way = list(taylor_bounds(cells.way, cells.duration_s, _ORDERS))
+    distance = list(taylor_bounds(cells.distance, cells.duration_s, _ORDERS))
     geometry = _Geometry(cells)
-    xi = _parameter(way, geometry)
+    xi = _parameter(distance, geometry)
     slope = [(k + 1) * xi[k + 1] for k in range(_ORDERS)]
     turn = _times(_composed(geometry.turn, xi, 2), _times(slope, slope, 2), 2)
     axes = [_times(_composed(one, xi, 4), slope, 4) for one in geometry.direction]
     return Motion(
-        feed=6.0 * way[3],
-        acceleration=24.0 * way[4],
-        jerk=120.0 * way[5],
+        feed=6.0 * distance[3],
+        acceleration=24.0 * distance[4],
+        jerk=120.0 * distance[5],
         centripetal=2.0 * turn[2],
         axis_velocity=tuple(2.0 * one[2] for one in axes),
         axis_acceleration=tuple(6.0 * one[3] for one in axes),
@@ -59,9 +59,9 @@ class _Geometry:
         self.turn = taylor_bounds(shifted(curve.turn(segment), low, width), width, 2)
 
 
-def _parameter(way: Series, geometry: _Geometry) -> Series:
+def _parameter(distance: Series, geometry: _Geometry) -> Series:
     """Majorants of xi(t), from sigma(xi) xi' = F'; the constant term is 0, xi counts from the instant."""
-    xi = [np.zeros_like(way[0])]
+    xi = [np.zeros_like(distance[0])]
     inverse: Series = []
     for order in range(_ORDERS):
         if order == 0:
@@ -70,7 +70,7 @@ def _parameter(way: Series, geometry: _Geometry) -> Series:
             speed = _composed(geometry.speed, xi, order)
             terms = sum(speed[k] * inverse[order - k] for k in range(1, order + 1))
             inverse.append(geometry.inverse * np.asarray(terms))
-        feed = [(k + 1) * way[k + 1] for k in range(order + 1)]
+        feed = [(k + 1) * distance[k + 1] for k in range(order + 1)]
         terms = sum(feed[k] * inverse[order - k] for k in range(order + 1))
         xi.append(np.asarray(terms) / (order + 1))
     return xi

@@ -28,7 +28,7 @@ class Cells:
     """C cells in the order of time.
 
     segment, start_s, duration_s   (C,) index; program time of its start; its length in time
-    way      (C, 8) arc length within the segment, mm, in powers of u = (t - start_s) / duration_s
+    distance      (C, 8) arc length within the segment, mm, in powers of u = (t - start_s) / duration_s
     xi       (C, 2) the curve's parameter at both ends
     """
 
@@ -37,7 +37,7 @@ class Cells:
     segment: Int
     start_s: Real
     duration_s: Real
-    way: Real
+    distance: Real
     xi: Real
 
     def __len__(self) -> int:
@@ -45,7 +45,7 @@ class Cells:
 
     def arc_length_mm(self, cell: Int, u: Real) -> Real:
         """Arc length on the path."""
-        return self.curve.start_mm[self.segment[cell]] + values(self.way[cell], u)
+        return self.curve.start_mm[self.segment[cell]] + values(self.distance[cell], u)
 
     def time_s(self, cell: Int, u: Real) -> Real:
         """Program time."""
@@ -58,7 +58,7 @@ class Cells:
             segment=self.segment[which],
             start_s=self.start_s[which],
             duration_s=self.duration_s[which],
-            way=self.way[which],
+            distance=self.distance[which],
             xi=self.xi[which],
         )
 
@@ -71,9 +71,9 @@ class Cells:
             self.taken(cell),
             start_s=self.start_s[cell] + first * width * self.duration_s[cell],
             duration_s=width * self.duration_s[cell],
-            way=shifted(self.way[cell], first * width, width),
+            distance=shifted(self.distance[cell], first * width, width),
         )
-        return replace(part, xi=part.curve.ends(part.segment, part.way))
+        return replace(part, xi=part.curve.ends(part.segment, part.distance))
 
 
 def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
@@ -82,17 +82,17 @@ def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
     exponent = np.array([piece.exponent for piece in pieces], dtype=np.float64)
     duration = pieces.duration_q32_s * 2.0**-32
     scale = np.concatenate((np.zeros((len(pieces), 1)), pieces.c_q40 * 2.0**-40), axis=1)
-    way = scale * (duration * 2.0**-exponent)[:, None] ** np.arange(8.0)
-    piece, u = _joints(program, way, more_mm)
+    distance = scale * (duration * 2.0**-exponent)[:, None] ** np.arange(8.0)
+    piece, u = _joints(program, distance, more_mm)
     cell_piece, low, high = _stretches(len(pieces), piece, u)
     brief = (high - low) * duration[cell_piece] < _BRIEF_S
     cell_piece, low, high = cell_piece[~brief], low[~brief], high[~brief]
-    middle = values(way[cell_piece], 0.5 * (low + high))
+    middle = values(distance[cell_piece], 0.5 * (low + high))
     start = pieces.start_q40[cell_piece]
     at_q40 = start + np.rint(middle * 2.0**40).astype(np.int64)
     segment = np.searchsorted(program.start_q40, at_q40, side="right") - 1
     segment = np.clip(segment, 0, program.segment_count - 1)
-    own = shifted(way[cell_piece], low, high - low)
+    own = shifted(distance[cell_piece], low, high - low)
     own[:, 0] += (start - program.start_q40[segment]) * 2.0**-40
     curve = curve_of(program)
     begun = np.concatenate(([0.0], np.cumsum(duration)[:-1]))
@@ -107,7 +107,7 @@ def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
     )
 
 
-def _joints(program: Program, way: Real, more_mm: Sequence[float]) -> tuple[Int, Real]:
+def _joints(program: Program, distance: Real, more_mm: Sequence[float]) -> tuple[Int, Real]:
     """Piece and u where the motion passes a joint of segments, or one of `more_mm`."""
     more = np.rint(np.asarray(more_mm, dtype=np.float64) * 2.0**40).astype(np.int64)
     joints = np.unique(np.concatenate((program.start_q40[1:], more)))
@@ -118,7 +118,7 @@ def _joints(program: Program, way: Real, more_mm: Sequence[float]) -> tuple[Int,
     low, high = np.zeros(joints.size), np.ones(joints.size)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        below = values(way[piece], middle) < target
+        below = values(distance[piece], middle) < target
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return piece, 0.5 * (low + high)
 

@@ -51,9 +51,11 @@ class Curve(ABC):
             xi = xi - (values(arc, xi) - arc_mm) / values(arc, xi, 1)
         return np.asarray(xi)
 
-    def ends(self, segment: Int, way: Real) -> Real:
+    def ends(self, segment: Int, distance: Real) -> Real:
         """xi at u = 0 and 1 of cells, (C, 2)."""
-        first, last = (self.parameter(segment, end) for end in (way[:, 0], way.sum(axis=1)))
+        first, last = (
+            self.parameter(segment, end) for end in (distance[:, 0], distance.sum(axis=1))
+        )
         return np.stack((first, last), axis=1)
 
 

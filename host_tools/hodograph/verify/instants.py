@@ -47,10 +47,10 @@ class Motion:
 
 def motion_at(cells: Cells, cell: Int, u: Real) -> Motion:
     """The motion in cells `cell` at u, both (K,)."""
-    way, h = cells.way[cell], cells.duration_s[cell]
-    f1, f2, f3 = (values(way, u, order) / h**order for order in (1, 2, 3))
+    distance, h = cells.distance[cell], cells.duration_s[cell]
+    f1, f2, f3 = (values(distance, u, order) / h**order for order in (1, 2, 3))
     segment = cells.segment[cell]
-    xi = cells.curve.parameter(segment, values(way, u))
+    xi = cells.curve.parameter(segment, values(distance, u))
     if isinstance(cells.curve, SpaceCurve):
         return _in_space(cells.curve, segment, xi, (f1, f2, f3))
     assert isinstance(cells.curve, PlaneCurve)

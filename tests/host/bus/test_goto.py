@@ -71,8 +71,10 @@ def test_any_move_in_space(start: tuple[int, ...], end: tuple[int, ...]) -> None
     st.tuples(*[st.integers(-1_900_000_000, 1_900_000_000)] * 3),
     st.tuples(*[st.sampled_from([0, 1, -1, 1999, -2500, 60_000_000])] * 3),
 )
-def test_short_moves_and_moves_along_an_axis(start: tuple[int, ...], way: tuple[int, ...]) -> None:
-    check_moves(start, tuple(a + b for a, b in zip(start, way, strict=True)), SPACE)
+def test_short_moves_and_moves_along_an_axis(
+    start: tuple[int, ...], distance: tuple[int, ...]
+) -> None:
+    check_moves(start, tuple(a + b for a, b in zip(start, distance, strict=True)), SPACE)
 
 
 def test_outside_the_travel() -> None:

@@ -158,10 +158,12 @@ def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
             second = (after.slope_per_s - before.slope_per_s) / period
             for part in np.linspace(0.0, 1.0, COUNT_S):
                 h = part * period
-                way = before.override * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
+                distance = (
+                    before.override * h + before.slope_per_s * h**2 / 2.0 + second * h**3 / 6.0
+                )
                 rate = before.override + before.slope_per_s * h + second * h**2 / 2.0
                 instants.append(
-                    (before.time_s + way, rate, before.slope_per_s + second * h, second)
+                    (before.time_s + distance, rate, before.slope_per_s + second * h, second)
                 )
         before = after
     t, rate, slope, second = np.array(instants).T

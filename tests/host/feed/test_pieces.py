@@ -76,14 +76,16 @@ class Reference:
                 out[j] += v / total * mpmath.binomial(k, j) * mpmath.mpf(2) ** j * (-1) ** (k - j)
         return out
 
-    def _way(self, t):
+    def _distance(self, t):
         """Of the ramp."""
         tau = t / self.time
         integral = [mpmath.mpf(0)] + [v / (k + 1) for k, v in enumerate(self._polynomial)]
-        way = self.feed * self.time * value(integral, tau)
+        distance = self.feed * self.time * value(integral, tau)
         if self._n is not None:
-            way += self.time**2 * (self._added_integral(tau) - self._added_integral(mpmath.mpf(0)))
-        return way
+            distance += self.time**2 * (
+                self._added_integral(tau) - self._added_integral(mpmath.mpf(0))
+            )
+        return distance
 
     def _jerk(self, t):
         """Of the ramp."""
@@ -112,9 +114,9 @@ class Reference:
     def at(self, t):
         """F and its third derivative at a time; beyond a ramp by a rounding, its continuation."""
         if t <= self.time:
-            return self._way(t), self._jerk(t)
+            return self._distance(t), self._jerk(t)
         if self.end - t <= self.time:
-            return self.length - self._way(self.end - t), self._jerk(self.end - t)
+            return self.length - self._distance(self.end - t), self._jerk(self.end - t)
         return self.feed * (t - self.time / 2), mpmath.mpf(0)
 
 

@@ -54,8 +54,8 @@ def test_ramp_is_the_papers(n_c: float | None) -> None:
             t = tau * 0.1
             exact = curve(mpmath.mpf(t))
             assert abs(ramp.value(FEED, t) - exact) < 1e-12
-            way = mpmath.quad(curve, [0, mpmath.mpf(t) / 2, mpmath.mpf(t)])
-            assert abs(ramp.value(DISPLACEMENT, t) - way) < 1e-14
+            distance = mpmath.quad(curve, [0, mpmath.mpf(t) / 2, mpmath.mpf(t)])
+            assert abs(ramp.value(DISPLACEMENT, t) - distance) < 1e-14
             for order, bound in ((ACCELERATION, 1e-9), (JERK, 1e-6)):
                 exact = mpmath.diff(curve, mpmath.mpf(t), order)
                 assert abs(ramp.value(order, t) - exact) < bound
@@ -79,8 +79,8 @@ def test_every_ramp_is_antisymmetric_and_starts_and_ends_at_rest(feed, time, deg
         assert abs(ramp.value(FEED, 0.0)) < 1e-12 * feed
         assert abs(ramp.value(ACCELERATION, 0.0)) < 1e-10 * feed / time
         assert abs(ramp.value(ACCELERATION, time)) < 1e-10 * feed / time
-        way = ramp.value(DISPLACEMENT, time)
-        np.testing.assert_allclose(way, feed * time / 2, rtol=1e-13)
+        distance = ramp.value(DISPLACEMENT, time)
+        np.testing.assert_allclose(distance, feed * time / 2, rtol=1e-13)
 
 
 @settings(max_examples=60, deadline=None)

@@ -160,7 +160,7 @@ def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us
 @pytest.mark.parametrize("period_us", [1000, 8000])
 @pytest.mark.parametrize("spacing_mm", [0.002, 0.0007, 0.00037])
 def test_feeds_lowered_for_the_shortest_segments_are_accepted(spacing_mm, period_us) -> None:
-    """Where the controller's resolution of 2^-24 mm and mm/s is a visible part of way and feed."""
+    """Where the controller's resolution of 2^-24 mm and mm/s is a visible part of distance and feed."""
     turn = 0.3 * np.sin(np.arange(24) / 3.0)
     spline = from_control_polygon(np.cumsum(spacing_mm * np.exp(1j * turn)), False).spline
     plan = plan_feed(spline.length_mm, FeedRequest("quintic", 100.0, 0.002), period_us=period_us)

@@ -23,7 +23,7 @@ FIRST_MM = 2.0**-6
 """Way of the first piece: from rest to rest, more slowly than 2^-10 mm/s."""
 DURATION_S = 64
 SHORT_MM = 1.0e-6
-"""Two of them are a little longer than the way of 2 ms at 2^-10 mm/s."""
+"""Two of them are a little longer than the distance of 2 ms at 2^-10 mm/s."""
 
 
 def creeping_piece(back: float) -> list[float]:
@@ -39,8 +39,8 @@ def creeping_program(back: float) -> Program:
     first = [0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0]
     c_mm = np.array([np.array(first) * FIRST_MM, creeping_piece(back)])
     c_q40 = np.round(np.ldexp(c_mm, 40)).astype(np.int64)
-    ways_q40 = c_q40.sum(axis=1)
-    length = int(ways_q40.sum())
+    distances_q40 = c_q40.sum(axis=1)
+    length = int(distances_q40.sum())
     short = 2500
     lengths = [FIRST_MM - short * SHORT_MM, *[SHORT_MM] * short, length * 2.0**-40 - FIRST_MM]
     w_q44 = np.round(np.ldexp(np.sqrt(np.array(lengths)), 44)).astype(np.int64)
@@ -52,7 +52,7 @@ def creeping_program(back: float) -> Program:
     golden = decode(GOLDEN.read_bytes())
     pieces = FeedPieces(
         np.full(2, DURATION_S << 32, dtype=np.int64),
-        np.array([0, ways_q40[0]], dtype=np.int64),
+        np.array([0, distances_q40[0]], dtype=np.int64),
         c_q40,
         np.full(2, 1 << 14, dtype=np.uint32),
         np.full((2, 7), 128, dtype=np.uint8),

@@ -61,15 +61,15 @@ def compiled(
 @given(st.integers(4, 40), st.integers(0, 10**6), st.booleans())
 def test_joints_meet_far_within_the_tolerance(count, seed, closed) -> None:
     program = compiled(wavy(count, seed, closed and count > 5))
-    dx, dy, ds = (way.exact() for way in segment_ways(program.a_q44))
+    dx, dy, ds = (distance.exact() for distance in segment_ways(program.a_q44))
     unit = 15 << 48
-    for start, way, allowed in (
+    for start, distance, allowed in (
         (program.point_q40[0], dx, 17),
         (program.point_q40[1], dy, 17),
         (np.append(program.start_q40, program.length_q40), ds, 1),
     ):
         n = start.size - 1
-        gaps = [int(start[i]) * unit + way[i] - int(start[i + 1]) * unit for i in range(n)]
+        gaps = [int(start[i]) * unit + distance[i] - int(start[i + 1]) * unit for i in range(n)]
         assert max(map(abs, gaps), default=0) <= allowed * unit
 
 
@@ -221,7 +221,7 @@ def test_compile_and_check_take_linear_time() -> None:
         # Slow circles that stay within the 4096 mm of the format.
         turn = np.exp(1j * np.arange(2 * count + 1) * np.pi / 500)
         w = 2.0 * np.stack((turn[:-1:2], turn[1::2], turn[2::2]), axis=1)
-        ways = (
+        distances = (
             3 * w[:, 0] ** 2
             + 3 * w[:, 0] * w[:, 1]
             + 2 * w[:, 1] ** 2
@@ -229,7 +229,7 @@ def test_compile_and_check_take_linear_time() -> None:
             + 3 * w[:, 1] * w[:, 2]
             + 3 * w[:, 2] ** 2
         ) / 15
-        origin = np.concatenate(([0.0], np.cumsum(ways)[:-1]))
+        origin = np.concatenate(([0.0], np.cumsum(distances)[:-1]))
         spline = PHSpline(origin, w, False)
         plan = plan_feed(spline.length_mm, REQUEST, None, CONTROLLER)
         begin = time.process_time()

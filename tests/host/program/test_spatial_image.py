@@ -78,12 +78,14 @@ def test_sums_of_products_are_exact() -> None:
 def test_joints_meet_far_within_the_tolerance(seed: int) -> None:
     program = compiled(seed)
     assert np.abs(program.a_q44).max() < 8 << 44
-    *ways, along = (way.exact() for way in segment_ways(program.a_q44))
+    *distances, along = (distance.exact() for distance in segment_ways(program.a_q44))
     joints = np.append(program.start_q40, program.length_q40)
-    columns = [(one, way, 17) for one, way in zip(program.point_q40, ways, strict=True)]
-    for start, way, allowed in [*columns, (joints, along, 1)]:
+    columns = [
+        (one, distance, 17) for one, distance in zip(program.point_q40, distances, strict=True)
+    ]
+    for start, distance, allowed in [*columns, (joints, along, 1)]:
         gaps = [
-            int(start[i]) * (15 << 48) + way[i] - int(start[i + 1]) * (15 << 48)
+            int(start[i]) * (15 << 48) + distance[i] - int(start[i + 1]) * (15 << 48)
             for i in range(start.size - 1)
         ]
         assert max(map(abs, gaps)) <= allowed * (15 << 48)

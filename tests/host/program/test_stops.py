@@ -76,8 +76,8 @@ def test_the_numbers_keep_path_limits_by_themselves(program, kind) -> None:
 
 
 def test_every_piece_of_the_examples_has_a_fault_stop(program) -> None:
-    """But where the program, or the way to the next piece that has one, ends sooner than a brake; or where one that
-    begins while a hold brakes would pass a limit. That wait is never the longest stop."""
+    """Except where the program, or the distance to the next piece that has one, ends sooner than a brake; or where one
+    that begins while a hold brakes would pass a limit. That wait is never the longest stop."""
     without = (program.stops.codes[:, FAULT] == 0).any(axis=1)
     duration_us = np.ldexp(program.pieces.duration_q32_s.astype(float), -32) * 1e6
     assert duration_us[without].sum() < 60_000

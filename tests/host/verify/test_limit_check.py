@@ -143,10 +143,10 @@ def bumped(program: Program, rng: np.random.Generator) -> Program:
     duration_s = float(pieces.duration_q32_s[k]) * 2.0**-32
     exponent = int(np.ceil(np.log2(duration_s)))
     end = duration_s * 2.0**-exponent
-    way = np.polynomial.polynomial.polyfromroots([0.0] * 3 + [end] * 3)
+    distance = np.polynomial.polynomial.polyfromroots([0.0] * 3 + [end] * 3)
     size = 10.0 ** rng.uniform(-7.0, 0.0) * rng.choice([-1.0, 1.0]) / end**6
     c = pieces.c_q40.copy()
-    c[k, :6] += np.rint(size * way[1:] * 2.0**40).astype(np.int64)
+    c[k, :6] += np.rint(size * distance[1:] * 2.0**40).astype(np.int64)
     return replace(program, pieces=replace(pieces, c_q40=c))
 
 

@@ -122,9 +122,9 @@ def first_estimate(
     return FirstEstimate(s, q, t, *_steps(spline, s, q, t, pull, jerk, period_s), pull)
 
 
-def _from_rest(way: Real, jerk: float) -> Real:
-    """q after a way from rest at constant jerk."""
-    return np.asarray(0.25 * jerk**2 * (6.0 * np.maximum(way, 0.0) / jerk) ** (4.0 / 3.0))
+def _from_rest(distance: Real, jerk: float) -> Real:
+    """q after a distance from rest at constant jerk."""
+    return np.asarray(0.25 * jerk**2 * (6.0 * np.maximum(distance, 0.0) / jerk) ** (4.0 / 3.0))
 
 
 def _samples(spline: Curve, limits: PlanLimits, low: float, high: float) -> Real:

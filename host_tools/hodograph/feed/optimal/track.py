@@ -210,11 +210,11 @@ def make_track(ends: Ends, stretch: float, joints: Real) -> Track:
     return Track(t_q32, s, shape, joints, stretch)
 
 
-def _hermite(way: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: Real) -> Real:
+def _hermite(distance: Real, h: Real, feed: Real, acceleration: Real, j0: Real, j1: Real) -> Real:
     out = np.zeros((h.size, 8))
     out[:, 1], out[:, 2], out[:, 3] = feed[:-1] * h, acceleration[:-1] * h**2 / 2.0, j0 * h**3 / 6.0
     c1, c2, c3 = out[:, 1], out[:, 2], out[:, 3]
-    p = way - c1 - c2 - c3
+    p = distance - c1 - c2 - c3
     v = feed[1:] * h - c1 - 2.0 * c2 - 3.0 * c3
     a = acceleration[1:] * h**2 - 2.0 * c2 - 6.0 * c3
     j = (j1 - j0) * h**3
@@ -267,9 +267,9 @@ def _limited(
     spline: Curve, limits: PlanLimits, track: Track, part: slice, us: Real
 ) -> Iterator[_Limited]:
     shape, h = track.shape[part, None, :], track.seconds[part, None]
-    way, v, a, j = ((powers(shape, k, us) / h**k).ravel() for k in range(4))
+    distance, v, a, j = ((powers(shape, k, us) / h**k).ravel() for k in range(4))
     starts, ends = track.s[:-1][part], track.s[1:][part]
-    s = (starts[:, None] + way.reshape(-1, us.size)).ravel()
+    s = (starts[:, None] + distance.reshape(-1, us.size)).ravel()
     side = np.tile(np.where(us == 0.0, RIGHT, np.where(us == 1.0, LEFT, 0)), starts.size)
     s = np.where(side == RIGHT, np.repeat(starts, us.size), s)
     s = np.where(side == LEFT, np.repeat(ends, us.size), s)
