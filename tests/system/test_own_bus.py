@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,8 +16,9 @@ from pathlib import Path
 import pytest
 
 from hodograph.bus import own_bus
-from hodograph.bus.hub import is_served
-from hodograph.errors import BusError
+from hodograph.bus.address import parse_address
+from hodograph.bus.hub import LocalHub, is_served
+from hodograph.errors import BusError, InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 ALPHA = ROOT / "examples/alpha.toml"
@@ -63,6 +65,23 @@ def simulated_machine(environment: Mapping[str, str]) -> Iterator[subprocess.Pop
 def setpoints(kernel_run: subprocess.CompletedProcess[str]) -> str:
     assert kernel_run.returncode == 0, kernel_run.stderr
     return str(json.loads(kernel_run.stdout)["setpoints_sha256"])
+
+
+def test_a_long_folder_for_temporary_files_is_left_out(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The system has a limit for the path of a socket, which such a folder can exceed; a relative one is not used."""
+    folder = tmp_path / ("x" * 100)
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    for runtime in (str(folder), "relative", ""):
+        monkeypatch.setenv("XDG_RUNTIME_DIR", runtime)
+        assert own_bus.own_path() == Path(f"/tmp/hodograph-{os.getuid()}/bus")
+    with LocalHub() as hub:
+        assert Path(hub.address.channel).is_relative_to("/tmp")
+        assert not Path(hub.address.channel).is_relative_to(folder)
+    with pytest.raises(InputError, match="107 bytes"):
+        parse_address(f"local:{folder}/bus")
 
 
 def test_run_serves_a_bus_of_its_own_and_says_so(environment: Mapping[str, str]) -> None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import struct
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ BUS_VARIABLE = "HODOGRAPH_BUS"
 """Of the environment: the bus of commands that are not given one."""
 _SIOCGIFFLAGS = 0x8913
 _IFF_UP = 1
+_SOCKET_PATH_BYTES = 107
+"""Of the path of a local bus: a limit of the system."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,16 @@ def parse_address(text: str) -> BusAddress:
         interface, channel = "socketcan", text
     if not interface or not channel:
         raise InputError(f'--bus "{text}": write interface:channel, as in {DEFAULT_BUS}')
+    if interface == "local" and not can_be_bus(Path(channel)):
+        raise InputError(
+            f"--bus: the path of a local bus has {_SOCKET_PATH_BYTES} bytes at most: {channel}"
+        )
     return BusAddress(interface, channel)
+
+
+def can_be_bus(path: Path) -> bool:
+    """Whether the path is short enough for a local bus."""
+    return len(os.fsencode(path)) <= _SOCKET_PATH_BYTES
 
 
 def check_raw(address: BusAddress) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import BusError
-from .address import BusAddress
+from .address import BusAddress, can_be_bus
 from .processes import find_program, guarded
 
 HUB = "hodograph-hub"
@@ -22,6 +22,12 @@ def is_served(path: Path) -> bool:
     """Whether a hub listens there: the socket is there a moment before."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
         return probe.connect_ex(str(path)) == 0
+
+
+def _folder() -> Path:
+    """Where buses without a path are served: the folder for temporary files, unless its name is too long."""
+    folder = Path(tempfile.gettempdir())
+    return folder if can_be_bus(folder / "hodograph-abcdefgh" / "bus99") else Path("/tmp")
 
 
 class LocalHub:
@@ -52,7 +58,7 @@ class LocalHub:
         return self.addresses[0]
 
     def __enter__(self) -> LocalHub:
-        self._folder = tempfile.TemporaryDirectory(prefix="hodograph-")
+        self._folder = tempfile.TemporaryDirectory(prefix="hodograph-", dir=_folder())
         paths = self._paths or [Path(self._folder.name) / name for name in self._names]
         command = [str(find_program(HUB)), *self._words, *map(str, paths)]
         child = self.child = subprocess.Popen(

@@ -14,16 +14,22 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import BusError
-from .address import BUS_VARIABLE, DEFAULT_BUS, BusAddress, check_raw, parse_address
+from .address import BUS_VARIABLE, DEFAULT_BUS, BusAddress, can_be_bus, check_raw, parse_address
 from .hub import LocalHub, is_served
 
 
 def own_path() -> Path:
-    """Where the local bus of this user is served: below $XDG_RUNTIME_DIR, else below the folder for temporary files."""
+    """Where the local bus of this user is served: below $XDG_RUNTIME_DIR, else below the folder for temporary files,
+    else, where the names of these are too long for a bus, below /tmp.
+    """
     runtime = os.environ.get("XDG_RUNTIME_DIR")
-    if runtime and os.access(runtime, os.W_OK):
-        return Path(runtime) / "hodograph" / "bus"
-    return Path(tempfile.gettempdir()) / f"hodograph-{os.getuid()}" / "bus"
+    if runtime and Path(runtime).is_absolute() and os.access(runtime, os.W_OK):
+        below_runtime = Path(runtime) / "hodograph" / "bus"
+        if can_be_bus(below_runtime):
+            return below_runtime
+    name = Path(f"hodograph-{os.getuid()}") / "bus"
+    below_temporary = tempfile.gettempdir() / name
+    return below_temporary if can_be_bus(below_temporary) else "/tmp" / name
 
 
 def bus_address(given: str | None) -> BusAddress:

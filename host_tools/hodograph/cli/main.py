@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import signal
 import sys
@@ -13,13 +14,14 @@ from contextlib import nullcontext
 from importlib import import_module
 from types import FrameType
 
-from ..errors import INTERRUPTED_EXIT_STATUS, HodographError
+from ..errors import INTERRUPTED_EXIT_STATUS, HodographError, InputError
 from .output import WANTED, complain
 from .parser import make_parser
 from .waiting import waiting
 
 TERMINATED_EXIT_STATUS = 143
 """Exit status after SIGTERM (128 + SIGTERM)."""
+_NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 _MODULES = {
@@ -76,6 +78,7 @@ class Terminated(KeyboardInterrupt):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     debug = bool(os.environ.get("HODOGRAPH_DEBUG"))
+    _open_closed_streams()
     try:
         options = make_parser().parse_args(arguments)
         debug = debug or options.debug
@@ -90,18 +93,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _end("interrupted", INTERRUPTED_EXIT_STATUS, debug)
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 1
     except MemoryError:
         return _end("out of memory: the path or the run is too long for this machine", 1, debug)
+    except OSError as error:
+        if error.errno not in _NO_SPACE:
+            return _internal_error(error, debug)
+        if error.filename is None:
+            _drop_output()
+        message = f"{error.filename or 'output'}: cannot be written: {error.strerror}"
+        return _end(message, InputError.exit_status, debug)
     except Exception as error:
-        text = " ".join(str(error).split())
-        return _end(
-            f"internal error, please report it ({type(error).__name__}: {text}); "
-            "HODOGRAPH_DEBUG=1 shows where",
-            1,
-            debug,
-        )
+        return _internal_error(error, debug)
+
+
+def _internal_error(error: Exception, debug: bool) -> int:
+    text = " ".join(str(error).split())
+    return _end(
+        f"internal error, please report it ({type(error).__name__}: {text}); HODOGRAPH_DEBUG=1 shows where",
+        1,
+        debug,
+    )
+
+
+def _open_closed_streams() -> None:
+    """The shell's >&- closes them. What goes to a closed one is lost."""
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+
+
+def _drop_output() -> None:
+    """What waits in stdout cannot be written; without this Python tries again at its end, with a message of its own."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -60,10 +60,15 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
         stream_on(options, address)
         return
     runs = [_run_one(task, address, options) for task in tasks]
+    _print_runs(options, runs)
     if options.trace is not None:
         _write_trace(runs[0], options.trace)
     if options.report is not None:
         _write_report(tasks, runs, options.report)
+
+
+def _print_runs(options: Namespace, runs: list[BusRun | JobRun]) -> None:
+    """Before files are written, which can fail: the machine has moved, and this cannot be had again."""
     if options.json:
         _print_json(options.files, runs)
         return

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from argparse import Namespace
 from pathlib import Path
 
@@ -31,7 +32,7 @@ def init(options: Namespace) -> None:
     write_files(files, force=True)
     for file in files:
         print(file)
-    print(f"next: hodograph simulate {folder / 'path.toml'}")
+    print(f"next: hodograph simulate {shlex.quote(str(folder / 'path.toml'))}")
 
 
 def schema_(options: Namespace) -> None:

@@ -223,3 +223,23 @@ def test_progress_without_these(terminal: Terminal, capsys: pytest.CaptureFixtur
     with redirect_stderr(terminal):
         assert main(["simulate", ALPHA]) == 0
     assert "\r" in terminal.getvalue()
+
+
+def command(*words: str, before: str = "", after: str = "") -> subprocess.CompletedProcess[str]:
+    """`hodograph` by a shell, as with redirections."""
+    line = f'{before} "{sys.executable}" -m hodograph {" ".join(words)} {after}'
+    return subprocess.run(
+        ["bash", "-c", line], capture_output=True, text=True, timeout=120, check=False
+    )
+
+
+def test_a_full_disk_behind_stdout_is_one_message() -> None:
+    done = command("schema", "path", after="> /dev/full")
+    assert done.returncode == 2
+    assert done.stderr == "hodograph: output: cannot be written: No space left on device\n"
+
+
+@pytest.mark.parametrize("stream", [">&-", "2>&-", ">&- 2>&-"])
+def test_closed_streams_change_nothing(stream: str) -> None:
+    done = command("schema", "path", after=stream)
+    assert (done.returncode, done.stderr) == (0, "")
