@@ -10,6 +10,7 @@ between samples is taken from its second differences. docs/theory/numerics.md se
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import perm
 from typing import Protocol
 
 import numpy as np
@@ -99,7 +100,8 @@ def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathK
     track = _track(pieces)
     ends = [end for zone in bounds.limits.zones for end in (zone.from_mm, zone.to_mm)]
     cuts = np.unique(np.concatenate((bounds.spline.segment_starts_mm[1:-1], ends)))
-    cells = _cells(track, cuts)
+    first, behind = track.start[0], track.start[-1] + track.way[-1].sum()
+    cells = _cells(track, cuts[(cuts > first) & (cuts < behind)])
     found = []
     for _ in range(_ROUNDS):
         samples = _evaluate(bounds.spline, track, cells)
@@ -192,10 +194,14 @@ def _taken(samples: PathKinematics, which: NDArray[np.bool_]) -> PathKinematics:
 
 
 def raised(values: Real) -> Real:
-    """Magnitudes of samples (C, K), raised by what they may rise in between, from second differences."""
-    bend = np.abs(np.diff(values, 2, axis=1))
-    bend = np.concatenate((bend[:, :1], bend, bend[:, -1:]), axis=1) / 8.0
-    return np.asarray(np.abs(values) + bend)
+    """Magnitudes of samples (…, K), raised by what they may rise in between, from second differences."""
+    step = values[..., 1:] - values[..., :-1]
+    bend = np.abs(step[..., 1:] - step[..., :-1]) / 8.0
+    out = np.abs(values)
+    out[..., 1:-1] += bend
+    out[..., 0] += bend[..., 0]
+    out[..., -1] += bend[..., -1]
+    return out
 
 
 def _cells(track: _ArcLength, cuts: Real) -> _Cells:
@@ -220,8 +226,7 @@ def _value(distance: Real, u: Real, order: int) -> Real:
     """Derivative `order` of rows of powers (C, 8) at u (C, K)."""
     out = np.zeros_like(u)
     for power in range(7, order - 1, -1):
-        factor = float(np.prod(np.arange(power - order + 1, power + 1)))
-        out = out * u + factor * distance[:, power, None]
+        out = out * u + float(perm(power, order)) * distance[:, power, None]
     return out
 
 

@@ -15,7 +15,7 @@ jerked at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,7 +30,7 @@ from .kinematics import (
     raised,
     sample,
 )
-from .limits import ControllerLimits, Limits, Plant
+from .limits import ControllerLimits, Limits
 from .override_levels import (
     FACTOR_ONE_Q14,
     FULL,
@@ -99,26 +99,34 @@ class _Piece:
     controller: ControllerLimits
     headrooms: Sequence[Headroom]
 
-    def rate(self, at: Real, share: float) -> Real:
-        """Override rate R (M,) for overrides up to `at`, with `share` of the headroom of the jerks."""
+    def rates(self, at: Real, shares: Sequence[float]) -> Iterator[Real]:
+        """Override rate R (M,) for overrides up to `at`, with each of these shares of the headroom of the jerks."""
         left_a = self.controller.acceleration_mm_s2 - at**2 * self.a
         left_j = self.controller.jerk_mm_s3 - at**3 * self.j
-        rate = np.minimum(left_a / self.v, share * left_j / (3.0 * at * self.a))
+        by_rest, by_jerk = left_a / self.v, left_j / (3.0 * at * self.a)
         for headroom in self.headrooms:
-            rate = np.minimum(rate, headroom.rate(at, share))
-        return rate
+            rest, jerk = headroom.rate(at)
+            by_rest, by_jerk = np.minimum(by_rest, rest), np.minimum(by_jerk, jerk)
+        for share in shares:
+            yield np.minimum(by_rest, share * by_jerk)
 
-    def second(self, at: Real, rate: Real) -> Real:
-        """Override acceleration Q (M,) for these overrides and override rates."""
+    def seconds(self, at: Real) -> Callable[[Real], Real]:
+        """Override acceleration Q (M,) for overrides up to `at`, as a function of the override rate R (M,)."""
         left_j = self.controller.jerk_mm_s3 - at**3 * self.j
-        second: Real = (left_j - 3.0 * at * rate * self.a) / self.v
-        for headroom in self.headrooms:
-            second = np.minimum(second, headroom.second(at, rate))
+        others = [headroom.seconds(at) for headroom in self.headrooms]
+
+        def second(rate: Real) -> Real:
+            own = (left_j - 3.0 * at * rate * self.a) / self.v
+            return np.minimum.reduce([own, *(other(rate) for other in others)])
+
         return second
 
-    def codes(self, at: Real, share: float) -> tuple[Codes, Codes]:
-        rate = rate_codes(self.rate(at, share) * _MARGIN)
-        return rate, second_codes(self.second(at, rates_per_s(rate)) * _MARGIN)
+    def codes(self, at: Real, shares: Sequence[float]) -> Iterator[tuple[Codes, Codes]]:
+        """Codes of slope and second derivative (M,) for each share."""
+        second = self.seconds(at)
+        for found in self.rates(at, shares):
+            rate = rate_codes(found * _MARGIN)
+            yield rate, second_codes(second(rates_per_s(rate)) * _MARGIN)
 
 
 def override_bounds(
@@ -167,11 +175,14 @@ def override_bounds(
 
 def _best(piece: _Piece, at: Real, change: Real) -> tuple[Codes, Codes]:
     """Codes for overrides up to `at`, of the share of the jerks with which they change by `change` soonest."""
-    rate, second = piece.codes(at, RATE_SHARES[0])
-    for share in RATE_SHARES[1:] if piece.headrooms else ():
-        other = piece.codes(at, share)
-        better = _move_s(change, *other) < _move_s(change, rate, second)
+    choices = piece.codes(at, RATE_SHARES if piece.headrooms else RATE_SHARES[:1])
+    rate, second = next(choices)
+    taken_s = _move_s(change, rate, second)
+    for other in choices:
+        other_s = _move_s(change, *other)
+        better = other_s < taken_s
         rate, second = np.where(better, other[0], rate), np.where(better, other[1], second)
+        taken_s = np.minimum(taken_s, other_s)
     return rate, second
 
 
@@ -191,18 +202,19 @@ def _ratio(limit: float | None, peak: Real) -> Real:
 
 
 @dataclass(frozen=True, eq=False)
-class Axis:
-    """One axis: raised magnitudes (C, K) and limits (inf: none); volts as velocities, v + T a signed."""
+class Axes:
+    """All A axes: raised magnitudes (A, C, K) and limits (A, 1, 1) (inf: none); volts as velocities, v + T a signed."""
 
     v: Real
     a: Real
     j: Real
-    velocity: float
-    acceleration: float
-    jerk: float
+    velocity: Real
+    acceleration: Real
+    jerk: Real
     signed_v: Real
     signed_a: Real
-    plant: Plant | None
+    reach: Real | None
+    time_constant: Real | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,32 +229,30 @@ class Headroom:
         return sample(self.bounds, self.pieces, filled=True)
 
     @cached_property
-    def axes(self) -> tuple[Axis, ...]:
+    def axes(self) -> Axes:
         """Those that follow the path."""
-        samples, limits = self._samples, self.bounds.limits.axes
+        samples, limits, plants = self._samples, self.bounds.limits.axes, self.bounds.plants
         count = len(samples.velocity)
-        free = (np.inf,) * count
-        plants = self.bounds.plants or (None,) * count
-        return tuple(
-            Axis(
-                raised(v) + _TINY,
-                raised(a) + _TINY,
-                raised(j) + _TINY,
-                (limits.velocity_mm_s or free)[k],
-                (limits.acceleration_mm_s2 or free)[k],
-                (limits.jerk_mm_s3 or free)[k],
-                v,
-                a,
-                plants[k],
-            )
-            for k, (v, a, j) in enumerate(
-                zip(samples.velocity, samples.acceleration, samples.jerk, strict=True)
-            )
+        velocity, acceleration, jerk = (
+            _by_axis(given or (np.inf,) * count)
+            for given in (limits.velocity_mm_s, limits.acceleration_mm_s2, limits.jerk_mm_s3)
+        )
+        return Axes(
+            raised(samples.velocity) + _TINY,
+            raised(samples.acceleration) + _TINY,
+            raised(samples.jerk) + _TINY,
+            velocity,
+            acceleration,
+            jerk,
+            samples.velocity,
+            samples.acceleration,
+            None if plants is None else _by_axis(one.reach_mm_s for one in plants),
+            None if plants is None else _by_axis(one.time_constant_s for one in plants),
         )
 
     def factor(self) -> Real:
         """f (M,), below 1 where a limit is exceeded at an override of 1."""
-        limits, samples = self.bounds.limits, self._samples
+        limits, samples, axes = self.bounds.limits, self._samples, self.axes
         feed = raised(samples.feed) + _TINY
         f = np.full_like(feed, np.inf)
         for zone in limits.zones:
@@ -252,62 +262,66 @@ class Headroom:
             f = np.minimum(
                 f, np.sqrt(limits.centripetal_mm_s2 / (raised(samples.centripetal) + _TINY))
             )
-        for axis in self.axes:
-            f = np.minimum(f, axis.velocity / axis.v)
-            f = np.minimum(f, np.sqrt(_shared_headroom(axis.a, axis.acceleration)))
-            f = np.minimum(f, np.cbrt(_shared_headroom(axis.j, axis.jerk)))
-            if axis.plant is not None:
-                f = np.minimum(f, _factor_of_volts(axis, axis.plant))
-        return least_of_pieces(samples, f, self._count)
+        by_axis = np.minimum(
+            axes.velocity / axes.v, np.sqrt(_shared_headroom(axes.a, axes.acceleration))
+        )
+        by_axis = np.minimum(by_axis, np.cbrt(_shared_headroom(axes.j, axes.jerk)))
+        if axes.reach is not None and axes.time_constant is not None:
+            by_axis = np.minimum(by_axis, _factor_of_volts(axes, axes.reach, axes.time_constant))
+        return self._least(np.minimum(f, by_axis.min(axis=0)))
 
-    def rate(self, factor: Real, share: float) -> Real:
-        """R (M,) for factors (M,), with `share` of the jerks; below 0 where a limit leaves nothing."""
-        f = factor[self._samples.piece, None]
-        rate = np.full_like(self._samples.feed, np.inf)
-        for axis in self.axes:
-            rate = np.minimum(rate, (axis.acceleration - f**2 * axis.a) / axis.v)
-            left = share * (axis.jerk - f**3 * axis.j)
-            rate = np.minimum(rate, left / (3.0 * f * axis.a))
-            if axis.plant is not None:
-                left = axis.plant.reach_mm_s - _greatest_volts(axis, axis.plant, f)
-                rate = np.minimum(rate, left / (axis.plant.time_constant_s * axis.v))
-        return least_of_pieces(self._samples, rate, self._count)
+    def rate(self, factor: Real) -> tuple[Real, Real]:
+        """R (M,) for factors (M,): what accelerations and volts leave, and what all of the jerks does; below 0 where a
+        limit leaves nothing.
+        """
+        axes, f = self.axes, factor[self._samples.piece, None]
+        rest = (axes.acceleration - f**2 * axes.a) / axes.v
+        jerk = (axes.jerk - f**3 * axes.j) / (3.0 * f * axes.a)
+        if axes.reach is not None and axes.time_constant is not None:
+            left = axes.reach - _greatest_volts(axes, axes.time_constant, f)
+            rest = np.minimum(rest, left / (axes.time_constant * axes.v))
+        return self._least(rest.min(axis=0)), self._least(jerk.min(axis=0))
 
-    def second(self, factor: Real, rate: Real) -> Real:
-        """Q (M,) for factors and rates (M,)."""
-        piece = self._samples.piece
-        f, r = factor[piece, None], rate[piece, None]
-        second = np.full_like(self._samples.feed, np.inf)
-        for axis in self.axes:
-            left = axis.jerk - f**3 * axis.j - 3.0 * f * r * axis.a
-            second = np.minimum(second, left / axis.v)
-        return least_of_pieces(self._samples, second, self._count)
+    def seconds(self, factor: Real) -> Callable[[Real], Real]:
+        """Q (M,) for factors (M,), as a function of R (M,)."""
+        axes, piece = self.axes, self._samples.piece
+        f = factor[piece, None]
+        still = (axes.jerk - f**3 * axes.j) / axes.v
+        falls = 3.0 * f * axes.a / axes.v
 
-    @property
-    def _count(self) -> int:
-        return int(self.pieces.duration_q32_s.size)
+        def second(rate: Real) -> Real:
+            return self._least((still - rate[piece, None] * falls).min(axis=0))
+
+        return second
+
+    def _least(self, values: Real) -> Real:
+        """The least of the samples (C, K) of each piece."""
+        return least_of_pieces(self._samples, values, int(self.pieces.duration_q32_s.size))
 
 
-def _shared_headroom(peak: Real, limit: float) -> Real:
+def _by_axis(values: Iterable[float]) -> Real:
+    return np.array(list(values), dtype=np.float64)[:, None, None]
+
+
+def _shared_headroom(peak: Real, limit: Real) -> Real:
     """1 plus half of the headroom above a peak, over the peak; below 1 where there is none."""
     headroom = limit / peak - 1.0
     return np.asarray(1.0 + np.where(headroom > 0.0, FACTOR_SHARE, 1.0) * headroom)
 
 
-def _factor_of_volts(axis: Axis, plant: Plant) -> Real:
+def _factor_of_volts(axes: Axes, reach: Real, time_constant: Real) -> Real:
     """The factor that raises |f v + f^2 T a| <= f^2 (g + |v|) - f |v|, g = |v + T a|, half the way to the reach."""
-    g = raised(axis.signed_v + plant.time_constant_s * axis.signed_a) + _TINY
-    goal = np.maximum(
-        FACTOR_SHARE * (g + plant.reach_mm_s), plant.reach_mm_s * (g > plant.reach_mm_s)
-    )
-    whole = g + axis.v
-    return np.asarray((axis.v + np.sqrt(axis.v**2 + 4.0 * whole * goal)) / (2.0 * whole))
+    g = raised(axes.signed_v + time_constant * axes.signed_a) + _TINY
+    goal = np.maximum(FACTOR_SHARE * (g + reach), reach * (g > reach))
+    whole = g + axes.v
+    return np.asarray((axes.v + np.sqrt(axes.v**2 + 4.0 * whole * goal)) / (2.0 * whole))
 
 
-def _greatest_volts(axis: Axis, plant: Plant, f: Real) -> Real:
+def _greatest_volts(axes: Axes, time_constant: Real, f: Real) -> Real:
     """Greatest |lambda v + lambda^2 T a| over 0 <= lambda <= f: at f, or v^2 / (4 T |a|) where the two pull apart."""
-    pull = plant.time_constant_s * axis.signed_a
-    at_f = raised(f * axis.signed_v + f**2 * pull)
-    apart = (axis.signed_v * pull < 0.0) & (np.abs(axis.signed_v) < 2.0 * f * np.abs(pull))
-    between = axis.v**2 / (4.0 * np.maximum(np.abs(pull), _TINY))
+    pull = time_constant * axes.signed_a
+    at_f = raised(f * axes.signed_v + f**2 * pull)
+    size = np.abs(pull)
+    apart = (axes.signed_v * pull < 0.0) & (np.abs(axes.signed_v) < 2.0 * f * size)
+    between = axes.v**2 / (4.0 * np.maximum(size, _TINY))
     return np.asarray(np.maximum(at_f, np.where(apart, between, 0.0)))

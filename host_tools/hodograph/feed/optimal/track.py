@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import inf
+from math import inf, perm
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -174,8 +174,7 @@ def powers(shape: Real, order: int, u: Real) -> Real:
     """
     out = np.zeros(np.broadcast_shapes(shape.shape[:-1], u.shape))
     for k in range(7, order - 1, -1):
-        factor = float(np.prod(np.arange(k - order + 1, k + 1)))
-        out = out * u + factor * shape[..., k]
+        out = out * u + float(perm(k, order)) * shape[..., k]
     return out
 
 

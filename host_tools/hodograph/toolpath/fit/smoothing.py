@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, solveh_banded
+from scipy.linalg.lapack import dpbsv
 
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -144,11 +144,10 @@ class _Problem:
         for k in range(width):
             off = width - 1 - k
             band[k, off:] *= scale[off:] * scale[: scale.size - off]
-        try:
-            step = solveh_banded(band, -gradient.ravel() * scale, check_finite=False) * scale
-        except LinAlgError:
+        _, step, failed = dpbsv(band, -gradient.ravel() * scale, overwrite_ab=1, overwrite_b=1)
+        if failed:
             return np.asarray(-gradient / flat[:, None])
-        return np.asarray(step.reshape(shift.shape))
+        return np.asarray((step * scale).reshape(shift.shape))
 
     def _longest(self, shift: Real, step: Real) -> float:
         """The greatest multiple of the step that stays inside the bounds."""
