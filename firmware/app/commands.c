@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "canopen/cob.h"
+#include "core/first_axis.h"
 #include "port/port.h"
 
 static enum machine_refusal locked(struct machine *machine,
@@ -47,7 +48,7 @@ static enum machine_refusal program_refusal(struct controller *controller)
     if (!slot->present) {
         return MACHINE_NO_PROGRAM;
     }
-    if (slot->program.header.axis_count > controller->config.axis_count) {
+    if (first_axis_end(&slot->program.header) > controller->config.axis_count) {
         return MACHINE_AXES_MISSING;
     }
     program_slot_refresh(slot, &controller->config);

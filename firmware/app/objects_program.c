@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "canopen/sdo_abort.h"
+#include "core/first_axis.h"
 #include "port/port.h"
 
 /* ---- Sub 1: the image ---- */
@@ -153,13 +154,15 @@ static uint64_t place_number(struct controller *controller, uint8_t sub)
 {
     struct program_slot *slot = &controller->slot;
     program_slot_refresh(slot, &controller->config);
+    const uint32_t first = first_axis(&slot->program.header);
     if (sub >= START_REST) {
         const int32_t *counts = sub < END_REST ? slot->start_counts : slot->end_counts;
         const uint32_t axis = PROGRAM_PLANE + (sub - START_REST) % (AXES_MAX - PROGRAM_PLANE);
-        return axis < slot->program.header.axis_count ? (uint64_t)(int64_t)counts[axis] : 0u;
+        return axis < slot->program.header.axis_count ? (uint64_t)(int64_t)counts[first + axis]
+                                                      : 0u;
     }
     const int32_t *counts = sub < 14u ? slot->start_counts : slot->end_counts;
-    return (uint64_t)(int64_t)counts[sub & 1u];
+    return (uint64_t)(int64_t)counts[first + (sub & 1u)];
 }
 
 uint64_t object_read_program(struct controller *controller, const struct od_entry *entry)

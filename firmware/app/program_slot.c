@@ -8,6 +8,7 @@
 #include "app/machine/path_counts.h"
 #include "app/program_table.h"
 #include "core/coefficients.h"
+#include "core/first_axis.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)
@@ -71,11 +72,11 @@ static int check(const struct program_slot *slot, const struct program *program,
                  const struct config *config, struct program_fault *fault)
 {
     struct program_limits limits;
-    if (program->header.axis_count > config->axis_count) {
+    if (first_axis_end(&program->header) > config->axis_count) {
         *fault = (struct program_fault){.code = PROGRAM_ERR_AXES, .index = 0};
         return fault->code;
     }
-    config_limits(config, &limits);
+    config_limits(config, first_axis(&program->header), &limits);
     limits.attend = slot->attend;
     limits.self = slot->self;
     return program_check(program, &limits, fault);

@@ -34,7 +34,7 @@ struct program_slot {
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */
     int32_t start_counts
-        [AXES_MAX]; /* first and last setpoint with the present configuration: of the program's axes */
+        [AXES_MAX]; /* first and last setpoint with the present configuration, by axis of the machine */
     int32_t end_counts[AXES_MAX];
     unsigned bank;         /* of the active program */
     uint32_t sequence;     /* of its record */

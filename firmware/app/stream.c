@@ -103,7 +103,7 @@ static int check_program(const struct stream *stream, struct chunk *chunk,
     if (chunk->program.header.axis_count > config->axis_count) {
         return PROGRAM_ERR_AXES;
     }
-    config_limits(config, &limits);
+    config_limits(config, 0, &limits);
     limits.attend = stream->attend;
     limits.self = stream->self;
     return chunk_check(chunk, previous, &limits, fault);

@@ -4,6 +4,7 @@
 #include "core/program_check.h"
 
 #include "core/event_check.h"
+#include "core/first_axis.h"
 #include "core/limit_check.h"
 #include "core/piece_check.h"
 #include "core/segment_check.h"
@@ -47,11 +48,13 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    const uint32_t flags = PROGRAM_FLAG_CLOSED | (limits->chunk != 0 ? PROGRAM_FLAG_MOVING : 0u);
+    const uint32_t flags =
+        PROGRAM_FLAG_CLOSED | (limits->chunk != 0 ? PROGRAM_FLAG_MOVING : FIRST_AXIS_FLAGS);
     if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }
-    if (limits->axis_count != 0 && limits->axis_count != h->axis_count) {
+    if (first_axis_end(h) > PROGRAM_AXES ||
+        (limits->axis_count != 0 && limits->axis_count != h->axis_count)) {
         return PROGRAM_ERR_AXES;
     }
     if (h->length_q40_mm <= 0 || h->length_q40_mm >= (int64_t)1 << 62) {

@@ -145,6 +145,8 @@ class JobSection:
     before  commands that happen at rest, before it starts
     events  commands on the way, with the arc lengths in mm where they happen
     tied    whether it begins and ends in motion, as a part of a longer section
+    stands_at  of a section that turns axes alone: where x, y and z stand, mm; its lengths and feeds are in degrees. None: it
+               goes a way
     """
 
     fitted: FittedPath
@@ -153,6 +155,18 @@ class JobSection:
     before: tuple[Command, ...]
     events: tuple[tuple[float, Command], ...]
     tied: tuple[bool, bool] = (False, False)
+    stands_at: tuple[float, float, float] | None = None
+
+    @property
+    def length_mm(self) -> float:
+        """Way of x, y and z."""
+        return self.fitted.curve.length_mm if self.stands_at is None else 0.0
+
+    @property
+    def standing_mm(self) -> Real:
+        """Where the axes before those of its program stand, in the order of the path, without the work offset."""
+        first = self.pipeline.machine.first_axis
+        return np.array((self.stands_at or ())[:first], dtype=np.float64)
 
     @property
     def first_line(self) -> int:
@@ -203,7 +217,8 @@ class Job:
     @property
     def deviation_um(self) -> float:
         """Bound of the distance between the programmed path and the curves, both ways."""
-        return 1000.0 * max(section.fitted.deviation_mm for section in self.sections)
+        ways = [one.fitted.deviation_mm for one in self.sections if one.stands_at is None]
+        return 1000.0 * max(ways, default=0.0)
 
     @property
     def lines(self) -> int:
@@ -218,8 +233,8 @@ class Job:
 
     @property
     def length_mm(self) -> float:
-        """Length of all curves."""
-        return sum(section.fitted.curve.length_mm for section in self.sections)
+        """Length of all curves of x, y and z."""
+        return sum(section.length_mm for section in self.sections)
 
     @property
     def dwell_s(self) -> float:
@@ -345,12 +360,19 @@ class SectionMaker:
 
     def made(self, section: Section) -> Iterator[JobSection]:
         """The section, or its parts where no curve was found within the tolerance."""
+        if section.stands_at is not None:
+            yield from self._parts(self._on_turning_axes(section))
+            return
         if self.feed_mm_s is not None:
             reference = section.reference
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
             section = replace(section, reference=replace(reference, feed_mm_s=feed))
         self._check_plane(section)
-        found = fit(section.reference, Tolerance(section.tolerance_mm, self._limits), section.tied)
+        yield from self._parts(section)
+
+    def _parts(self, section: Section) -> Iterator[JobSection]:
+        limits = _motion_limits(self._moving(section))
+        found = fit(section.reference, Tolerance(section.tolerance_mm, limits), section.tied)
         if isinstance(found, FittedPath):
             yield self._section(section, found)
             return
@@ -367,16 +389,28 @@ class SectionMaker:
             )
         places = np.union1d(reference.place_mm[chord], reference.place_mm[chord + 1])
         for part in cut_at(section, places):
-            yield from self.made(part)
+            yield from self._parts(part)
 
-    @property
-    def _limits(self) -> MotionLimits:
-        axes = self.machine.path_axes[:3]
-        return MotionLimits(
-            min(self.machine.feed_mm_s, *(axis.velocity_mm_s for axis in axes)),
-            min(self.machine.acceleration_mm_s2, *(axis.acceleration_mm_s2 for axis in axes)),
-            min(self.machine.jerk_mm_s3, *(axis.jerk_mm_s3 for axis in axes)),
-        )
+    def _moving(self, section: Section) -> Machine:
+        """The machine, with the axes that the program of the section moves."""
+        return self.machine if section.stands_at is None else self.machine.turning
+
+    def _on_turning_axes(self, section: Section) -> Section:
+        """A section that turns a, b and c alone, with the coordinates of the axes of its program as points.
+
+        Raises InputError: one that turns is no axis of the machine.
+        """
+        assert section.stands_at is not None
+        reference = section.reference
+        self._check_turning(reference.point, reference.line)
+        point = np.zeros_like(reference.point)
+        for k, axis in enumerate(self.machine.turning.path_axes):
+            name = axis.name.lower()
+            if name in AXES[3:]:
+                point[:, k] = reference.point[:, AXES.index(name) - 3]
+            elif k < len(AXES) - 3 and self.machine.turning.first_axis + k < 3:
+                point[:, k] = section.stands_at[self.machine.turning.first_axis + k]
+        return replace(section, reference=replace(reference, point=point))
 
     def _check_plane(self, section: Section) -> None:
         if len(self.machine.path_axes) > 2:
@@ -391,25 +425,31 @@ class SectionMaker:
 
     def _turned(self, section: Section, fitted: FittedPath) -> FittedPath:
         """With the axes of the machine that turn along. Raises InputError and PlanError, naming file and line."""
-        angles, extra = section.reference.turn_deg, self.machine.path_axes[3:]
+        angles = section.reference.turn_deg
         if angles is None:
             return fitted
-        names = [axis.name.lower() for axis in extra]
-        for k, name in enumerate(AXES[3:]):
-            if name not in names and angles[:, k].any():
-                line = section.reference.line[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
-                raise InputError(
-                    f"{self.file}:{line}: the move turns {name.upper()}, but no axis {name} of "
-                    f'{self.machine.file.name} follows the path: name it behind "z" in path = [...] at its top, '
-                    "or leave it out"
-                )
+        self._check_turning(angles, section.reference.line)
+        names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
         columns = [AXES.index(name) - 3 if name in AXES[3:] else None for name in names]
         try:
             return with_turning(fitted, columns, section.tolerance_mm)
         except PlanError as error:
             raise PlanError(f"{self.file}: {error}") from None
 
+    def _check_turning(self, angles: Real, lines: Int) -> None:
+        """Raises InputError, naming the line, where a, b or c turns, which is no axis of the machine's path."""
+        names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
+        for k, name in enumerate(AXES[3:]):
+            if name not in names and angles[:, k].any():
+                line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
+                raise InputError(
+                    f"{self.file}:{line}: the move turns {name.upper()}, but no axis {name} of "
+                    f'{self.machine.file.name} follows the path: name it behind "z" in path = [...] at its top, '
+                    "or leave it out"
+                )
+
     def _section(self, section: Section, fitted: FittedPath) -> JobSection:
+        machine = self._moving(section)
         fitted = self._turned(section, fitted)
         nominal, zones = _feeds(fitted)
         first = int(section.reference.line[0])
@@ -422,17 +462,18 @@ class SectionMaker:
             limits=Limits(zones=zones),
             machine_file=None,
         )
-        self._check_travel(section, fitted)
+        self._check_travel(section, fitted, machine)
         places = fitted.arc_length_at(np.array([event.place_mm for event in section.events]))
         events = tuple(
             (float(s), event.command) for s, event in zip(places, section.events, strict=True)
         )
-        pipeline = SectionPipeline(file, self.machine, fitted)
+        pipeline = SectionPipeline(file, machine, fitted)
         return JobSection(
-            fitted, section.tolerance_mm, pipeline, section.before, events, section.tied
+            *(fitted, section.tolerance_mm, pipeline, section.before, events, section.tied),
+            section.stands_at,
         )
 
-    def _check_travel(self, section: Section, fitted: FittedPath) -> None:
+    def _check_travel(self, section: Section, fitted: FittedPath, machine: Machine) -> None:
         """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""
         curve, reference = fitted.curve, section.reference
         coefficients, given = curve.position_coefficients, reference.point
@@ -440,8 +481,8 @@ class SectionMaker:
             coefficients = np.concatenate((coefficients, curve.extra), axis=1)
             starts = np.clip(fitted.arc_length_at(reference.place_mm), 0.0, curve.length_mm)
             given = np.concatenate((given, curve.extra_point(starts)), axis=1)
-        for k, axis in enumerate(self.machine.path_axes[: coefficients.shape[1]]):
-            offset = self.machine.offset_mm[k]
+        for k, axis in enumerate(machine.path_axes[: coefficients.shape[1]]):
+            offset = machine.offset_mm[k]
             low = coefficients[:, k].min(axis=1) + offset
             high = coefficients[:, k].max(axis=1) + offset
             out = (low < axis.travel_min_mm - _ROUNDING_MM) | (
@@ -458,6 +499,15 @@ class SectionMaker:
                 f"offset, its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} {axis.unit}: "
                 "change [work] offset_mm, or the program"
             )
+
+
+def _motion_limits(machine: Machine) -> MotionLimits:
+    axes = machine.path_axes[:3]
+    return MotionLimits(
+        min(machine.feed_mm_s, *(axis.velocity_mm_s for axis in axes)),
+        min(machine.acceleration_mm_s2, *(axis.acceleration_mm_s2 for axis in axes)),
+        min(machine.jerk_mm_s3, *(axis.jerk_mm_s3 for axis in axes)),
+    )
 
 
 def _chord_of(fitted: FittedPath, segment: int) -> int:
@@ -510,6 +560,13 @@ class JobMotion:
         """Time of the motion, from the first tick to the last, without dwells."""
         return (self.ticks - 1) * self.period_s
 
+    @property
+    def _on_the_way(self) -> Iterator[Motion]:
+        """Those in which x, y or z move: errors of the others are in degrees."""
+        for section, motion in zip(self.job.sections, self.motions, strict=True):
+            if section.stands_at is None:
+                yield motion
+
     def summary(self) -> dict[str, object]:
         """The keys that tools may rely on in `--json` output."""
         return self.job.summary() | {
@@ -517,8 +574,12 @@ class JobMotion:
             "ticks": self.ticks,
             "planning_s": self.planning_s,
             "fit_s": self.job.fit_s,
-            "max_contour_error_um": max(motion.max_contour_error_um for motion in self.motions),
-            "max_following_error_um": max(motion.max_following_error_um for motion in self.motions),
+            "max_contour_error_um": max(
+                (motion.max_contour_error_um for motion in self._on_the_way), default=0.0
+            ),
+            "max_following_error_um": max(
+                (motion.max_following_error_um for motion in self._on_the_way), default=0.0
+            ),
             "section": [
                 section.lines_summary() | motion.summary()
                 for section, motion in zip(self.job.sections, self.motions, strict=True)
@@ -539,7 +600,8 @@ def simulate_job(
     planning_s = perf_counter() - begin
     motions = []
     for done, image in enumerate(images):
-        motions.append(simulate_on(job.machine, image, kernel, keep_rows=keep_rows))
+        machine = job.sections[done].pipeline.machine
+        motions.append(simulate_on(machine, image, kernel, keep_rows=keep_rows))
         if progress is not None:
             progress(done + 1, len(images))
     return JobMotion(job, tuple(motions), planning_s)
@@ -548,7 +610,8 @@ def simulate_job(
 def write_job_trace(run: JobMotion, file: Path) -> None:
     """One row a tick: tick, t_s, source line, arc length, feed, commanded and actual positions of the axes.
 
-    Positions are in the program's own coordinates: without the work offset. Raises InputError.
+    Positions are in the program's own coordinates: without the work offset. In sections that turn axes alone, arc length
+    stands still and the feed is in degrees a second. Raises InputError.
     """
     machine = run.job.machine
     named = [(axis.name, axis.unit) for axis in machine.path_axes]
@@ -568,7 +631,6 @@ def write_job_trace(run: JobMotion, file: Path) -> None:
 
 def _trace_rows(run: JobMotion) -> Iterator[str]:
     tick, passed_mm = 0, 0.0
-    offset = np.array(run.job.machine.offset_mm)
     for index, (section, motion) in enumerate(zip(run.job.sections, run.motions, strict=True)):
         first = 1 if index else 0
         rows = slice(first, motion.ticks)
@@ -578,12 +640,20 @@ def _trace_rows(run: JobMotion) -> Iterator[str]:
             np.arange(tick, tick + count),
             np.arange(tick, tick + count) * run.period_s,
             section.line_at(own),
-            passed_mm + own,
+            passed_mm + (own if section.stands_at is None else np.zeros(count)),
             motion.feed_mm_s[rows],
-            *(motion.cmd_mm[rows] - offset).T,
-            *(motion.act_mm[rows] - offset).T,
+            *_places(section, motion.cmd_mm[rows]),
+            *_places(section, motion.act_mm[rows]),
         ]
         texts = [map(repr, column.tolist()) for column in columns]
         yield from (",".join(row) + "\n" for row in zip(*texts, strict=True))
         tick += count
-        passed_mm += section.fitted.curve.length_mm
+        passed_mm += section.length_mm
+
+
+def _places(section: JobSection, moved_mm: Real) -> Real:
+    """Positions (axes, n) of the path's axes without the work offset, of those (n, k) of the axes of a program."""
+    machine = section.pipeline.machine
+    own = moved_mm - np.array(machine.offset_mm)
+    stands = np.broadcast_to(section.standing_mm, (len(own), machine.first_axis))
+    return np.concatenate((stands, own), axis=1).T

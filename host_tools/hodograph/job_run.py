@@ -19,7 +19,7 @@ from .bus.goto import goto
 from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
 from .bus.sdo.controller import READY
 from .errors import PlanError, RunError
-from .job import Job, JobMotion
+from .job import Job, JobMotion, JobSection
 from .native import NativeProgram
 from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
@@ -141,12 +141,12 @@ def run_job(
     runs: list[BusRun] = []
     failure: RunError | None = None
     passed = 0
-    _to_start(at, made, made.programs[0], unhomed)
+    _to_start(at, job.sections[0], made, made.programs[0], unhomed)
     for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
         at_rest(at, job.file, section.before, operator)
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
         # No move, unless an operator moved the axes during the stop.
-        _to_start(at, made, program, unhomed)
+        _to_start(at, section, made, program, unhomed)
         done = passed
         recorded = record_program(
             at,
@@ -155,12 +155,13 @@ def run_job(
             None if progress is None else _shifted(progress, done),
             unhomed=unhomed,
         )
-        _require_end(at, made, program, place)
+        _require_end(at, section, made, program, place)
         passed += program.ticks
         say(at, job.file, [command for _, command in section.events])
         try:
             file = _record_of(record, number, job)
-            runs.append(analysed(at, job.machine, program.image, made.kernel, recorded, file))
+            machine = section.pipeline.machine
+            runs.append(analysed(at, machine, program.image, made.kernel, recorded, file))
         except SetpointJumpError as error:
             raise RunError(f"{place}: {error}") from None
         except RunError as error:
@@ -182,11 +183,13 @@ def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
     return record.with_name(f"{record.stem}.{number}{record.suffix}")
 
 
-def _setpoint(made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
-    counts_per_mm = made.job.machine.path_counts
-    _, setpoints = program.setpoints(made.kernel, counts_per_mm, tick, 1)
-    found: list[int] = setpoints[0].tolist()
-    return found
+def _place(section: JobSection, made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
+    """Where a tick of a section has all axes of the path, in counts."""
+    moved, machine = section.pipeline.machine, made.job.machine
+    _, setpoints = program.setpoints(made.kernel, moved.path_counts, tick, 1)
+    stands = section.standing_mm + machine.offset_mm[: moved.first_axis]
+    counts = np.rint(stands * machine.path_counts[: moved.first_axis])
+    return [*counts.astype(int).tolist(), *setpoints[0].tolist()]
 
 
 def _off_counts(at: RunSession, place: list[int]) -> int:
@@ -194,15 +197,20 @@ def _off_counts(at: RunSession, place: list[int]) -> int:
     return int(np.abs(np.subtract(at.controller.targets(len(place)), place)).max())
 
 
-def _to_start(at: RunSession, made: PreparedJob, program: NativeProgram, unhomed: bool) -> None:
-    start = _setpoint(made, program, 0)
+def _to_start(
+    at: RunSession, section: JobSection, made: PreparedJob, program: NativeProgram, unhomed: bool
+) -> None:
+    start = _place(section, made, program, 0)
     if _off_counts(at, start) > _START_COUNTS:
         goto(at.controller, made.job.machine, start, unhomed=unhomed)
 
 
-def _require_end(at: RunSession, made: PreparedJob, program: NativeProgram, place: str) -> None:
+def _require_end(
+    at: RunSession, section: JobSection, made: PreparedJob, program: NativeProgram, place: str
+) -> None:
     """Raises RunError: the axes stand, but not where the program ends."""
-    if _off_counts(at, _setpoint(made, program, program.ticks)) > 0:
+    end, first = _place(section, made, program, program.ticks), section.pipeline.machine.first_axis
+    if list(at.controller.targets(len(end)))[first:] != end[first:]:
         raise RunError(f"{place}: stopped before its end: the job ends here")
 
 

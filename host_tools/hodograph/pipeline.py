@@ -438,6 +438,7 @@ class Pipeline:
                     machine.period_us,
                     self.stop_terms,
                     events,
+                    machine.first_axis,
                 ),
                 self._replan,
             )

@@ -2,6 +2,8 @@
 /* Tests of app/machine/config.h: the configuration of the host as one value. */
 #include "app/machine/config.h"
 
+#include <string.h>
+
 #include "od_controller.h"
 #include "unity.h"
 
@@ -30,7 +32,7 @@ static struct program_limits limits_of(int32_t min_counts, int32_t max_counts,
                  {.acceleration_limit_um_s2 = 5, .jerk_limit_mm_s3 = 6}},
     };
     struct program_limits limits;
-    config_limits(&config, &limits);
+    config_limits(&config, 0, &limits);
     return limits;
 }
 
@@ -160,11 +162,18 @@ static void test_an_axis_that_turns(void)
     TEST_ASSERT_EQUAL_UINT32(500, config_tolerance_counts(&config, 4));
     TEST_ASSERT_EQUAL_UINT32(8000000, config.apart_counts[3]); /* 20 ms at 400 mm/s */
     TEST_ASSERT_EQUAL_UINT32(720000, config.apart_counts[4]);  /* and at 360 deg/s */
-    config_limits(&config, &limits);
+    config_limits(&config, 0, &limits);
     TEST_ASSERT_EQUAL_INT64(36 * Q40, limits.max_q40_mm[3]);
     TEST_ASSERT_EQUAL_INT64(-12 * Q40, limits.min_q40_mm[4]);
     TEST_ASSERT_EQUAL_INT64(360 * Q40, limits.max_q40_mm[4]);
     TEST_ASSERT_EQUAL_UINT32(360000, limits.axis_velocity_um_s[4]);
+    memset(&limits, 0xff, sizeof limits);
+    config_limits(&config, 3, &limits); /* of a program that moves the axes from 3 on */
+    TEST_ASSERT_EQUAL_INT64(36 * Q40, limits.max_q40_mm[0]);
+    TEST_ASSERT_EQUAL_INT64(-12 * Q40, limits.min_q40_mm[1]);
+    TEST_ASSERT_EQUAL_UINT32(360000, limits.axis_velocity_um_s[1]);
+    TEST_ASSERT_EQUAL_INT64(0, limits.max_q40_mm[3]); /* there is no axis 6 */
+    TEST_ASSERT_EQUAL_UINT32(0, limits.chunk);        /* so no program may begin in motion */
     struct config other = config;
     TEST_ASSERT_TRUE(config_same_zero(&config, &other, 4));
     other.axis[4].counts_per_unit = 100001;

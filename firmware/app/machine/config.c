@@ -282,22 +282,36 @@ static int64_t q40_from_counts(int32_t counts, uint32_t counts_per_mm, bool upwa
     return negative ? -(int64_t)q40 : (int64_t)q40;
 }
 
-void config_limits(const struct config *config, struct program_limits *limits)
+static void limits_of_axis(const struct config *config, uint32_t axis, uint32_t i,
+                           struct program_limits *limits)
 {
-    limits->axis_count = 0; /* any: those beyond the program's hold their position */
+    const uint32_t counts_per_unit = config_counts_per_unit(config, axis);
+    limits->min_q40_mm[i] = q40_from_counts(config->travel_min_counts[axis], counts_per_unit, true);
+    limits->max_q40_mm[i] =
+        q40_from_counts(config->travel_max_counts[axis], counts_per_unit, false);
+    limits->axis_velocity_um_s[i] = config->axis[axis].velocity_limit_um_s;
+    limits->axis_acceleration_um_s2[i] = config->axis[axis].acceleration_limit_um_s2;
+    limits->axis_jerk_mm_s3[i] = config->axis[axis].jerk_limit_mm_s3;
+}
+
+void config_limits(const struct config *config, uint32_t first_axis, struct program_limits *limits)
+{
+    limits->axis_count = 0; /* any: those that the program does not move hold their position */
     limits->period_us = config->period_us;
     limits->feed_um_s = config->feed_limit_um_s;
     limits->acceleration_um_s2 = config->acceleration_limit_um_s2;
     limits->jerk_mm_s3 = config->jerk_limit_mm_s3;
     limits->stop_time_ms = config->stop_time_ms;
-    for (uint8_t i = 0; i < AXES_MAX; ++i) {
-        const uint32_t counts_per_unit = config_counts_per_unit(config, i);
-        limits->min_q40_mm[i] =
-            q40_from_counts(config->travel_min_counts[i], counts_per_unit, true);
-        limits->max_q40_mm[i] =
-            q40_from_counts(config->travel_max_counts[i], counts_per_unit, false);
-        limits->axis_velocity_um_s[i] = config->axis[i].velocity_limit_um_s;
-        limits->axis_acceleration_um_s2[i] = config->axis[i].acceleration_limit_um_s2;
-        limits->axis_jerk_mm_s3[i] = config->axis[i].jerk_limit_mm_s3;
+    limits->chunk = 0;
+    for (uint32_t i = 0; i < AXES_MAX; ++i) {
+        if (first_axis + i < AXES_MAX) {
+            limits_of_axis(config, first_axis + i, i, limits);
+        } else {
+            limits->min_q40_mm[i] = 0;
+            limits->max_q40_mm[i] = 0;
+            limits->axis_velocity_um_s[i] = 0;
+            limits->axis_acceleration_um_s2[i] = 0;
+            limits->axis_jerk_mm_s3[i] = 0;
+        }
     }
 }

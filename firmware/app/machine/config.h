@@ -136,7 +136,9 @@ static inline uint32_t config_tolerance_counts(const struct config *config, uint
  * other. Pure. */
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
-/* The limits in the form that program_check takes; travel is rounded inwards. Main loop. */
-void config_limits(const struct config *config, struct program_limits *limits);
+/* The limits in the form that program_check takes, for a program whose axes begin at this one of the machine
+ * (core/first_axis.h); travel is rounded inwards. Axes beyond the last one have no
+ * travel. It is no chunk; attend and self are left as they are. Main loop. */
+void config_limits(const struct config *config, uint32_t first_axis, struct program_limits *limits);
 
 #endif

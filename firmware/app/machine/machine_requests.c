@@ -167,13 +167,13 @@ static enum machine_refusal start_refusal(const struct machine *machine,
     if (machine->state != MACHINE_READY) {
         return MACHINE_DRIVES_OFF;
     }
-    if (machine->config.axis_count < motion_axis_count(prepared)) {
+    if (machine->config.axis_count < motion_axes_end(prepared)) {
         return MACHINE_AXES_MISSING;
     }
     if (!machine->unhomed_allowed && machine_unhomed(machine) != 0u) {
         return MACHINE_NOT_HOMED;
     }
-    for (uint32_t i = 0; i < motion_axis_count(prepared); ++i) {
+    for (uint32_t i = motion_first_axis(prepared); i < motion_axes_end(prepared); ++i) {
         const uint32_t tolerance_counts = config_tolerance_counts(&machine->config, i);
         if (axis_distance(&machine->axes[i], start_counts[i]) > tolerance_counts) {
             return MACHINE_AWAY_FROM_START;

@@ -72,7 +72,8 @@ static void next_targets(struct machine *machine)
         machine_raise_quick(machine, EMCY_SOFTWARE, 0, (uint32_t)-result);
         return;
     }
-    for (uint32_t i = 0; i < motion_axis_count(&machine->motion); ++i) {
+    const uint32_t end = motion_axes_end(&machine->motion);
+    for (uint32_t i = motion_first_axis(&machine->motion); i < end; ++i) {
         machine->axes[i].target_counts = target_counts[i];
     }
     machine->statistics.program_tick = machine->motion.setpoints - 1u;

@@ -58,14 +58,26 @@ static inline bool motion_wants_records(const struct motion *motion)
     return feed_override_wants_records(&motion->feed, &motion->interp) != 0;
 }
 
-/* The next setpoint: targets of the program's path axes. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
+/* The next setpoint: targets of the axes that the program moves, by axis of the machine. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
  * Timer. */
 int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX]);
 
-/* How many axes follow the path: the first ones of the machine. Pure. */
+/* How many axes the motion moves. Pure. */
 static inline uint32_t motion_axis_count(const struct motion *motion)
 {
     return motion->scale.axis_count;
+}
+
+/* The axes of the machine that it moves: from this one on, */
+static inline uint32_t motion_first_axis(const struct motion *motion)
+{
+    return motion->scale.first_axis;
+}
+
+/* and below this one. Pure. */
+static inline uint32_t motion_axes_end(const struct motion *motion)
+{
+    return motion_first_axis(motion) + motion_axis_count(motion);
 }
 
 /* Before motion_step in each tick: counts the ticks of a rest between two chunks. True: this tick repeats the last setpoint, and

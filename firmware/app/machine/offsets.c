@@ -33,11 +33,12 @@ void offsets_step(struct offsets *offsets, const struct config *config, const st
         return;
     }
     const int64_t *position_q40 = motion->point.position_q40;
-    for (uint32_t i = 0; i < motion_axis_count(motion); ++i) {
+    const uint32_t first = motion_first_axis(motion);
+    for (uint32_t i = first; i < motion_axes_end(motion); ++i) {
         const struct feedforward_gains gains = gains_of(config, i);
         if (seen == 0u) { /* a motion begins at rest */
-            feedforward_begin(&offsets->axes[i], position_q40[i]);
+            feedforward_begin(&offsets->axes[i], position_q40[i - first]);
         }
-        offset[i] = feedforward_next(&offsets->axes[i], &gains, position_q40[i]);
+        offset[i] = feedforward_next(&offsets->axes[i], &gains, position_q40[i - first]);
     }
 }

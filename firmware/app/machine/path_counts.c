@@ -4,15 +4,16 @@
 
 #include <stddef.h>
 
+#include "core/first_axis.h"
 #include "core/kernel.h"
 
 void path_counts_init(struct path_counts *scale, const struct program *program,
                       const struct config *config)
 {
+    scale->first_axis = first_axis(&program->header);
     scale->axis_count = program->header.axis_count;
-    scale->per_mm = config->counts_per_mm;
-    for (uint32_t i = PROGRAM_SPACE; i < PROGRAM_AXES; ++i) {
-        scale->per_unit[i - PROGRAM_SPACE] = config_counts_per_unit(config, i);
+    for (uint32_t i = 0; i < scale->axis_count; ++i) {
+        scale->per_unit[i] = config_counts_per_unit(config, scale->first_axis + i);
     }
 }
 
@@ -35,8 +36,8 @@ void path_counts_ends(const struct program *program, const struct config *config
 void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,
                       int32_t counts[AXES_MAX])
 {
-    counts[PROGRAM_PLANE] = counts_from_q40_mm(point->position_q40[PROGRAM_PLANE], scale->per_mm);
-    for (uint32_t i = PROGRAM_SPACE; i < scale->axis_count; ++i) {
-        counts[i] = counts_from_q40_mm(point->position_q40[i], scale->per_unit[i - PROGRAM_SPACE]);
+    int32_t *own = counts + scale->first_axis;
+    for (uint32_t i = PROGRAM_PLANE; i < scale->axis_count; ++i) {
+        own[i] = counts_from_q40_mm(point->position_q40[i], scale->per_unit[i]);
     }
 }

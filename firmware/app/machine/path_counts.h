@@ -10,16 +10,16 @@
 #include "core/interpolator.h"
 
 struct path_counts {
-    uint32_t axis_count;                             /* of the program: 2 ... AXES_MAX */
-    uint32_t per_mm;                                 /* of the axes that draw the path */
-    uint32_t per_unit[PROGRAM_AXES - PROGRAM_SPACE]; /* of the extra axes, which may turn */
+    uint32_t first_axis;             /* of the machine that the program moves (core/first_axis.h) */
+    uint32_t axis_count;             /* of the program: 2 ... AXES_MAX */
+    uint32_t per_unit[PROGRAM_AXES]; /* by axis of the program: counts of a mm, or of a degree */
 };
 
 void path_counts_init(struct path_counts *scale, const struct program *program,
                       const struct config *config);
 
-/* First and last setpoint of a program with the configured kernel; unchanged where this image does not have it. Main
- * loop. */
+/* First and last setpoint of a program with the configured kernel, by axis of the machine; unchanged where this image does
+ * not have it. Main loop. */
 void path_counts_ends(const struct program *program, const struct config *config,
                       int32_t start_counts[AXES_MAX], int32_t end_counts[AXES_MAX]);
 
@@ -27,12 +27,13 @@ void path_counts_ends(const struct program *program, const struct config *config
 void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,
                       int32_t counts[AXES_MAX]);
 
-/* Counts of the program's path axes; the others are left as they are. */
+/* Counts of the axes that the program moves, by axis of the machine; the others are left as they are. */
 static inline void path_counts_of(const struct path_counts *scale,
                                   const struct interpolator_point *point, int32_t counts[AXES_MAX])
 {
-    counts[0] = counts_from_q40_mm(point->position_q40[0], scale->per_mm);
-    counts[1] = counts_from_q40_mm(point->position_q40[1], scale->per_mm);
+    int32_t *own = counts + scale->first_axis;
+    own[0] = counts_from_q40_mm(point->position_q40[0], scale->per_unit[0]);
+    own[1] = counts_from_q40_mm(point->position_q40[1], scale->per_unit[1]);
     if (scale->axis_count > PROGRAM_PLANE) {
         path_counts_rest(scale, point, counts);
     }

@@ -105,7 +105,7 @@ def _stretch(frames: Frames, image: bytes, machine: Machine, kernel: str) -> Fra
         rows = np.stack(
             [_targets(frames, sync_at[begin : end + 1], RPDO1 + n) for n in machine.nodes], axis=1
         )
-        first = program_tick(rows[:, : setpoints.shape[1]], setpoints)
+        first = program_tick(rows[_columns(machine, setpoints)], setpoints)
         if first is not None:
             last = first + program.ticks + settling_ticks(machine.period_us) + REACHED_AFTER
             start = sync_at[max(begin, begin + first - _AROUND)]
@@ -160,7 +160,7 @@ def _motion(
         volts_mv = np.zeros(ticks.targets.shape, dtype=np.int16)
     else:
         volts_mv = ticks.volts_mv
-    path = np.s_[:, : setpoints.shape[1]]
+    path = _columns(machine, setpoints)
     found = program_tick(ticks.targets[path], setpoints)
     first = first_tick(ticks.targets[path], setpoints) if found is None else found
     count = program.ticks + settling_ticks(machine.period_us)
@@ -179,6 +179,12 @@ def _motion(
         latched=latched,
     )
     return motion if ticks.volts_mv is not None else replace(motion, max_volts=None)
+
+
+def _columns(machine: Machine, setpoints: NDArray[np.int32]) -> tuple[slice, slice]:
+    """Of rows of all axes of a machine, those that a program moves."""
+    first = machine.first_axis
+    return np.s_[:, first : first + setpoints.shape[1]]
 
 
 def program_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int | None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +57,8 @@ class Machine:
     """Room for a program in the controller's memory (0x2041 sub 1), for `compile`'s warning; None: not known."""
     outputs: Outputs | None = None
     """The outputs that a path switches; None: there is no I/O module."""
+    first_axis: int = 0
+    """The first axis that a program moves; not 0 only in what `turning` gives."""
 
     @property
     def start_tolerance_counts(self) -> int:
@@ -94,13 +96,32 @@ class Machine:
             raise InputError(
                 f"{self.file}: has one axis ({self.axes[0].name}), a path needs two: add a second [[axis]]"
             )
+        if self.first_axis:
+            return self.axes[self.first_axis : self.first_axis + self.path_count]
         return _drawn(self.file, self.axes[: self.path_count])
+
+    @property
+    def turning(self) -> Machine:
+        """This machine for programs that move its extra axes alone, while x and y stand: its path axes are those after
+        z, and z where there is only one. The unit of length of such a program is that of these axes, the degree.
+
+        Asserts that the machine has extra axes.
+        """
+        assert self.path_count > SPACE_AXES and not self.first_axis, "no extra axes"
+        first = min(SPACE_AXES, self.path_count - PLANE_AXES)
+        return replace(
+            self,
+            first_axis=first,
+            path_count=self.path_count - first,
+            offset_mm=self.offset_mm[first:],
+        )
 
     @property
     def path_names(self) -> tuple[str, ...]:
         """What the axes that follow a path are called: x, y in the plane, their own names in space."""
         axes = self.path_axes
-        return AXES[:PLANE_AXES] if len(axes) == PLANE_AXES else tuple(axis.name for axis in axes)
+        plane = len(axes) == PLANE_AXES and not self.first_axis
+        return AXES[:PLANE_AXES] if plane else tuple(axis.name for axis in axes)
 
     @property
     def path_counts(self) -> tuple[int, ...]:

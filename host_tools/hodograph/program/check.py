@@ -34,6 +34,7 @@ from ..feed.pieces import (
     distance_excess,
     exponents,
 )
+from ..names import AXES
 from ..spline.bernstein import square
 from ..spline.spatial.curve import hodograph_of
 from ..spline.spatial.quaternion import polar
@@ -556,9 +557,11 @@ def _header_fault(
         return ProgramError.PERIOD
     if limits is not None and limits.period_us not in (0, program.period_us):
         return ProgramError.PERIOD_USED
-    if not reserved.flags or (program.moving and not chunk):
+    if not reserved.flags or (program.moving and not chunk) or (program.first_axis and chunk):
         return ProgramError.FLAGS
-    if limits is not None and limits.axis_count not in (0, program.axis_count):
+    if program.first_axis + program.axis_count > len(AXES) or (
+        limits is not None and limits.axis_count not in (0, program.axis_count)
+    ):
         return ProgramError.AXES
     if not 0 < program.length_q40 < LONGEST_Q40_MM:
         return ProgramError.LENGTH

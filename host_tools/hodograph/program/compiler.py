@@ -53,7 +53,8 @@ class ProgramOptions:
 
     `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
     only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
-    beside the plan's limits. `events`: outputs on the path, by place.
+    beside the plan's limits. `events`: outputs on the path, by place. `first_axis`: of the machine, that the first axis of
+    the program is.
     """
 
     name: str = ""
@@ -62,6 +63,7 @@ class ProgramOptions:
     period_us: int | None = None
     stops: StopTerms = field(default_factory=StopTerms)
     events: Events = field(default_factory=no_events)
+    first_axis: int = 0
 
 
 _USUAL = ProgramOptions()
@@ -117,6 +119,7 @@ def compile_path(
         stops=no_stops(len(pieces)),
         extra_q40=geometry.extra_q40,
         events=_on_path(options.events, length_q40),
+        first_axis=options.first_axis,
     )
     _require_override_headroom(program, spline)
     program = plan_stops(program, plan, options.stops)

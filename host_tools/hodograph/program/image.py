@@ -26,6 +26,7 @@ HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
 """Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
 PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
 FLAG_CLOSED, FLAG_MOVING = 1, 2
+FIRST_AXIS_SHIFT, _FIRST_AXIS_FLAGS = 8, 0x0700
 NAME_SIZE = 32
 
 _HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 4I".replace(" ", ""))
@@ -60,6 +61,7 @@ class Program:
     pieces     the M feed pieces, and `stops` for each of them
     moving     it begins in motion: only in a chunk of a stream
     events     outputs that switch on the path, by place
+    first_axis the axis of the machine that the program's first one is
     Limits of 0 mean none.
     """
 
@@ -80,6 +82,7 @@ class Program:
     extra_q40: Int = field(default_factory=lambda: np.zeros((0, 0, 5), dtype=np.int64))
     moving: bool = False
     events: Events = field(default_factory=no_events)
+    first_axis: int = 0
 
     def __post_init__(self) -> None:
         if not len(self.extra_q40):
@@ -162,7 +165,9 @@ def encode(program: Program) -> bytes:
             program.period_us,
             program.segment_count,
             program.piece_count,
-            FLAG_CLOSED * program.closed | FLAG_MOVING * program.moving,
+            FLAG_CLOSED * program.closed
+            | FLAG_MOVING * program.moving
+            | program.first_axis << FIRST_AXIS_SHIFT,
             program.axis_count,
             program.duration_q32_s,
             program.length_q40,
@@ -225,6 +230,7 @@ def decode(image: bytes) -> Program:
         period_us=head[5],
         closed=bool(head[8] & FLAG_CLOSED),
         moving=bool(head[8] & FLAG_MOVING),
+        first_axis=(head[8] & _FIRST_AXIS_FLAGS) >> FIRST_AXIS_SHIFT,
         duration_q32_s=head[10],
         length_q40=head[11],
         offset_q40=(
@@ -336,7 +342,7 @@ def reserved_fields(image: bytes) -> ReservedFields:
     after = header_size(head[9]) + segment_size(head[9]) * head[6]
     stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
     return ReservedFields(
-        flags=not head[8] & ~(FLAG_CLOSED | FLAG_MOVING),
+        flags=not head[8] & ~(FLAG_CLOSED | FLAG_MOVING | _FIRST_AXIS_FLAGS),
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
         stops=stops != 0,
     )

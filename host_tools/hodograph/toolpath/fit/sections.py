@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..moves import (
-    AXES,
     ORIGIN,
     AnalogOutput,
     ArcMove,
@@ -24,6 +23,7 @@ from ..moves import (
     Coolant,
     DigitalOutput,
     Dwell,
+    FeedMode,
     Message,
     Move,
     OverrideSwitch,
@@ -74,6 +74,8 @@ class Section:
     events        commands that happen on the way
     tied          whether start and end are no rests, but in the middle of a chord of a longer section: the curve is
                   straight there, in the direction of the chord
+    stands_at     of a section that turns a, b and c alone: where x, y and z stand, mm. The points of its reference are
+                  (a, b, c), and degrees take the place of mm. None: x, y or z move
     """
 
     reference: Reference
@@ -81,6 +83,7 @@ class Section:
     before: tuple[Command, ...] = ()
     events: tuple[PathEvent, ...] = ()
     tied: tuple[bool, bool] = (False, False)
+    stands_at: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +109,7 @@ class Divider:
     moved: bool = False
     direction: Real | None = None
     tied: bool = False
+    stands_at: tuple[float, float, float] | None = None
 
     def take(self, command: Command) -> None:
         """The next command."""
@@ -125,24 +129,57 @@ class Divider:
             self.before.append(command)
 
     def _move(self, move: Move) -> None:
-        if move.end[3:] != self.builder.position[3:] and isinstance(move, StraightMove):
-            self._check_way(move)
+        turned = self._turned_alone(move)
+        if turned is None and self.stands_at is not None:
+            self._go_from_turning()
+        elif turned is not None:
+            if self.stands_at is None:
+                self._go_to_turning()
+            move = turned
         if self.blending is Blending.EXACT_PATH and not self._goes_straight_on(move):
             self.stop()
         self._add(move)
         if self.blending is Blending.EXACT_STOP or self.tolerance_mm == 0.0:
             self.stop()
 
-    def _check_way(self, move: StraightMove) -> None:
-        """Raises InputError: the move turns axes without a way of x, y and z."""
+    def _turned_alone(self, move: Move) -> StraightMove | None:
+        """The move as one of (a, b, c) in place of x, y, z, where it turns axes and x, y and z go less than a path needs;
+        None: it goes a way.
+        """
+        if not isinstance(move, StraightMove):
+            return None
+        here = self._place
+        way = float(np.linalg.norm(np.subtract(move.end[:3], here[:3])))
+        if way >= _SHORTEST_MM or (move.end[3:] == here[3:] and (way or self.stands_at is None)):
+            return None
+        feed = move.feed
+        if feed is not None and feed.mode is not FeedMode.INVERSE_TIME:
+            feed = replace(feed, feed_mm_s=feed.feed_deg_s)
+        return StraightMove(move.line, (*move.end[3:], 0.0, 0.0, 0.0), feed)
+
+    @property
+    def _place(self) -> Position:
+        """Where the moves have led so far; x, y and z less than a path needs away from there count for the next one."""
+        own = self.builder.position
+        return own if self.stands_at is None else (*self.stands_at, *own[:3])
+
+    def _go_to_turning(self) -> None:
+        """The section ends. The next one turns a, b and c."""
+        self.stop()
         here = self.builder.position
-        way = np.linalg.norm(np.subtract(move.end[:3], here[:3]))
-        if way < _SHORTEST_MM:
-            turned = [n.upper() for n, p, q in zip(AXES, here, move.end, strict=True) if p != q]
-            raise InputError(
-                f"{self.file}:{move.line}: the move turns {', '.join(turned)} alone: axes turn along a path of X, Y "
-                "and Z: turn them in a move that goes at least 2 um, or write the part for each angle as a program"
-            )
+        self.stands_at = here[:3]
+        self._begin_at((*here[3:], 0.0, 0.0, 0.0))
+
+    def _go_from_turning(self) -> None:
+        """The section that turns a, b and c ends."""
+        self.stop()
+        here = self._place
+        self.stands_at = None
+        self._begin_at(here)
+
+    def _begin_at(self, start: Position) -> None:
+        self.builder = ReferenceBuilder(start, SAG_SHARE * self.section_tolerance)
+        self.direction = None
 
     def _add(self, move: Move) -> None:
         before = self.builder.position
@@ -204,6 +241,7 @@ class Divider:
             tuple(self.before),
             tuple(self.events),
             (self.tied, ends_tied),
+            self.stands_at,
         )
         self.sections.extend(_without_reversals(whole))
         self.before, self.events, self.tied = [], [], ends_tied
@@ -264,5 +302,5 @@ def cut_at(section: Section, places: np.ndarray) -> Iterator[Section]:
         )
         tied = (first == 0 and section.tied[0], final and section.tied[1])
         part = section.reference.part(first, last)
-        yield Section(part, section.tolerance_mm, before, events, tied)
+        yield replace(section, reference=part, before=before, events=events, tied=tied)
         before = ()

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: MIT */
+/*
+ * first_axis: which axes of a machine a program moves. Axis i of the program is axis first + i of the machine's path; all
+ * others hold their position. 0: a path of x, y, z and the axes that follow it. More: a path of axes that turn, for which x, y
+ * and z need not move (docs/reference/protocol.md 1.1). Its unit of length is the degree. Pure, any context.
+ */
+#ifndef HODOGRAPH_CORE_FIRST_AXIS_H
+#define HODOGRAPH_CORE_FIRST_AXIS_H
+
+#include <stdint.h>
+
+#include "core/program.h"
+
+#define FIRST_AXIS_SHIFT 8u
+#define FIRST_AXIS_FLAGS 0x0700u /* bits 8 ... 10 of the flags of the header */
+
+static inline uint32_t first_axis(const struct program_header *header)
+{
+    return ((uint32_t)header->flags & FIRST_AXIS_FLAGS) >> FIRST_AXIS_SHIFT;
+}
+
+/* One more than the last axis of the machine's path that the program moves. */
+static inline uint32_t first_axis_end(const struct program_header *header)
+{
+    return first_axis(header) + header->axis_count;
+}
+
+#endif
