@@ -53,7 +53,8 @@ _STRAIGHT_RAD = 1e-6
 """Change of direction up to which moves of G61 go straight on."""
 
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
-_SHORTEST_MM = 2.0**-9
+SHORTEST_MM = 2.0**-9
+"""Shorter moves are no section of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +138,7 @@ class Divider:
         """Raises InputError: the move turns axes without a way of x, y and z."""
         here = self.builder.position
         way = np.linalg.norm(np.subtract(move.end[:3], here[:3]))
-        if way < _SHORTEST_MM:
+        if way < SHORTEST_MM:
             turned = [n.upper() for n, p, q in zip(AXES, here, move.end, strict=True) if p != q]
             raise InputError(
                 f"{self.file}:{move.line}: the move turns {', '.join(turned)} alone: axes turn along a path of X, Y "
@@ -213,7 +214,7 @@ class Divider:
         if not self.moved:
             return
         reference = self.builder.reference()
-        if reference.count and float(reference.place_mm[-1]) >= _SHORTEST_MM:
+        if reference.count and float(reference.place_mm[-1]) >= SHORTEST_MM:
             self.add(reference, ends_tied=False)
             begin = self.builder.position
         else:  # too short to be run: the next section makes it good
