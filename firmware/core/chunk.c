@@ -46,7 +46,7 @@ static uint32_t crc_of(const uint8_t *bytes, uint32_t size)
 static int flags_fit(const struct chunk *c)
 {
     const int rests = chunk_begins_at_rest(c);
-    const int joined = (c->flags & CHUNK_FLAG_JOINED) != 0u;
+    const int joined = chunk_is_joined(c);
     return (c->flags & ~FLAGS) == 0u && (c->rest_flags & ~REST_FLAGS) == 0u &&
            (rests || (c->rest_ms | c->rest_flags) == 0u) && !(joined && !chunk_goes_on(c));
 }
@@ -106,7 +106,7 @@ static int check_follows(const struct chunk *next, const struct chunk *previous)
     if ((next->flags & CHUNK_FLAG_FIRST) != 0u || !chunk_goes_on(previous)) {
         return PROGRAM_ERR_CHUNK_FIRST;
     }
-    if (!chunk_begins_at_rest(next) && (previous->flags & CHUNK_FLAG_JOINED) != 0u) {
+    if (!chunk_begins_at_rest(next) && chunk_is_joined(previous)) {
         return PROGRAM_ERR_CHUNK_REST;
     }
     return next->program.header.period_us == previous->program.header.period_us &&
@@ -173,6 +173,39 @@ static int check_pieces(const struct chunk *next, const struct chunk *previous, 
     return 0;
 }
 
+static int same_event(const struct program *p, uint32_t i, const struct program *before, uint32_t k,
+                      int64_t arc_shift_q40_mm)
+{
+    struct program_event own;
+    struct program_event old;
+    program_event_get(p, i, &own);
+    program_event_get(before, k, &old);
+    return own.place_q40_mm == old.place_q40_mm - arc_shift_q40_mm && own.kind == old.kind &&
+           own.channel == old.channel && own.mask == old.mask && own.value == old.value;
+}
+
+/* Up to the predecessor's end both have the same events, so that the next event is the same one whenever the takeover happens.
+ * Where those of the next chunk are in disorder, the check of its program finds it. */
+static int check_events(const struct chunk *next, const struct chunk *previous, uint32_t *index)
+{
+    const struct program *before = &previous->program;
+    const int64_t shift_q40_mm = next->arc_shift_q40_mm;
+    const int64_t end_q40_mm = before->header.length_q40_mm - shift_q40_mm;
+    const uint32_t first = program_first_event_from(before, shift_q40_mm);
+    const uint32_t wanted = before->header.event_count - first;
+    const uint32_t found = program_first_event_from(&next->program, end_q40_mm + 1);
+    *index = 0;
+    while (*index < wanted && *index < found &&
+           same_event(&next->program, *index, before, first + *index, shift_q40_mm)) {
+        (*index)++;
+    }
+    if (*index < wanted || *index < found) {
+        return PROGRAM_ERR_CHUNK_EVENT;
+    }
+    *index = 0;
+    return 0;
+}
+
 /* --- One that begins at rest --- */
 
 static int meets(int64_t start_q40, int64_t end_q40)
@@ -216,7 +249,8 @@ static int check_shared(const struct chunk *next, const struct chunk *previous, 
         code = PROGRAM_ERR_CHUNK_SHARED;
     }
     code = code != 0 ? code : check_segments(next, previous, index);
-    return code != 0 ? code : check_pieces(next, previous, index);
+    code = code != 0 ? code : check_pieces(next, previous, index);
+    return code != 0 ? code : check_events(next, previous, index);
 }
 
 int chunk_check(struct chunk *next, const struct chunk *previous,

@@ -6,7 +6,8 @@
  * the limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before
  * the joint, where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion
  * is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
- * rests on the path.
+ * rests on the path. Events are shared like segments: both chunks have those up to the end of the predecessor, so that none
+ * acts twice or is left out, whichever chunk the motion passes it with.
  *
  * A chunk with flag REST shares nothing: it begins at rest, where its predecessor ends, after a dwell or a program stop. So
  * paths with exact stops between them are one job.
@@ -81,6 +82,12 @@ static inline int chunk_goes_on(const struct chunk *c)
 static inline int chunk_begins_at_rest(const struct chunk *c)
 {
     return (c->flags & CHUNK_FLAG_REST) != 0u;
+}
+
+/* 1: its end is a rest of the job, and not that of a tail. */
+static inline int chunk_is_joined(const struct chunk *c)
+{
+    return (c->flags & CHUNK_FLAG_JOINED) != 0u;
 }
 
 /* Ticks of rest before such a chunk: setpoints that repeat the end of its predecessor. */

@@ -78,20 +78,17 @@ void path_outputs_begin(struct path_outputs *outputs, const struct program *prog
     }
 }
 
-void path_outputs_carry(struct path_outputs *outputs, const struct program *program,
-                        int64_t arc_length_q40_mm)
+void path_outputs_carry(struct path_outputs *outputs, const struct program *before,
+                        const struct program *program, int64_t arc_shift_q40_mm)
 {
-    uint32_t low = 0;
-    uint32_t high = program->header.event_count;
-    while (low < high) {
-        const uint32_t middle = low + (high - low) / 2u;
-        if (program_event_place(program, middle) <= arc_length_q40_mm) {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    outputs->next = low;
+    const uint32_t left_out = program_first_event_from(before, arc_shift_q40_mm);
+    outputs->next = outputs->next > left_out ? outputs->next - left_out : 0u;
+    look_at_next(outputs, program);
+}
+
+void path_outputs_begin_next(struct path_outputs *outputs, const struct program *program)
+{
+    outputs->next = 0;
     look_at_next(outputs, program);
 }
 

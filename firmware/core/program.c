@@ -159,6 +159,21 @@ int64_t program_event_place(const struct program *p, uint32_t i)
     return read_i64(event_bytes(p, i));
 }
 
+uint32_t program_first_event_from(const struct program *p, int64_t arc_length_q40_mm)
+{
+    uint32_t low = 0;
+    uint32_t high = p->header.event_count;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2u;
+        if (program_event_place(p, middle) < arc_length_q40_mm) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
 int64_t program_segment_start(const struct program *p, uint32_t i)
 {
     return read_i64(segment_bytes(p, i));

@@ -182,6 +182,9 @@ void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kin
 void program_event_get(const struct program *p, uint32_t i, struct program_event *out);
 int64_t program_event_place(const struct program *p, uint32_t i);
 
+/* Number of the first event at or past an arc length; their count where there is none. Some 32 steps at most. */
+uint32_t program_first_event_from(const struct program *p, int64_t arc_length_q40_mm);
+
 /* Only the start (arc length) of a segment, only the duration or the start of a piece: cheaper. */
 int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);

@@ -167,6 +167,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_CHUNK_OVER,
      "chunk: of a job that is over, or checked under another configuration"},
     {PROGRAM_ERR_CHUNK_REST, "chunk: does not begin at rest where its predecessor ends"},
+    {PROGRAM_ERR_CHUNK_EVENT, "chunk: events of the shared part are not those of its predecessor"},
     {PROGRAM_ERR_AXIS_VELOCITY, "above the velocity limit of an axis"},
     {PROGRAM_ERR_AXIS_ACCELERATION, "above the acceleration limit of an axis"},
     {PROGRAM_ERR_AXIS_JERK, "above the jerk limit of an axis"},

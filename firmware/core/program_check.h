@@ -84,7 +84,7 @@ enum program_error {
     PROGRAM_ERR_EVENT_VALUE = -101, /* mask or value outside of what the kind has */
     PROGRAM_ERR_EVENT_PLACE = -102, /* before the event before it, or outside the path */
     PROGRAM_ERR_EVENT_DENSE = -103, /* a tick at 200 % could pass more than 16 events */
-    /* chunks of a stream (core/chunk.h): index = the segment or piece of the chunk where it says so, else 0 */
+    /* chunks of a stream (core/chunk.h): index = the segment, piece or event of the chunk where it says so, else 0 */
     PROGRAM_ERR_CHUNK_FORMAT =
         -80, /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
     PROGRAM_ERR_CHUNK_CRC = -81, /* CRC-32 of the chunk is wrong */
@@ -102,6 +102,8 @@ enum program_error {
         -89, /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
     PROGRAM_ERR_CHUNK_REST =
         -79, /* behind a rest it does not begin where its predecessor ends, or flag REST is missing */
+    PROGRAM_ERR_CHUNK_EVENT =
+        -78, /* events of the shared segments are not the predecessor's; index = the event */
 };
 
 /* What this controller allows. */

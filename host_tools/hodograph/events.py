@@ -45,3 +45,33 @@ def no_events() -> Events:
 def events_of(events: Iterable[Event]) -> Events:
     """A table of events, in the order of their places; events of one place keep their order."""
     return np.array(sorted((tuple(one) for one in events), key=lambda one: one[0]), dtype=EVENT)
+
+
+class SwitchedOutputs:
+    """What events have made of outputs that were all off."""
+
+    def __init__(self) -> None:
+        self._levels = 0
+        self._analogue: dict[int, Event] = {}
+
+    def act(self, events: Events) -> None:
+        """The events act, in their order."""
+        for event in map(Event._make, events.tolist()):
+            if event.kind == DIGITAL:
+                self._levels = (self._levels & ~event.mask) | event.value
+            else:
+                self._analogue[event.channel] = event
+
+    def begin(self) -> Events:
+        """The events at arc length 0 that make the same of outputs that are off."""
+        found = [Event(0, DIGITAL, 0, self._levels, self._levels)] if self._levels else []
+        found += [one._replace(place_q40=0) for one in self._analogue.values() if one.value]
+        return events_of(found)
+
+
+def events_behind(events: Events, place_q40: int) -> tuple[Events, Events]:
+    """Events at or before an arc length, and those behind it with places from there on."""
+    at = int(np.searchsorted(events["place"], place_q40, side="right"))
+    behind = events[at:].copy()
+    behind["place"] -= place_q40
+    return events[:at], behind

@@ -62,23 +62,22 @@ def section_events(
     """The events of each section's program. Raises InputError: an output that the machine does not have, or a value
     that is too large.
     """
-    maker = _Maker(outputs, file)
+    maker = EventMaker(outputs, file)
     found = []
     for i, section in enumerate(sections):
-        begin = maker.repeated()
-        _, rest = _split(section.before, is_first=i == 0)
-        begin += maker.changed(0, rest)
-        way = [
-            event
-            for s_mm, command in section.on_the_way
-            for event in maker.changed(round(s_mm * 2**40), [command])
-        ]
-        end_q40 = round(section.length_mm * 2**40)
-        next_before = sections[i + 1].before if i + 1 < len(sections) else after
         last = i + 1 == len(sections)
-        early = next_before if last else _split(next_before, is_first=False)[0]
-        found.append(events_of([*begin, *way, *maker.changed(end_q40, early)]))
+        behind = after if last else sections[i + 1].before
+        own = maker.section(section, behind, is_first=i == 0, is_last=last)
+        found.append(events_of([*own.repeated, *own.events]))
     return found
+
+
+@dataclass(frozen=True)
+class SectionEvents:
+    """Events of a section: those at its start that repeat what is on, and its own."""
+
+    repeated: list[Event]
+    events: list[Event]
 
 
 def _split(commands: tuple[Command, ...], *, is_first: bool) -> tuple[list[Command], list[Command]]:
@@ -89,14 +88,37 @@ def _split(commands: tuple[Command, ...], *, is_first: bool) -> tuple[list[Comma
 
 
 @dataclass
-class _Maker:
-    """Makes events, and knows what is on."""
+class EventMaker:
+    """Makes the events of the sections of a toolpath, one after the other, and knows what is on."""
 
     outputs: Outputs
     file: Path
     last: dict[str, Event] = field(default_factory=dict)
 
-    def repeated(self) -> list[Event]:
+    def section(
+        self,
+        section: SectionCommands,
+        behind: tuple[Command, ...],
+        *,
+        is_first: bool = False,
+        is_last: bool = False,
+    ) -> SectionEvents:
+        """Of the next section, or part of one; `behind`: the commands at rest behind it. Raises InputError: an output
+        that the machine does not have, or a value that is too large.
+        """
+        repeated = self._repeated()
+        _, rest = _split(section.before, is_first=is_first)
+        begin = self.changed(0, rest)
+        way = [
+            event
+            for s_mm, command in section.on_the_way
+            for event in self.changed(round(s_mm * 2**40), [command])
+        ]
+        end_q40 = round(section.length_mm * 2**40)
+        early = list(behind) if is_last else _split(behind, is_first=False)[0]
+        return SectionEvents(repeated, [*begin, *way, *self.changed(end_q40, early)])
+
+    def _repeated(self) -> list[Event]:
         """Events at the start of a program that make the outputs what they were."""
         digital = [event for event in self.last.values() if event.kind == DIGITAL]
         mask, levels = 0, 0

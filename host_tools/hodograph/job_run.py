@@ -94,10 +94,6 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
                 f"{job.file}:{section.first_line}: the section up to line {section.last_line} takes {needed} bytes of "
                 f"a controller, which has {room}"
             )
-            if any(len(one.pipeline.events) for one in job.sections):
-                raise PlanError(
-                    f"{problem}: divide it by exact stops (G61); stream does not switch outputs yet"
-                )
             raise NoRoomError(f"{problem}: hodograph stream takes jobs of any length")
         programs.append(program)
     return PreparedJob(job, kernel, tuple(programs), perf_counter() - begin)

@@ -15,16 +15,23 @@ def events_on_path(file: PathFile, machine: Machine, curve: Curve) -> Events:
     """The events of a path file on its curve. Raises InputError: no such output or place, or a value that is wrong."""
     if not file.outputs:
         return no_events()
+    points = len(file.given_path.points)
+    return events_of(
+        _event(file, one, machine, _place_q40(one, curve, points)) for one in file.outputs
+    )
+
+
+def require_output(file: PathFile, output: PathOutput, machine: Machine) -> None:
+    """Raises InputError: the machine does not have an output of a path file, or its value is wrong."""
+    _event(file, output, machine, 0)
+
+
+def _event(file: PathFile, output: PathOutput, machine: Machine, place_q40: int) -> Event:
     if machine.outputs is None:
         raise InputError(
             f"{file.file}: has [[output]], but the machine {machine.file} has no outputs: add [outputs] to it"
         )
-    points = len(file.given_path.points)
-    found: list[Event] = []
-    for one in file.outputs:
-        channel = machine.outputs.channel(one.name, one.where)
-        found.append(one.event(channel, _place_q40(one, curve, points)))
-    return events_of(found)
+    return output.event(machine.outputs.channel(output.name, output.where), place_q40)
 
 
 def _place_q40(output: PathOutput, curve: Curve, points: int) -> int:

@@ -232,6 +232,7 @@ def _listed_path() -> Schema:
     rests = {
         "dwell_ms": _integer("Standstill before this path", 0, LONGEST_DWELL_MS, 0),
         "stop": _choice("Whether a program stop is before it", STOPS, STOPS[0]),
+        "output": _list("Outputs that switch on this path", _path_output()),
     }
     return _table("A curve, and the rest before it", properties | rests, required, more)
 

@@ -30,6 +30,7 @@ static void begin(struct offline_stream *s, const struct chunk *first)
     const struct coefficients_window *window = coefficient_cache_begin(&s->cache, p, s->kernel);
     interpolator_begin_window(&s->interp, p, window);
     feed_override_begin_job(&s->feed, first, window, p->header.period_us);
+    path_outputs_begin(&s->outputs, p, -1);
 }
 
 int offline_stream_add(struct offline_stream *s, struct offline_part *part)
@@ -58,6 +59,16 @@ static void make_records(struct offline_stream *s)
     }
 }
 
+static void carry_outputs(struct offline_stream *s, const struct chunk *next)
+{
+    if (chunk_begins_at_rest(next)) {
+        path_outputs_begin_next(&s->outputs, &next->program);
+    } else {
+        path_outputs_carry(&s->outputs, &s->active->chunk.program, &next->program,
+                           next->arc_shift_q40_mm);
+    }
+}
+
 static void take_over(struct offline_stream *s)
 {
     struct offline_part *next = s->active->next;
@@ -72,6 +83,7 @@ static void take_over(struct offline_stream *s)
         return;
     }
     coefficient_cache_used(&s->cache);
+    carry_outputs(s, &next->chunk);
     if (chunk_begins_at_rest(&next->chunk)) {
         const uint32_t ticks = chunk_rest_ticks(&next->chunk);
         s->rest_ticks = ticks > s->waited_ticks ? ticks - s->waited_ticks : 0u;
@@ -101,6 +113,7 @@ static int tick(struct offline_stream *s, struct interpolator_point *point)
         return 0;
     }
     const int result = feed_override_next(&s->feed, &s->interp, point);
+    path_outputs_step(&s->outputs, point->arc_length_q40_mm, feed_override_feed_q32(&s->feed));
     const uint32_t waits = misses_next(s) ? 1u : 0u;
     point->arc_length_q40_mm += s->active->chunk.job_start_q40_mm;
     s->underruns += waits & ~s->rested;
@@ -117,13 +130,16 @@ static int is_over(const struct offline_stream *s, uint32_t until_rest)
 }
 
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
-                           struct interpolator_point *points)
+                           struct interpolator_point *points, struct path_outputs_values *values)
 {
     uint32_t done = 0;
     while (done < count && s->active != NULL && !is_over(s, until_rest)) {
         const int result = tick(s, &points[done]);
         if (result < 0) {
             return result;
+        }
+        if (values != NULL) {
+            values[done] = s->outputs.values;
         }
         done++;
     }

@@ -20,6 +20,7 @@
 #include "core/feed_override.h"
 #include "core/interpolator.h"
 #include "core/kernel.h"
+#include "core/path_outputs.h"
 
 /* A chunk that was given. */
 struct offline_part {
@@ -33,6 +34,7 @@ struct offline_stream {
     struct feed_override feed; /* its commands may be called between ticks */
     struct interpolator interp;
     struct coefficient_cache cache;
+    struct path_outputs outputs; /* at the last setpoint */
     struct offline_part *active; /* NULL before the first chunk, */
     struct offline_part *newest; /* and the last one accepted */
     uint64_t ticks;
@@ -59,8 +61,8 @@ int offline_stream_check(const struct offline_stream *s, struct offline_part *pa
 int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 
 /* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind which
- * no chunk is known. Points have arc lengths of the job. How many ticks it were, or a negative INTERPOLATOR_ERR_.... */
+ * no chunk is known. Points have arc lengths of the job; `values`, where it is not NULL, are the outputs at them. How many ticks it were, or a negative INTERPOLATOR_ERR_.... */
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
-                           struct interpolator_point *points);
+                           struct interpolator_point *points, struct path_outputs_values *values);
 
 #endif

@@ -144,7 +144,7 @@ uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t
     cob_put(bytes + 8, size, 4);
     cob_put(bytes + 16, plan->job, 4);
     cob_put(bytes + 20, plan->sequence, 4);
-    if (plan->from > 0u) {
+    if ((plan->flags & (CHUNK_FLAG_FIRST | CHUNK_FLAG_REST)) == 0u) {
         put_shifts(bytes, plan);
     }
     put_i64(bytes + 56, (plan->job_mm + (int64_t)segment_of(plan->from) * SEGMENT_MM) * Q40);
@@ -152,6 +152,37 @@ uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t
     cob_put(bytes + 68, remaining_ms(plan), 4);
     cob_put(bytes + 72, plan->rest_ms, 4);
     cob_put(bytes + 76, plan->rest_flags, 4);
+    chunk_image_seal(bytes);
+    return size;
+}
+
+static void put_event(uint8_t *at, const struct program_event *event, int64_t place_q40_mm)
+{
+    put_i64(at, place_q40_mm);
+    at[8] = event->kind;
+    at[9] = event->channel;
+    cob_put(at + 10, event->mask, 2);
+    cob_put(at + 12, (uint32_t)event->value, 4);
+}
+
+uint32_t chunk_image_switch(uint8_t *bytes, const struct program_event *events, uint32_t count)
+{
+    uint8_t *image = bytes + CHUNK_HEADER_SIZE;
+    const int64_t start_q40_mm = (int64_t)cob_get(bytes + 56, 8);
+    const int64_t length_q40_mm = (int64_t)cob_get(image + 40, 8);
+    uint32_t size = (uint32_t)cob_get(bytes + 8, 4);
+    uint32_t own = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        const int64_t place_q40_mm = events[i].place_q40_mm - start_q40_mm;
+        if (place_q40_mm >= 0 && place_q40_mm <= length_q40_mm) {
+            put_event(bytes + size, &events[i], place_q40_mm);
+            size += PROGRAM_EVENT_SIZE;
+            own++;
+        }
+    }
+    cob_put(bytes + 8, size, 4);
+    cob_put(image + 8, size - CHUNK_HEADER_SIZE, 4);
+    cob_put(image + 76, own, 4);
     chunk_image_seal(bytes);
     return size;
 }

@@ -9,12 +9,14 @@
 
 #include <stdint.h>
 
+#include "core/program.h"
+
 #define CHUNK_IMAGE_SIZE_MAX 32768u
 
 /* Pieces are counted through the job: 0 is the one from rest, all others go on at 16 mm/s. */
 struct chunk_plan {
     uint32_t previous; /* first piece of the predecessor; not of a first chunk */
-    uint32_t from;     /* first piece of this one; 0: a first chunk */
+    uint32_t from;     /* first piece of this one; 0: of a first chunk, or a second one */
     uint32_t joint;    /* the pieces before this one are shared with the predecessor */
     uint32_t to;       /* the pieces before this one, then the end; 1 more than a multiple of 8 */
     uint32_t flags;    /* CHUNK_FLAG_... */
@@ -29,6 +31,10 @@ struct chunk_plan {
 /* Makes the chunk; the path begins at (x_mm, y_mm). Returns its size. */
 uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t x_mm,
                           int32_t y_mm);
+
+/* Adds those of these events that are on the path of the chunk, in their order; places are arc lengths of the job. Returns the new
+ * size. */
+uint32_t chunk_image_switch(uint8_t *bytes, const struct program_event *events, uint32_t count);
 
 /* Puts the right CRCs into a chunk that was changed. */
 void chunk_image_seal(uint8_t *bytes);

@@ -92,6 +92,63 @@ void chunked_refine(struct override_program *p, double longest_s)
     override_program_image(p, image, size);
 }
 
+/* --- Events --- */
+
+static int by_place(const void *a, const void *b)
+{
+    const int64_t one = *(const int64_t *)a;
+    const int64_t other = *(const int64_t *)b;
+    return (one > other) - (one < other);
+}
+
+static int64_t any_place(const struct program *p, uint64_t *random)
+{
+    const uint64_t length_q40 = (uint64_t)p->header.length_q40_mm;
+    if (golden_random(random) % 4u != 0u) {
+        return (int64_t)(golden_random(random) % (length_q40 + 1u));
+    }
+    return program_segment_start(p, (uint32_t)(golden_random(random) % p->header.segment_count));
+}
+
+static void put_event(uint8_t *at, const struct program_event *event)
+{
+    put(at, (uint64_t)event->place_q40_mm, 8);
+    at[8] = event->kind;
+    at[9] = event->channel;
+    put(at + 10, event->mask, 2);
+    put(at + 12, (uint32_t)event->value, 4);
+}
+
+void chunked_add_events(struct override_program *p, uint32_t count, uint64_t *random)
+{
+    int64_t places[CHUNKED_EVENTS];
+    const uint32_t size = p->program.size + count * PROGRAM_EVENT_SIZE;
+    TEST_ASSERT_TRUE(count >= 2u && count <= CHUNKED_EVENTS);
+    places[0] = 0;
+    places[1] = p->program.header.length_q40_mm;
+    for (uint32_t i = 2; i < count; i++) {
+        places[i] =
+            golden_random(random) % 8u == 0u ? places[i - 1u] : any_place(&p->program, random);
+    }
+    qsort(places, count, sizeof *places, by_place);
+    uint8_t *image = calloc(1, size);
+    TEST_ASSERT_NOT_NULL(image);
+    memcpy(image, p->image, p->program.size);
+    for (uint32_t i = 0; i < count; i++) {
+        const struct program_event event = {places[i], PROGRAM_EVENT_ANALOGUE, 0, 0,
+                                            1 + (int32_t)i};
+        put_event(image + p->program.size + (size_t)i * PROGRAM_EVENT_SIZE, &event);
+    }
+    put(image + 8, size, 4);
+    put(image + 76, count, 4);
+    free(p->image);
+    p->image = image;
+    p->program.image = image;
+    p->program.size = size;
+    p->program.header.image_size = size;
+    p->program.header.event_count = count;
+}
+
 /* --- Tail: a quintic --- */
 
 struct quintic {
@@ -252,6 +309,31 @@ static void write_body(uint8_t *at, const struct override_program *w, const stru
     }
 }
 
+static int64_t end_of(const struct program *p, const struct chunked_cut *cut)
+{
+    return segment_end(p, cut->segments - 1u);
+}
+
+/* The number of the first event of a chunk, and how many it has. */
+static uint32_t events_of(const struct program *p, const struct chunked_cut *cut, uint32_t *count)
+{
+    const uint32_t first = program_first_event_from(p, arc_of(p, cut));
+    *count = program_first_event_from(p, end_of(p, cut) + 1) - first;
+    return first;
+}
+
+static void write_events(uint8_t *at, const struct program *p, const struct chunked_cut *cut)
+{
+    uint32_t count;
+    const uint32_t first = events_of(p, cut, &count);
+    for (uint32_t i = 0; i < count; i++) {
+        struct program_event event;
+        program_event_get(p, first + i, &event);
+        event.place_q40_mm -= arc_of(p, cut);
+        put_event(at + (size_t)i * PROGRAM_EVENT_SIZE, &event);
+    }
+}
+
 static uint64_t tail_time(const struct chunked_cut *cut)
 {
     uint64_t sum = 0;
@@ -265,8 +347,10 @@ static void write_image(uint8_t *image, uint32_t size, const struct override_pro
                         const struct chunked_cut *cut)
 {
     const struct program *p = &w->program;
-    const int64_t end_q40 = segment_end(p, cut->segments - 1u);
+    const int64_t end_q40 = end_of(p, cut);
+    uint32_t events;
     uint8_t codes[6];
+    (void)events_of(p, cut, &events);
     memcpy(image, p->image, PROGRAM_HEADER_SIZE);
     memcpy(image, "HDGP", 4);
     put(image + 4, PROGRAM_VERSION, 2);
@@ -279,7 +363,9 @@ static void write_image(uint8_t *image, uint32_t size, const struct override_pro
     put(image + 30, PROGRAM_PLANE, 2);
     put(image + 32, time_of(p, cut->joint) - time_of(p, cut->first) + tail_time(cut), 8);
     put(image + 40, (uint64_t)(end_q40 - arc_of(p, cut)), 8);
+    put(image + 76, events, 4);
     write_body(image + PROGRAM_HEADER_SIZE, w, cut);
+    write_events(image + size - (size_t)events * PROGRAM_EVENT_SIZE, p, cut);
     override_program_codes(&w->limit, codes);
     stop_table_write(image, size, codes);
 }
@@ -320,9 +406,12 @@ static void write_header(uint8_t *at, uint32_t size, const struct program *p,
 static void write_chunk(struct chunked *c, uint32_t i)
 {
     const struct chunked_cut *cut = &c->cuts[i];
+    uint32_t events;
+    (void)events_of(&c->whole->program, cut, &events);
     const uint32_t image =
         PROGRAM_HEADER_SIZE + (cut->segments - cut->segment) * PROGRAM_SEGMENT_SIZE +
-        (cut->joint - cut->first + cut->tail_count) * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
+        (cut->joint - cut->first + cut->tail_count) * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
+        events * PROGRAM_EVENT_SIZE;
     c->sizes[i] = CHUNK_HEADER_SIZE + image;
     c->bytes[i] = calloc(1, c->sizes[i]);
     TEST_ASSERT_NOT_NULL(c->bytes[i]);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * chunked: a planar program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
- * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program.
+ * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has the
+ * events of the program on its segments.
  */
 #ifndef TESTS_UNIT_CHUNKED_H
 #define TESTS_UNIT_CHUNKED_H
@@ -9,8 +10,9 @@
 #include "core/chunk.h"
 #include "override_program.h"
 
-#define CHUNKED_TAIL 8u  /* pieces of a tail, at most */
-#define CHUNKED_MOST 32u /* chunks of a chain, at most */
+#define CHUNKED_TAIL   8u  /* pieces of a tail, at most */
+#define CHUNKED_MOST   32u /* chunks of a chain, at most */
+#define CHUNKED_EVENTS 64u
 
 /* Where a chunk is cut, in numbers of the whole program. */
 struct chunked_cut {
@@ -35,6 +37,10 @@ struct chunked {
 /* The program with pieces of at most this duration, as many as OVERRIDE_PIECES allows: the same motion but for rounding. Its
  * limits are to be set again. */
 void chunked_refine(struct override_program *p, double longest_s);
+
+/* The program with so many events of analogue output 0, whose values are their numbers from 1 on: at random places, at both ends,
+ * at starts of segments, and some at the same place as the one before. */
+void chunked_add_events(struct override_program *p, uint32_t count, uint64_t *random);
 
 /* Cuts with the joints and first pieces given: 1, or 0 where there is no tail inside the limits. */
 int chunked_make(struct chunked *out, const struct override_program *whole, const uint32_t firsts[],

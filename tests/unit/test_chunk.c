@@ -185,6 +185,103 @@ static void test_the_shared_part_is_compared_bit_for_bit(void)
     TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
 }
 
+/* --- Events --- */
+
+static void with_events(uint32_t count)
+{
+    uint64_t random = 3;
+    chunked_add_events(&whole, count, &random);
+    golden_seal(whole.image, whole.program.size);
+}
+
+static uint32_t event_at(uint32_t i)
+{
+    return chain.sizes[1] - (chunks[1].program.header.event_count - i) * PROGRAM_EVENT_SIZE;
+}
+
+static uint32_t shared_events(void)
+{
+    const struct program *before = &chunks[0].program;
+    return before->header.event_count -
+           program_first_event_from(before, chunks[1].arc_shift_q40_mm);
+}
+
+/* Any bit of those on the shared segments; one behind them is an event of the next chunk alone. */
+static void test_events_of_the_shared_part_are_the_predecessors(void)
+{
+    struct program_fault fault;
+    with_events(40);
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    TEST_ASSERT_EQUAL_INT_MESSAGE(0, check_chunk(1, &fault), program_error_text(fault.code));
+    const uint32_t shared = shared_events();
+    const uint32_t count = chunks[1].program.header.event_count;
+    TEST_ASSERT_TRUE(shared > 4u && count > shared + 4u);
+    for (uint32_t at = event_at(0); at < event_at(shared); at++) {
+        const struct program_fault found = fault_with_bit(at);
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_EVENT, found.code);
+        TEST_ASSERT_EQUAL_UINT32((at - event_at(0)) / PROGRAM_EVENT_SIZE, found.index);
+    }
+    TEST_ASSERT_EQUAL_INT(0, fault_with_bit(event_at(count - 1u) + 12).code);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_EVENT_PLACE, fault_with_bit(event_at(count - 1u) + 7).code);
+}
+
+/* The event is taken out of, or put once more into, the image of a chunk. */
+static void change_events(uint32_t chunk, uint32_t i, int more)
+{
+    const uint32_t count = chunks[chunk].program.header.event_count;
+    const uint32_t size = chain.sizes[chunk] + PROGRAM_EVENT_SIZE;
+    uint8_t *bytes = calloc(1, size);
+    const uint32_t at = chain.sizes[chunk] - (count - i) * PROGRAM_EVENT_SIZE;
+    const uint32_t from = more ? at : at + PROGRAM_EVENT_SIZE;
+    const uint32_t to = more ? at + PROGRAM_EVENT_SIZE : at;
+    TEST_ASSERT_NOT_NULL(bytes);
+    memcpy(bytes, chain.bytes[chunk], chain.sizes[chunk]);
+    memcpy(bytes + to, chain.bytes[chunk] + from, chain.sizes[chunk] - from);
+    free(chain.bytes[chunk]);
+    chain.bytes[chunk] = bytes;
+    chain.sizes[chunk] = to + chain.sizes[chunk] - from;
+    const uint32_t changed = more ? count + 1u : count - 1u;
+    for (uint32_t k = 0; k < 4u; k++) {
+        bytes[8 + k] = (uint8_t)(chain.sizes[chunk] >> 8u * k);
+        bytes[CHUNK_HEADER_SIZE + 8 + k] =
+            (uint8_t)((chain.sizes[chunk] - CHUNK_HEADER_SIZE) >> 8u * k);
+        bytes[CHUNK_HEADER_SIZE + 76 + k] = (uint8_t)(changed >> 8u * k);
+    }
+    chunked_seal(bytes, chain.sizes[chunk]);
+}
+
+static void test_one_event_more_or_less_is_refused(void)
+{
+    struct program_fault fault;
+    with_events(40);
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+    const uint32_t shared = shared_events();
+    for (uint32_t chunk = 0; chunk < 2u; chunk++) {
+        const uint32_t count = chunks[chunk].program.header.event_count;
+        const uint32_t first = chunk == 0 ? count - shared : 0u;
+        for (uint32_t i = first; i < first + shared; i++) {
+            for (int more = 0; more <= 1; more++) {
+                change_events(chunk, i, more);
+                TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+                TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_EVENT, check_chunk(1, &fault));
+                chunked_close(&chain);
+                cut_in_two();
+                TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+                TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+            }
+        }
+    }
+    chunked_close(&chain);
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    change_events(1, shared,
+                  0); /* the first one behind the predecessor's end: nothing to compare with */
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+}
+
 static void test_a_program_in_motion_is_accepted_in_a_chunk_only(void)
 {
     struct program_fault fault;
@@ -568,6 +665,8 @@ int main(void)
     RUN_TEST(test_headers_are_refused_with_their_codes);
     RUN_TEST(test_damage_is_refused);
     RUN_TEST(test_the_shared_part_is_compared_bit_for_bit);
+    RUN_TEST(test_events_of_the_shared_part_are_the_predecessors);
+    RUN_TEST(test_one_event_more_or_less_is_refused);
     RUN_TEST(test_a_program_in_motion_is_accepted_in_a_chunk_only);
     RUN_TEST(test_a_takeover_at_every_tick_changes_no_setpoint);
     RUN_TEST(test_chains_give_the_setpoints_of_the_whole);

@@ -241,19 +241,63 @@ static void test_a_start_and_a_takeover_find_the_next_event(void)
         set_event(i, &one);
     }
     TEST_ASSERT_EQUAL_INT(0, open_with(4));
+    TEST_ASSERT_EQUAL_UINT32(1, program_first_event_from(&program, 5));
+    TEST_ASSERT_EQUAL_UINT32(3, program_first_event_from(&program, 6));
+    TEST_ASSERT_EQUAL_UINT32(4, program_first_event_from(&program, 10));
     path_outputs_begin(&outputs, &program, 5);
     TEST_ASSERT_EQUAL_HEX16(7, outputs.values.digital);
     path_outputs_step(&outputs, 9, 0);
     TEST_ASSERT_EQUAL_HEX16(15, outputs.values.digital);
+    path_outputs_carry(&outputs, &program, &program, 0);
+    TEST_ASSERT_NULL(outputs.program);
     path_outputs_clear(&outputs);
     outputs.values.digital = 0x100;
-    path_outputs_carry(&outputs, &program, 4);
+    path_outputs_begin_next(&outputs, &program);
     TEST_ASSERT_EQUAL_HEX16(0x100, outputs.values.digital);
-    path_outputs_step(&outputs, 5, 0);
-    TEST_ASSERT_EQUAL_HEX16(0x106, outputs.values.digital);
-    path_outputs_carry(&outputs, &program, -1);
     path_outputs_step(&outputs, 0, 0);
-    TEST_ASSERT_EQUAL_HEX16(0x107, outputs.values.digital);
+    TEST_ASSERT_EQUAL_HEX16(0x101, outputs.values.digital);
+}
+
+static void set_values(const int64_t places[], uint32_t count, int32_t first_value)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const struct program_event one = {places[i], PROGRAM_EVENT_ANALOGUE, 0, 0,
+                                          first_value + (int32_t)i};
+        set_event(i, &one);
+    }
+    TEST_ASSERT_EQUAL_INT(0, open_with(count));
+}
+
+/* A program that begins at 5 of another one, where that has two events: each acts once, wherever the takeover happens. */
+static void test_a_takeover_goes_on_with_the_same_event(void)
+{
+    const int64_t places[] = {0, 5, 5, 9};
+    const int64_t shifted[] = {0, 0, 4};
+    const int64_t taken_over_at[] = {4, 5, 9};
+    uint8_t whole[8192];
+    struct program before;
+    set_values(places, 4, 10);
+    TEST_ASSERT_TRUE(program.size <= sizeof whole);
+    memcpy(whole, image, program.size);
+    TEST_ASSERT_EQUAL_INT(0, program_open(&before, whole, program.size));
+    set_values(shifted, 3, 11);
+    for (uint32_t i = 0; i < 3u; i++) {
+        struct path_outputs outputs;
+        path_outputs_begin(&outputs, &before, taken_over_at[i]);
+        path_outputs_carry(&outputs, &before, &program, 5);
+        outputs.values.analogue[0] = 0;
+        path_outputs_step(&outputs, 3, 0);
+        TEST_ASSERT_EQUAL_INT16(i == 0u ? 12 : 0, outputs.values.analogue[0]);
+        path_outputs_step(&outputs, 4, 0);
+        TEST_ASSERT_EQUAL_INT16(i == 2u ? 0 : 13, outputs.values.analogue[0]);
+        TEST_ASSERT_NULL(outputs.program);
+    }
+    /* before the first setpoint, or a rounding unit before the place: none is left out */
+    struct path_outputs outputs;
+    path_outputs_begin(&outputs, &before, -1);
+    path_outputs_carry(&outputs, &before, &program, 5);
+    path_outputs_step(&outputs, 0, 0);
+    TEST_ASSERT_EQUAL_INT16(12, outputs.values.analogue[0]);
 }
 
 static void proportional(int32_t gain_q16, int64_t feed_q32, int16_t value)
@@ -288,6 +332,7 @@ int main(void)
     RUN_TEST(test_mutated_tables);
     RUN_TEST(test_random_tables_act_in_the_right_tick);
     RUN_TEST(test_a_start_and_a_takeover_find_the_next_event);
+    RUN_TEST(test_a_takeover_goes_on_with_the_same_event);
     RUN_TEST(test_proportional_values);
     return UNITY_END();
 }

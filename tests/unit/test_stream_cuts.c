@@ -3,7 +3,8 @@
  * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop and
  * fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside its
  * limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case ends with
- * a host that sends no more: then the motion comes to rest. Records are those of a coefficient cache, from the least that
+ * a host that sends no more: then the motion comes to rest. In each tick as many events of the path have acted as are at or
+ * before the farthest setpoint: none acts twice, is left out or is late. Records are those of a coefficient cache, from the least that
  * does to one for whole chunks; where it has room to spare, the main loop is late with them by a tick.
  *
  * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
@@ -16,6 +17,7 @@
 #include "chunked.h"
 #include "core/coefficient_cache.h"
 #include "core/feed_override.h"
+#include "core/path_outputs.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -26,6 +28,7 @@
 #define MOST_TICKS 6000u
 #define LONGEST    20000u /* until rest */
 #define CACHE_MOST 65536u
+#define EVENTS     40u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
 
 /* Found among 10^6: a hold while the override rises is late by the bound of the piece where it was commanded. */
@@ -38,6 +41,7 @@ static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp",
 struct motion {
     struct feed_override feed;
     struct interpolator it;
+    struct path_outputs outputs;
     uint32_t chunk;
     uint32_t tick;
 };
@@ -69,6 +73,7 @@ static struct {
     uint32_t which;
     uint32_t held;      /* 1: a hold was commanded */
     uint32_t fault;     /* 1: a fault stop */
+    uint32_t acted;     /* events at or before the farthest setpoint */
     uint32_t commanded; /* commands so far, */
     uint32_t rested;    /* and rests at the end of a tail */
     unsigned number;
@@ -145,6 +150,19 @@ static void accept(struct chain *c)
     }
 }
 
+/* As the controller does (app/machine/motion). */
+static int take_chunk_over(struct motion *m, const struct chunk *next,
+                           const struct coefficients_window *window)
+{
+    const struct program *before = m->it.program;
+    if (feed_override_take_over(&m->feed, &m->it, next, window) == 0) {
+        return 0;
+    }
+    path_outputs_carry(&m->outputs, before, &next->program, next->arc_shift_q40_mm);
+    m->chunk++;
+    return 1;
+}
+
 /* The motion of a chain whose chunks come in time, at the takeover of each. */
 static void note_begins(struct chain *c)
 {
@@ -153,14 +171,15 @@ static void note_begins(struct chain *c)
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&m.it, &c->chunks[0].program));
     feed_override_begin_job(&m.feed, &c->chunks[0], &m.it.window,
                             c->cuts.whole->program.header.period_us);
+    path_outputs_begin(&m.outputs, &c->chunks[0].program, -1);
     c->begun[0] = m;
     while (m.chunk + 1u < c->cuts.count) {
         TEST_ASSERT_EQUAL_INT(0, feed_override_next(&m.feed, &m.it, &point));
+        path_outputs_step(&m.outputs, point.arc_length_q40_mm, point.feed_q32_mm_s);
         m.tick++;
         struct coefficients_window window;
         coefficients_window_of(&window, &c->chunks[m.chunk + 1u].program);
-        if (feed_override_take_over(&m.feed, &m.it, &c->chunks[m.chunk + 1u], &window)) {
-            m.chunk++;
+        if (take_chunk_over(&m, &c->chunks[m.chunk + 1u], &window)) {
             c->begun[m.chunk] = m;
         }
         TEST_ASSERT_FALSE(feed_override_waits(&m.feed));
@@ -176,6 +195,7 @@ static void make_whole(uint32_t w, uint64_t *random)
         override_program_golden(p, GOLDEN[w % (sizeof GOLDEN / sizeof *GOLDEN)]);
         chunked_refine(p, override_random(random, 0.012, 0.03));
     }
+    chunked_add_events(p, EVENTS, random);
     override_program_limits(p, random);
     run_whole(w);
     for (uint32_t i = 0; i < 4u * CHAINS && wholes[w].chain_count < CHAINS; i++) {
@@ -230,6 +250,29 @@ static void check_same(void)
     }
 }
 
+/* The event that acts next is the first one of the whole program past the farthest setpoint. */
+static void check_next_event(void)
+{
+    const int64_t start_q40 = now.chain->chunks[now.m.chunk].job_start_q40_mm;
+    const uint32_t before = program_first_event_from(&now.p->program, start_q40);
+    TEST_ASSERT_EQUAL_UINT32_MESSAGE(now.acted, before + now.m.outputs.next, where("events", 0, 0));
+}
+
+/* The value is that of the last one. Arc lengths are still those of the chunk. */
+static void check_events(void)
+{
+    const struct program *whole = &now.p->program;
+    const int64_t start_q40 = now.chain->chunks[now.m.chunk].job_start_q40_mm;
+    path_outputs_step(&now.m.outputs, now.point.arc_length_q40_mm, now.point.feed_q32_mm_s);
+    while (now.acted < EVENTS &&
+           program_event_place(whole, now.acted) <= now.point.arc_length_q40_mm + start_q40) {
+        now.acted++;
+    }
+    check_next_event();
+    TEST_ASSERT_EQUAL_INT16_MESSAGE((int16_t)now.acted, now.m.outputs.values.analogue[0],
+                                    where("value", 0, 0));
+}
+
 static void use_records(const struct coefficients_window *window)
 {
     if (window != NULL && feed_override_use(&now.m.feed, &now.m.it, window)) {
@@ -262,6 +305,7 @@ static void tick(void)
     const int waited = feed_override_waits(&now.m.feed);
     TEST_ASSERT_EQUAL_INT_MESSAGE(0, feed_override_next(&now.m.feed, &now.m.it, &now.point),
                                   where("no error", 0, 0));
+    check_events();
     now.point.arc_length_q40_mm += now.chain->chunks[now.m.chunk].job_start_q40_mm;
     if (!waited && feed_override_waits(&now.m.feed)) {
         now.rested++;
@@ -349,9 +393,9 @@ static void try_to_take_over(void)
     const struct coefficients_window *window =
         coefficient_cache_prepare(&now.cache, &next->program, &place);
     TEST_ASSERT_NOT_NULL(window);
-    if (feed_override_take_over(&now.m.feed, &now.m.it, next, window)) {
+    if (take_chunk_over(&now.m, next, window)) {
+        check_next_event();
         coefficient_cache_used(&now.cache);
-        now.m.chunk++;
         seen.moving += moves ? 1u : 0u;
         seen.resting += moves ? 0u : 1u;
     }
@@ -385,6 +429,7 @@ static void begin(uint64_t *random)
     now.chain = &wholes[now.which].chains[golden_random(random) % wholes[now.which].chain_count];
     now.m = now.chain->begun[golden_random(random) % now.chain->cuts.count];
     now.h = now.p->program.header.period_us * 1e-6;
+    now.acted = (uint32_t)now.m.outputs.values.analogue[0];
     TEST_ASSERT_EQUAL_INT(0, interpolator_begin(&now.path, &wholes[now.which].exact.program));
     begin_cache(random);
 }

@@ -29,11 +29,13 @@ void motion_begin_job(struct motion *motion, const struct chunk *first,
     interpolator_begin_window(&motion->interp, &first->program, window);
     feed_override_begin_job(&motion->feed, first, window, config->period_us);
     path_outputs_begin(&motion->outputs, &first->program, -1);
+    motion->joined = chunk_is_joined(first);
 }
 
 bool motion_take_over(struct motion *motion, const struct chunk *next,
                       const struct coefficients_window *window)
 {
+    const struct program *before = motion->interp.program;
     if (feed_override_take_over(&motion->feed, &motion->interp, next, window) == 0) {
         return false;
     }
@@ -43,11 +45,12 @@ bool motion_take_over(struct motion *motion, const struct chunk *next,
         motion->rested_ticks = 0;
         motion->point.arc_length_q40_mm = 0;
         motion->precedes = true;
-        path_outputs_carry(&motion->outputs, &next->program, -1);
+        path_outputs_begin_next(&motion->outputs, &next->program);
     } else {
         motion->point.arc_length_q40_mm -= next->arc_shift_q40_mm;
-        path_outputs_carry(&motion->outputs, &next->program, motion->point.arc_length_q40_mm);
+        path_outputs_carry(&motion->outputs, before, &next->program, next->arc_shift_q40_mm);
     }
+    motion->joined = chunk_is_joined(next);
     return true;
 }
 
@@ -129,6 +132,11 @@ bool motion_held(const struct motion *motion)
 bool motion_waits(const struct motion *motion)
 {
     return feed_override_waits(&motion->feed) != 0 && !motion_over(motion);
+}
+
+bool motion_misses_chunk(const struct motion *motion)
+{
+    return !motion->joined && !motion->precedes && motion_waits(motion);
 }
 
 bool motion_late(const struct motion *motion)

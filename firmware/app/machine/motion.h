@@ -25,6 +25,7 @@ struct motion {
     uint32_t setpoints;              /* given so far */
     uint32_t rested_ticks;           /* at the end of the program, running, until the next chunk */
     uint32_t rest_ticks;             /* left before the program starts */
+    bool joined;   /* the end of the program is a rest of the job, not that of a tail */
     bool precedes; /* that setpoint is still the end of the chunk before: a rest is under way */
     struct path_counts scale;
     struct path_outputs
@@ -98,6 +99,9 @@ bool motion_held(const struct motion *motion);
 
 /* True at rest at the end of the tail of a chunk: only the next chunk leads on. */
 bool motion_waits(const struct motion *motion);
+
+/* The same, but false where the rest is one of the job, before a chunk that begins at rest. */
+bool motion_misses_chunk(const struct motion *motion);
 
 /* True while it comes to rest and has taken longer than its bound and a fifth. */
 bool motion_late(const struct motion *motion);

@@ -27,8 +27,10 @@ static enum outputs_mode mode_of(const struct machine *machine)
 {
     const uint32_t behaviour = machine->config.outputs.behaviour;
     switch (machine->state) {
-    case MACHINE_RUNNING:
-        return OUTPUTS_FOLLOW;
+    case MACHINE_RUNNING: /* at the end of a tail the path rests unasked, as in a hold */
+        return unless((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u ||
+                          !motion_misses_chunk(&machine->motion),
+                      OUTPUTS_MASKED);
     case MACHINE_HOLDING:
     case MACHINE_HELD:
         return unless((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u, OUTPUTS_MASKED);

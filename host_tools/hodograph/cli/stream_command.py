@@ -33,6 +33,7 @@ from ..pipeline import Pipeline, program_limits
 from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
+from ..stream.output_check import require_outputs
 from ..stream.plan import JobFiles, JobPlan, Place
 from ..stream.resuming import nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
@@ -102,7 +103,15 @@ def _machine(options: Namespace) -> Machine:
 def _job(options: Namespace) -> JobFiles:
     tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
     machine = _machine(options)
-    return JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
+    job = JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
+    _require_outputs(job)
+    return job
+
+
+def _require_outputs(job: JobFiles) -> None:
+    """Raises InputError, before anything moves: the machine does not have an output of the job."""
+    for file in job.files:
+        require_outputs(file, job.machine, job.reading)
 
 
 def journal_file(options: Namespace) -> Path:
@@ -138,6 +147,7 @@ def _continue(options: Namespace) -> None:
     files = tuple(Path(one.path) for one in entry.files)
     machine = load_machine(Path(entry.machine))
     job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
+    _require_outputs(job)
     require_fit(job.machine)
     with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
         _run(job, options, address, random.SystemRandom().randrange(1, 2**31), None, None, entry)
@@ -351,6 +361,8 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     for k, one in enumerate(found, 1):
         many = f" with {one.sections} sections" if one.sections > 1 else ""
         print(f"job {k}{many}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
+        if machine.outputs is not None:
+            print(f"    outputs SHA-256 {one.outputs_sha256}")
 
 
 COMMANDS = {"stream": stream}

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 from ..errors import InputError
 from ..events import (
@@ -263,27 +262,27 @@ _LEVELS = ("on", "value", "per_mm_s")
 
 
 def read_path_outputs(
-    tables: list[Table], file: Path, through_points: int | None
+    tables: list[Table], where: str, through_points: int | None
 ) -> tuple[PathOutput, ...]:
-    """The [[output]] tables of a path file; raises InputError. `through_points`: how many there are, None: none."""
-    return tuple(_path_output(one, file, i, through_points) for i, one in enumerate(tables))
+    """The tables of outputs of a path, which messages call `where`; raises InputError. `through_points`: how many
+    points of `through` there are, None: none.
+    """
+    return tuple(_path_output(one, f"{where} {i}", through_points) for i, one in enumerate(tables))
 
 
-def _path_output(table: Table, file: Path, i: int, through_points: int | None) -> PathOutput:
+def _path_output(table: Table, where: str, through_points: int | None) -> PathOutput:
     for keys in (_PLACES, _LEVELS):
         given = [key for key in keys if table.has(key)]
         if len(given) != 1:
             raise InputError(
-                f"{file}: [[output]] {i}: give one of {', '.join(keys)}, not {' and '.join(given) or 'none'}"
+                f"{where}: give one of {', '.join(keys)}, not {' and '.join(given) or 'none'}"
             )
     if table.has("at_point") and through_points is None:
-        raise InputError(
-            f"{file}: [[output]] {i}: at_point needs points of `through`: give at_mm or at_fraction"
-        )
+        raise InputError(f"{where}: at_point needs points of `through`: give at_mm or at_fraction")
     highest = (through_points or 1) - 1
     return PathOutput(
         name=table.text("name"),
-        where=f"{file}: [[output]] {i}",
+        where=where,
         at_mm=table.optional_number("at_mm", low=0.0, high=2.0**22),
         at_point=table.integer("at_point", low=0, high=highest) if table.has("at_point") else None,
         at_fraction=table.optional_number("at_fraction", low=0.0, high=1.0),

@@ -147,7 +147,7 @@ def load_path_file(file: Path) -> PathFile:
     root = Table(file, "", read_toml(file), _SECTIONS)
     if root.is_list("path"):
         raise root.error("path", "is a list of paths, which is a job: only stream and run take it")
-    return _path_file(root, root.table("path", _PATH))
+    return _path_file(root, root.table("path", _PATH), root, f"{file}: [[output]]")
 
 
 def load_paths(file: Path) -> tuple[ListedPath, ...]:
@@ -155,12 +155,12 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     root = Table(file, "", {} if is_toolpath(file) else read_toml(file), _SECTIONS)
     if not root.is_list("path"):
         return (ListedPath(load_path_file(file)),)
-    tables = root.tables("path", (*_PATH, *_RESTS))
+    tables = root.tables("path", (*_PATH, *_RESTS, "output"))
     if root.has("output"):
         raise root.error(
-            "output", "applies to files with one [path]: remove it, or make it one path"
+            "output", "applies to files with one [path]: put [[path.output]] behind its [[path]]"
         )
-    found = tuple(_listed(root, table) for table in tables)
+    found = tuple(_listed(root, table, i) for i, table in enumerate(tables, 1))
     if len({type(one.file.given_path) for one in found}) > 1:
         raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")
     for key in _RESTS:
@@ -171,13 +171,14 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     return found
 
 
-def _listed(root: Table, table: Table) -> ListedPath:
+def _listed(root: Table, table: Table, number: int) -> ListedPath:
     dwell_ms = table.integer("dwell_ms", 0, low=0, high=LONGEST_DWELL_MS)
-    return ListedPath(_path_file(root, table), dwell_ms, table.choice("stop", STOPS, STOPS[0]))
+    file = _path_file(root, table, table, f"{root.file}: path {number}: [[path.output]]")
+    return ListedPath(file, dwell_ms, table.choice("stop", STOPS, STOPS[0]))
 
 
-def _path_file(root: Table, table: Table) -> PathFile:
-    """What a file says of one of its paths."""
+def _path_file(root: Table, table: Table, outputs: Table, outputs_name: str) -> PathFile:
+    """What a file says of one of its paths, whose outputs are in the table `outputs`."""
     file = root.file
     machine = root.table("machine", ("file",), required=False)
     path = _path(table)
@@ -192,8 +193,8 @@ def _path_file(root: Table, table: Table) -> PathFile:
         limits=limits,
         machine_file=machine.path("file") if machine.has("file") else None,
         outputs=read_path_outputs(
-            root.tables("output", PATH_OUTPUT, required=False),
-            file,
+            outputs.tables("output", PATH_OUTPUT, required=False),
+            outputs_name,
             len(path.points) if path.through else None,
         ),
     )

@@ -88,8 +88,6 @@ struct path_outputs {
 };
 void path_outputs_begin(struct path_outputs *outputs, const struct program *program,
                         int64_t arc_length_q40_mm);
-void path_outputs_carry(struct path_outputs *outputs, const struct program *program,
-                        int64_t arc_length_q40_mm);
 void path_outputs_step(struct path_outputs *outputs, int64_t arc_length_q40_mm,
                        int64_t feed_q32_mm_s);
 
@@ -332,4 +330,4 @@ int offline_stream_check(const struct offline_stream *s, struct offline_part *pa
                          const uint8_t *bytes, uint32_t size, struct program_fault *fault);
 int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
-                           struct interpolator_point *points);
+                           struct interpolator_point *points, struct path_outputs_values *values);

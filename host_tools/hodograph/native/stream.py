@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import HodographError
+from ..events import ANALOGUES
 from .feed_override import FeedCommands
 from .library import library, text
 from .program import POINT, NativeFault, NativeLimits, kernel_code, limits_fields
+
+OUTPUTS = np.dtype([("digital", "<u2"), ("analogue", "<i2", ANALOGUES)])
+"""The outputs on the path at a setpoint, struct path_outputs_values of core/path_outputs.h."""
 
 CACHE_BYTES = 8192
 """The coefficient cache of a small controller."""
@@ -67,18 +71,25 @@ class OfflineStream(FeedCommands):
         Fewer when the job has ended or was stopped and, with `until_rest`, at the end of a tail behind which no chunk
         is known. Raises HodographError where the interpolator fails.
         """
-        points = np.zeros(ticks, dtype=POINT)
+        return self.run_with_outputs(ticks, until_rest=until_rest)[0]
+
+    def run_with_outputs(
+        self, ticks: int, *, until_rest: bool = False
+    ) -> tuple[NDArray[np.void], NDArray[np.void]]:
+        """The same, and the outputs on the path at each setpoint as an array of OUTPUTS, (n,)."""
+        points, values = np.zeros(ticks, dtype=POINT), np.zeros(ticks, dtype=OUTPUTS)
         made = self._lib.offline_stream_run(
             self._stream,
             ticks,
             until_rest,
             self._ffi.cast("struct interpolator_point *", self._ffi.from_buffer(points)),
+            self._ffi.cast("struct path_outputs_values *", self._ffi.from_buffer(values)),
         )
         if made < 0:
             raise HodographError(f"stream: the interpolator fails (code {made}): report a bug")
         while self._parts and self._parts[0][0] != self._stream.active:
             self._parts.pop(0)
-        return points[: int(made)]
+        return points[: int(made)], values[: int(made)]
 
     @property
     def waits(self) -> bool:

@@ -81,6 +81,7 @@ class ProgramError(IntEnum):
     CHUNK_PIECE = -88
     CHUNK_OVER = -89
     CHUNK_REST = -79
+    CHUNK_EVENT = -78
 
     @property
     def text(self) -> str:
@@ -158,4 +159,5 @@ _TEXTS = {
     ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",
     ProgramError.CHUNK_OVER: "chunk: of a job that is over, or checked under another configuration",
     ProgramError.CHUNK_REST: "chunk: does not begin at rest where its predecessor ends",
+    ProgramError.CHUNK_EVENT: "chunk: events of the shared part are not those of its predecessor",
 }

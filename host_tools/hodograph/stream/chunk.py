@@ -266,5 +266,15 @@ def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
     )
     if not same:
         return "a shared piece is not that of the predecessor"
+    if not _same_events(one, own, old):
+        return "the events of the shared part are not those of the predecessor"
     passed = sum(int(d) for d in b.duration_q32_s[: one.piece_shift])
     return None if passed == one.time_shift_q32_s else "the time shift is not that of the pieces"
+
+
+def _same_events(one: ChunkHeader, own: Program, old: Program) -> bool:
+    """Whether both have the same events up to the end of the predecessor."""
+    theirs = old.events[old.events["place"] >= one.arc_shift_q40].copy()
+    theirs["place"] -= one.arc_shift_q40
+    mine = own.events[own.events["place"] <= old.length_q40 - one.arc_shift_q40]
+    return np.array_equal(mine, theirs)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..config import Machine
 from ..errors import PlanError
+from ..events import EVENT
 from ..feed import FeedZone
 from ..feed.pieces import FeedPieces
 from ..native.program import NativeFault, NativeLimits, NativeProgram
@@ -245,6 +246,11 @@ class SectionChunks:
                 header, piece_shift=piece_shift, time_shift_q32_s=time_shift, shared_pieces=shared
             )
         self._require_room(program, header.line)
+        if fault is not None and fault.code == ProgramError.EVENT_DENSE:
+            raise PlanError(
+                f"line {header.line}: more than 16 outputs switch within the distance of a tick at 200 %: "
+                "lower the feed there, or switch fewer outputs at one place"
+            )
         if fault is not None:
             raise PlanError(
                 f"line {header.line}: the controller would refuse this part: {fault.text} "
@@ -288,8 +294,11 @@ class SectionChunks:
         path, pieces = self._feed.path, self._kept.pieces
         assert pieces is not None
         first = path.segment_at(int(pieces.start_q40[0]))
-        segments = path.segment_at(window.joint_q40(joint)) + 1 - first
-        return HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
+        joint_q40 = window.joint_q40(joint)
+        segments = path.segment_at(joint_q40) + 1 - first
+        events = len(path.events_on(int(path.start_q40[first]), joint_q40))
+        size = HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
+        return size + EVENT.itemsize * events
 
     def _require_room(self, program: Program, line: int) -> None:
         size = program.image_size + HEADER_SIZE
@@ -340,13 +349,13 @@ class SectionChunks:
         kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
         if window.rests and joint == window.count:
-            program = self._program(Stretch(kept, window.stretch.end_q40), codes)
+            program = self._switching(Stretch(kept, window.stretch.end_q40), codes)
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail, thorough)
-            program, fault = self._program(whole, np.concatenate((codes, own))), None
+            program, fault = self._switching(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 break
             fault = self._fault(program)
@@ -357,9 +366,17 @@ class SectionChunks:
                 break
             if fault.code in _MOVING_FAULTS:
                 tails.refuse(tail)
+            if fault.code == ProgramError.EVENT_DENSE:
+                break
             if fault.code == ProgramError.STOP_LONG and not thorough:
                 break  # more codes are the better remedy; with them, a longer tail has more room for brakes
         return program, fault
+
+    def _switching(self, stretch: Stretch, codes: Codes) -> Program:
+        """The same as `_program`, with the events of its path."""
+        program = self._program(stretch, codes)
+        base_q40 = stretch.end_q40 - program.length_q40
+        return replace(program, events=self._feed.path.events_on(base_q40, stretch.end_q40))
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
         """A program of pieces from inside the path in memory to an end of a segment."""

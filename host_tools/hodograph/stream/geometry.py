@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
+from ..events import Events, SwitchedOutputs, events_behind, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
@@ -48,11 +49,13 @@ class Block:
     curve      their curve, which begins where that of the block before ends
     feed_mm_s  (n,) programmed feed of each segment; inf: as fast as the machine can
     line       (n,) source line of each
+    events     outputs that switch on it; arc lengths from its start
     """
 
     curve: Curve
     feed_mm_s: Real
     line: Int
+    events: Events = field(default_factory=no_events)
 
 
 def short_segments(block: Block) -> Block:
@@ -70,7 +73,7 @@ def short_segments(block: Block) -> Block:
         curves.append(split)
         feeds.append(block.feed_mm_s[source])
         lines.append(block.line[source])
-    return Block(joined(curves), np.concatenate(feeds), np.concatenate(lines))
+    return Block(joined(curves), np.concatenate(feeds), np.concatenate(lines), block.events)
 
 
 def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
@@ -89,18 +92,21 @@ def joined(curves: Sequence[Curve]) -> Curve:
     return SpatialPHSpline(origin, np.concatenate([one.preimage for one in curves]), False)  # type: ignore[union-attr]
 
 
-def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
-    """The blocks of a section from an arc length on; none where less than LEAST_REST_MM of it is left. Raises
-    InputError: it is not that long.
+def blocks_from(
+    blocks: Iterator[Block], begin_mm: float, switched: SwitchedOutputs
+) -> Iterator[Block]:
+    """The blocks of a section from an arc length on; none where less than LEAST_REST_MM of it is left. Events up to
+    there act on `switched`. Raises InputError: it is not that long.
     """
     short: Block | None = None
     for block in blocks:
         length = block.curve.length_mm
         if begin_mm >= length:
             begin_mm -= length
+            switched.act(block.events)
             continue
         if begin_mm > 0.0:
-            block, begin_mm = _behind(block, begin_mm), 0.0
+            block, begin_mm = _behind(block, begin_mm, switched), 0.0
             if block.curve.length_mm < LEAST_REST_MM:
                 short = block
                 continue
@@ -108,14 +114,30 @@ def blocks_from(blocks: Iterator[Block], begin_mm: float) -> Iterator[Block]:
             yield short
             short = None
         yield block
+    if short is not None:
+        switched.act(short.events)
     if begin_mm > _BESIDE_MM:
         raise InputError(f"the section ends {begin_mm:g} mm before the place where it shall go on")
 
 
-def _behind(block: Block, begin_mm: float) -> Block:
-    """A block without its first part."""
+def begun_with(block: Block, events: Events) -> Block:
+    """The block with these events at its start, before its own."""
+    return replace(block, events=np.concatenate((events, block.events)))
+
+
+def switching(blocks: Iterator[Block], switched: SwitchedOutputs) -> Iterator[Block]:
+    """The blocks, each of which acts on `switched`."""
+    for block in blocks:
+        switched.act(block.events)
+        yield block
+
+
+def _behind(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
+    """A block without its first part, whose events act."""
     first, made = curve_behind(block.curve, begin_mm)
-    return Block(made, block.feed_mm_s[first:], block.line[first:])
+    passed, events = events_behind(block.events, round(begin_mm * 2**40))
+    switched.act(passed)
+    return Block(made, block.feed_mm_s[first:], block.line[first:], events)
 
 
 def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
@@ -160,6 +182,7 @@ class StreamPath:
     passed     segments of the section that are no longer here
     start_q40  (N + 1,) of the segments and of the end
     point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
+    events     outputs that switch on the path; arc lengths from the start of the section
     """
 
     def __init__(
@@ -179,6 +202,7 @@ class StreamPath:
         self.start_q40: Int = np.array([begin_q40], dtype=np.int64)
         self.feed_mm_s: Real = np.zeros(0)
         self.line: Int = np.zeros(0, dtype=np.int64)
+        self.events = no_events()
         self.complete = False
         self.passed = 0
 
@@ -207,6 +231,7 @@ class StreamPath:
         if self._end_point is not None:
             # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
             point = point + (self._end_point - point[:, 0])[:, None]
+        self._append_events(block.events, int(made.start_q40[-1]))
         if self._curve is None:
             self._curve, self.point_q40, self.a_q44 = block.curve, point, made.a_q44
         else:
@@ -223,6 +248,32 @@ class StreamPath:
         self.feed_mm_s = np.concatenate((self.feed_mm_s, block.feed_mm_s))
         self.line = np.concatenate((self.line, block.line))
 
+    def _append_events(self, events: Events, length_q40: int) -> None:
+        """Adds the events of a block of this length. Those at its start act a unit behind it, but for the first
+        block: a chunk that ends there was made without them.
+        """
+        if not len(events):
+            return
+        first = 0 if self._curve is None else 1
+        own = events.copy()
+        own["place"] = np.clip(events["place"], first, length_q40) + self.start_q40[-1]
+        self.events = np.concatenate((self.events, own))
+
+    def events_on(self, begin_q40: int, end_q40: int) -> Events:
+        """The events from one arc length of the section to another, both included, with places from the first on."""
+        at = np.searchsorted(self.events["place"], begin_q40, side="left")
+        own = self.events[at : self._events_until(end_q40)].copy()
+        own["place"] -= begin_q40
+        return own
+
+    def events_before(self, s_mm: Real) -> NDArray[np.intp]:
+        """How many events there are up to places (n,) of the curve."""
+        place_mm = np.ldexp((self.events["place"] - self.start_q40[0]).astype(np.float64), -40)
+        return np.searchsorted(place_mm, s_mm, side="right")
+
+    def _events_until(self, place_q40: int) -> int:
+        return int(np.searchsorted(self.events["place"], place_q40, side="right"))
+
     def drop(self, count: int) -> float:
         """Removes the first segments. Returns by how much arc lengths of `curve` are less then."""
         if count == 0:
@@ -233,6 +284,7 @@ class StreamPath:
         self.start_q40 = self.start_q40[count:]
         self.point_q40, self.a_q44 = self.point_q40[:, count:], self.a_q44[:, count:]
         self.feed_mm_s, self.line = self.feed_mm_s[count:], self.line[count:]
+        self.events = self.events[self._events_until(int(self.start_q40[0]) - 1) :]
         return passed_mm
 
     def segment_at(self, s_q40: int) -> int:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
+from ..events import Events, SwitchedOutputs, events_behind, no_events
 from ..pipeline import Pipeline
 from ..program.image import Program
 from ..program.inspection import end_point_q40
@@ -28,15 +29,23 @@ _MEETS_Q40 = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
-class _RestPipeline(Pipeline):
-    """The pipeline of a path from an arc length on."""
+class _BegunPipeline(Pipeline):
+    """The pipeline of the path that a job begins with: from an arc length on, with these events."""
 
     begin_mm: float = 0.0
+    given_events: Events = field(default_factory=no_events)
+
+    @property
+    def events(self) -> Events:
+        """The outputs that switch on the path."""
+        return self.given_events
 
     @cached_property
     def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
         """The curve behind that place."""
         found = super().found_spline
+        if self.begin_mm <= 0.0:
+            return found
         if found.spline.axes > 3:
             raise PlanError(
                 f"{self.file.file}: a path with extra axes cannot go on in its middle: stream the job from its start"
@@ -76,12 +85,19 @@ class PathsJob:
         if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
             first, begin_q40 = first + 1, 0
         place: JobPlace | None = None
+        switched = SwitchedOutputs()
         for number, listed in enumerate(paths):
             if number < first:
+                switched.act(self._events(listed))
                 continue
             last = number + 1 == len(paths)
-            begin = begin_q40 if number == first else 0
-            made = self._chunk(listed, number, place, begin, job=self.job + first, last=last)
+            if number == first:
+                pipeline = self._begun(listed, begin_q40, switched)
+            else:
+                pipeline, begin_q40 = Pipeline(listed.file, self.machine), 0
+            made = self._chunk(
+                listed, pipeline, number, place, begin_q40, job=self.job + first, last=last
+            )
             yield made
             header = made.chunk.header
             program = made.chunk.program
@@ -95,6 +111,7 @@ class PathsJob:
     def _chunk(
         self,
         listed: ListedPath,
+        pipeline: Pipeline,
         number: int,
         place: JobPlace | None,
         begin_q40: int,
@@ -102,7 +119,6 @@ class PathsJob:
         job: int,
         last: bool,
     ) -> PathChunk:
-        pipeline = self._pipeline(listed, begin_q40 * 2.0**-40)
         program = pipeline.program
         rest = Rest(listed.dwell_ms, listed.stop == "program", listed.stop == "optional")
         header = ChunkHeader(
@@ -125,14 +141,21 @@ class PathsJob:
             )
         return PathChunk(chunk, _commands(rest, number + 1), program.duration_q32_s * 2.0**-32)
 
-    def _pipeline(self, listed: ListedPath, begin_mm: float) -> Pipeline:
-        if begin_mm <= 0.0:
-            return Pipeline(listed.file, self.machine)
-        limits = listed.file.limits
-        file = replace(
-            listed.file, limits=replace(limits, zones=zones_behind(limits.zones, begin_mm))
-        )
-        return _RestPipeline(file, self.machine, begin_mm)
+    def _events(self, listed: ListedPath) -> Events:
+        """Of the whole path; a path without any is not computed for them."""
+        return Pipeline(listed.file, self.machine).events if listed.file.outputs else no_events()
+
+    def _begun(self, listed: ListedPath, begin_q40: int, switched: SwitchedOutputs) -> Pipeline:
+        """Of the first path, from an arc length on; at its start the outputs become what all events before made."""
+        begin_mm, limits = begin_q40 * 2.0**-40, listed.file.limits
+        events = self._events(listed)
+        if begin_q40:
+            passed, events = events_behind(events, begin_q40)
+            switched.act(passed)
+            limits = replace(limits, zones=zones_behind(limits.zones, begin_mm))
+        file = replace(listed.file, limits=limits)
+        begun = np.concatenate((switched.begin(), events))
+        return _BegunPipeline(file, self.machine, begin_mm, begun)
 
     def _require_meeting(self, number: int, program: Program, place: JobPlace) -> None:
         off = np.abs(program.point_q40[:, 0] - place.point_q40)

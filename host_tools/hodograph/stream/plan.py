@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
+from ..events import SwitchedOutputs
 from ..names import is_toolpath
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
 from .chunk import Chunk, Rest, parse
 from .chunks import JobPlace, SectionChunks
-from .geometry import blocks_from
+from .geometry import begun_with, blocks_from, switching
 from .paths import PathsJob
 from .reading import StreamReader, StreamSection
 
@@ -222,16 +223,17 @@ class JobPlan:
             reader = StreamReader(
                 file, self._job.machine, self._job.tolerance_mm, self._job.reading, self.notes
             )
-            carried = self.after
+            carried, switched = self.after, SwitchedOutputs()
             for section in reader.sections():
                 begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
-                blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40)
+                blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40, switched)
                 block = next(blocks, None) if number >= self._begin.section else None
                 if block is not None:
                     before = () if begin_q40 else (*carried, *section.before)
                     if place is None:
                         made = PlannedSection(number, file, section.first_line, before)
                         first = number
+                        block = begun_with(block, switched.begin())
                     else:
                         place = replace(place, rest=rest_of(before, stops=self.stops))
                         made = PlannedSection(
@@ -240,7 +242,7 @@ class JobPlan:
                     chunks = SectionChunks(
                         self._job.machine,
                         file.stem,
-                        chain([block], blocks),
+                        switching(chain([block], blocks), switched),
                         self._number + first,
                         self._most,
                         begin_q40,
@@ -253,7 +255,8 @@ class JobPlan:
                         yield made, planned.chunk, planned.new_s
                     place = None if last else chunks.end
                 else:
-                    for _ in section.blocks:
+                    for block in section.blocks:
+                        switched.act(block.events)
                         if self._ending:
                             return
                 carried = ()

@@ -8,7 +8,7 @@ curve of each part begins and ends there in the direction of the chord with curv
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..config import Machine
 from ..errors import InputError
+from ..events import Events, events_of, no_events
 from ..feed.request import GREATEST_FEED_MM_S
 from ..job import (
     GREATEST_TOLERANCE_MM,
@@ -25,10 +26,10 @@ from ..job import (
     ignored_note,
     toolpath_commands,
 )
-from ..job_outputs import is_output
+from ..job_outputs import EventMaker, SectionCommands
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
-from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
+from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
 from .geometry import Block, with_joints
@@ -62,6 +63,11 @@ class _Windows(Divider):
 
     window: int = FIRST_CHORDS
     searched: int = 0
+
+    @property
+    def begun(self) -> bool:
+        """Whether the next section has begun, so that `before` holds all that is at rest before it."""
+        return self.moved and self.builder.length_mm >= SHORTEST_MM
 
     def _move(self, move: Move) -> None:
         if move.end[3:] != ORIGIN[3:]:
@@ -139,38 +145,67 @@ class StreamReader:
             raise InputError(f"{self.file}: moves nothing: a job needs a move of 2 um at least")
         while part is not None:
             rest = _Rest(part, parts)
+            first = part.section
             yield StreamSection(
-                self.file, part.first_line, part.before, rest.blocks(), rest.next_start
+                self.file, first.first_line, first.before, rest.blocks(), rest.next_start
             )
             part = rest.next_part
 
-    def _parts(self) -> Iterator[JobSection]:
+    def _parts(self) -> Iterator[_Part]:
         """Fitted parts, tied to each other or from rest to rest."""
-        maker = SectionMaker(self.file, self.machine, self.reading.feed_mm_s, self.notes)
-        for section in self._divided():
-            yield from maker.made(section)
+        sections = SectionMaker(self.file, self.machine, self.reading.feed_mm_s, self.notes)
+        outputs = self.machine.outputs
+        events = None if outputs is None else EventMaker(outputs, self.file)
+        first = True
+        for divided in self._divided():
+            if events is None:
+                yield from (_Part(made) for made in sections.made(divided.section))
+                continue
+            for made, final in _with_final(sections.made(divided.section)):
+                own = events.section(
+                    SectionCommands(made.before, made.events, made.fitted.curve.length_mm),
+                    divided.behind if final else (),
+                    is_first=first,
+                    is_last=divided.is_last and final,
+                )
+                yield _Part(made, events_of(own.events))
+                first = False
 
-    def _divided(self) -> Iterator[Section]:
+    def _divided(self) -> Iterator[_Divided]:
+        """Sections. What is at rest behind one is known when the next one begins: where outputs may be among it, the
+        section waits for that.
+        """
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
         divider = _Windows(str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag))
         divider.tolerance_mm = self.tolerance_mm
+        waits = self.machine.outputs is not None
+        held: Section | None = None
         for command in self._commands():
             divider.take(command)
-            yield from divider.sections
+            for section in divider.sections:
+                if held is not None:
+                    yield _Divided(held, section.before)
+                held = section
+                if section.tied[1] or not waits:
+                    yield _Divided(section)
+                    held = None
             divider.sections.clear()
+            if held is not None and divider.begun:
+                yield _Divided(held, tuple(divider.before))
+                held = None
         divider.stop()
-        yield from divider.sections
+        for section in divider.sections:
+            if held is not None:
+                yield _Divided(held, section.before)
+            held = section
         self.after = tuple(divider.before)
+        if held is not None:
+            yield _Divided(held, self.after, is_last=True)
 
     def _commands(self) -> Iterator[Command]:
-        """Those of the file; the first one of each kind that is passed has a note. Raises InputError at an output."""
+        """Those of the file; the first one of each kind that is passed has a note."""
         noted: set[str] = set()
         for command in toolpath_commands(self.file, self.reading, self.notes):
-            if is_output(command, self.machine.outputs):
-                raise InputError(
-                    f"{self.file}:{command.line}: stream does not switch outputs yet: hodograph run does, where each "
-                    "section fits the controller; a machine file without [outputs] passes them"
-                )
             kind = ignored_kind(command, self.machine.outputs)
             if kind is not None and kind not in noted:
                 noted.add(kind)
@@ -178,24 +213,52 @@ class StreamReader:
             yield command
 
 
+@dataclass(frozen=True, eq=False)
+class _Divided:
+    """A section, or a part of one, with the commands at rest behind it; `is_last`: behind it the file ends."""
+
+    section: Section
+    behind: tuple[Command, ...] = ()
+    is_last: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A fitted part with its events."""
+
+    section: JobSection
+    events: Events = field(default_factory=no_events)
+
+
+def _with_final(parts: Iterator[JobSection]) -> Iterator[tuple[JobSection, bool]]:
+    """Each part, and whether it is the final one."""
+    held = next(parts, None)
+    for part in parts:
+        assert held is not None
+        yield held, False
+        held = part
+    if held is not None:
+        yield held, True
+
+
 class _Rest:
     """The parts of a section after its first one; `next_part` is the first of the next section once all are read."""
 
-    def __init__(self, part: JobSection, parts: Iterator[JobSection]) -> None:
-        self.next_part: JobSection | None = None
+    def __init__(self, part: _Part, parts: Iterator[_Part]) -> None:
+        self.next_part: _Part | None = None
         self._part, self._parts = part, parts
 
     def next_start(self) -> NDArray[np.float64] | None:
         """Where the next section starts."""
         if self.next_part is None:
             return None
-        return np.asarray(self.next_part.fitted.curve.nodal_points[0], dtype=np.float64)
+        return np.asarray(self.next_part.section.fitted.curve.nodal_points[0], dtype=np.float64)
 
     def blocks(self) -> Iterator[Block]:
-        part: JobSection | None = self._part
+        part: _Part | None = self._part
         while part is not None:
-            yield block_of(part)
-            tied = part.tied[1]
+            yield replace(block_of(part.section), events=part.events)
+            tied = part.section.tied[1]
             part = next(self._parts, None)
             if part is not None and not tied:
                 self.next_part = part

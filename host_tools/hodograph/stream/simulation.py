@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import RunError
 from ..feed.pieces import FeedPieces
@@ -31,12 +30,14 @@ class StreamedMotion:
 
     ticks              setpoints, from the first to the exact end
     setpoints_sha256   over them, as docs/reference/protocol.md section 2 has it
+    outputs_sha256     over the outputs at each setpoint: u16 of the digital ones and three i16, little-endian
     takeovers          in motion, and at rest
     sections           paths with rests between them
     """
 
     ticks: int
     setpoints_sha256: str
+    outputs_sha256: str
     takeovers: tuple[int, int]
     sections: int = 1
 
@@ -48,10 +49,13 @@ def simulate_chunks(
 
     Raises RunError: a chunk is refused.
     """
-    stream, digest, ticks = OfflineStream(kernel, limits), hashlib.sha256(), 0
+    stream, ticks = OfflineStream(kernel, limits), 0
+    digest, outputs = hashlib.sha256(), hashlib.sha256()
     axes, sections = 0, 1
 
-    def run(points: NDArray[np.void]) -> int:
+    def run(*, until_rest: bool = False) -> int:
+        points, values = stream.run_with_outputs(_SLICE_TICKS, until_rest=until_rest)
+        outputs.update(values.tobytes())
         counts = counts_from_q40_mm(points["position_q40"][:, :axes], counts_per_mm)
         digest.update(counts.tobytes())
         return len(points)
@@ -68,10 +72,12 @@ def simulate_chunks(
         while stream.sequence != chunk.header.sequence:
             if stream.waits and chunk.header.rest is None:
                 raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
-            ticks += run(stream.run(_SLICE_TICKS, until_rest=True))
+            ticks += run(until_rest=True)
     while stream.state is not State.ENDED:
-        ticks += run(stream.run(_SLICE_TICKS))
-    return StreamedMotion(ticks, digest.hexdigest(), stream.takeovers, sections)
+        ticks += run()
+    return StreamedMotion(
+        ticks, digest.hexdigest(), outputs.hexdigest(), stream.takeovers, sections
+    )
 
 
 class Concatenation:
@@ -83,6 +89,8 @@ class Concatenation:
         self._a: list[np.ndarray] = []
         self._starts: list[np.ndarray] = []
         self._codes: list[np.ndarray] = []
+        self._events: list[np.ndarray] = []
+        self._end_q40 = -1
         self._before: tuple[Chunk, Program] | None = None
 
     def add(self, chunk: Chunk, next_shared_end: int | None) -> None:
@@ -96,6 +104,10 @@ class Concatenation:
         self._starts.append(own.start_q40[fresh] + header.job_start_q40)
         self._points.append(own.point_q40[:, fresh])
         self._a.append(own.a_q44[:, fresh])
+        events = own.events.copy()
+        events["place"] += header.job_start_q40
+        self._events.append(events[events["place"] > self._end_q40])
+        self._end_q40 = header.job_start_q40 + own.length_q40
         self._before = (chunk, own)
 
     def program(self) -> Program:
@@ -115,6 +127,7 @@ class Concatenation:
             pieces=pieces,
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=False,
+            events=np.concatenate(self._events),
         )
         return with_bounds(whole)
 

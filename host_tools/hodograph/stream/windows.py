@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..config import Machine
 from ..errors import PlanError
+from ..events import EVENT
 from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
 from ..feed.limits import Plants
@@ -340,6 +341,7 @@ class SectionFeed:
         knots = found.grid.s[: count + 1]
         segments = np.searchsorted(self.path.curve.segment_starts_mm, knots)
         own = np.arange(count + 1) * PIECE_BYTES + segments * segment_size(self.path.curve.axes)
+        own = own + EVENT.itemsize * self.path.events_before(knots)
         share = np.maximum(t / self._joint.time_s, (own - own[0]) / self._joint.bytes)
         parts = JOINTS * max(1, ceil(float(share[-1]) - _SLIGHTLY_MORE))
         at = np.searchsorted(share, share[-1] * np.arange(1, parts) / parts)

@@ -49,7 +49,7 @@ def test_every_file_is_in_the_table_and_every_code_in_a_file() -> None:
         "AXIS_STEP",
     }  # verify/test_limit_check.py
     of_chunks = {
-        code.name for code in ProgramError if -100 < code <= ProgramError.CHUNK_REST
+        code.name for code in ProgramError if -100 < code <= ProgramError.CHUNK_EVENT
     }  # test_chunk.c
     of_programs = {code.name for code in ProgramError} - of_machines - of_chunks
     assert {row[1] for row in ROWS} - {"OK"} == of_programs

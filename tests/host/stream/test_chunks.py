@@ -16,6 +16,7 @@ import pytest
 
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
+from hodograph.events import SwitchedOutputs
 from hodograph.job import load_job
 from hodograph.native import NativeProgram
 from hodograph.native.program import NativeLimits
@@ -216,7 +217,9 @@ def test_a_part_of_a_section_begins_where_it_is_asked_for(tmp_path: Path, machin
     blocks = list(section.blocks)
     begin_mm = 0.37 * sum(block.curve.length_mm for block in blocks)
     begin_q40 = round(begin_mm * 2**40)
-    made = SectionChunks(machine, "walk", blocks_from(iter(blocks), begin_mm), 1, MOST, begin_q40)
+    made = SectionChunks(
+        machine, "walk", blocks_from(iter(blocks), begin_mm, SwitchedOutputs()), 1, MOST, begin_q40
+    )
     chunks = [one.chunk for one in made.chunks()]
     assert chunks[0].header.job_start_q40 == begin_q40
     first = chunks[0].program

@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: MIT
 """What a streamed toolpath says of commands that nobody executes."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from hodograph.config import load_machine
-from hodograph.errors import InputError
+from hodograph.job import toolpath_commands
+from hodograph.stream import reading
 from hodograph.stream.reading import StreamReader
 from hodograph.toolpath.files import ReadOptions
+from hodograph.toolpath.moves import Command, Move
 
 MACHINES = Path(__file__).parents[3] / "examples" / "machines"
 
@@ -25,12 +28,31 @@ def read(found: StreamReader) -> None:
             pass
 
 
-@pytest.mark.parametrize("word", ["M62 P0", "M65 P0", "M67 E0 Q5", "M3 S50", "M5"])
-def test_an_output_is_refused_with_its_line(tmp_path: Path, word: str) -> None:
-    with pytest.raises(
-        InputError, match=r"job.ngc:4: stream does not switch outputs yet: hodograph run does"
-    ):
-        read(reader(tmp_path, "dispenser.toml", f"G1 X10\n{word}\nG1 X20"))
+@pytest.mark.parametrize("word", ["M62 P0", "M67 E0 Q5"])
+def test_an_output_has_its_place(tmp_path: Path, word: str) -> None:
+    found = reader(tmp_path, "dispenser.toml", f"G1 X10\n{word}\nG1 X20")
+    events = [block.events for section in found.sections() for block in section.blocks]
+    assert [round(event["place"] * 2.0**-40, 6) for event in events[0]] == [10.0]
+    assert not found.notes
+
+
+@pytest.mark.parametrize(("machine", "moves"), [("mill.toml", 1), ("dispenser.toml", 3)])
+def test_a_section_waits_for_what_is_at_rest_behind_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, moves: int
+) -> None:
+    """Where outputs may be behind it; a move that is too short for a section does not count as the next one."""
+    found = reader(tmp_path, machine, "G1 X10\nM65 P0\nG4 P1\nG1 X10.0001\nM62 P0\nG1 X20")
+    read_moves: list[Move] = []
+
+    def counted(file: Path, options: ReadOptions, notes: list[str]) -> Iterator[Command]:
+        for command in toolpath_commands(file, options, notes):
+            if isinstance(command, Move):
+                read_moves.append(command)
+            yield command
+
+    monkeypatch.setattr(reading, "toolpath_commands", counted)
+    next(next(found.sections()).blocks)
+    assert len(read_moves) == moves
 
 
 def test_what_the_machine_does_not_have_is_noted_once(tmp_path: Path) -> None:

@@ -53,7 +53,8 @@ _STRAIGHT_RAD = 1e-6
 """Change of direction up to which moves of G61 go straight on."""
 
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
-_SHORTEST_MM = 2.0**-9
+SHORTEST_MM = 2.0**-9
+"""Shorter moves are no section of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class Divider:
             return None
         here = self._place
         way = float(np.linalg.norm(np.subtract(move.end[:3], here[:3])))
-        if way >= _SHORTEST_MM or (move.end[3:] == here[3:] and (way or self.stands_at is None)):
+        if way >= SHORTEST_MM or (move.end[3:] == here[3:] and (way or self.stands_at is None)):
             return None
         feed = move.feed
         if feed is not None and feed.mode is not FeedMode.INVERSE_TIME:
@@ -251,7 +252,7 @@ class Divider:
         if not self.moved:
             return
         reference = self.builder.reference()
-        if reference.count and float(reference.place_mm[-1]) >= _SHORTEST_MM:
+        if reference.count and float(reference.place_mm[-1]) >= SHORTEST_MM:
             self.add(reference, ends_tied=False)
             begin = self.builder.position
         else:  # too short to be run: the next section makes it good

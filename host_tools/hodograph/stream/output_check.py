@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: MIT
+"""Whether a machine has the outputs that a job switches: found before anything moves.
+
+A toolpath is read part by part while the machine moves, so an output that the machine does not have would be found in
+motion. A scan of the text of G-code costs far less than reading it. It knows numbers only: where it is not sure that
+all is well (an expression, a number that the machine does not have), the file is read once as it will be read in
+motion, which gives the message. So the scan may be wrong to one side only.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from ..config import Machine, load_paths
+from ..config.outputs import Channel, Outputs
+from ..errors import InputError
+from ..job import toolpath_commands
+from ..job_outputs import EventMaker, is_output
+from ..names import STANDARD_INPUT, is_toolpath
+from ..path_outputs import require_output
+from ..toolpath.files import ReadOptions, is_gcode
+
+_COMMENT = re.compile(rb"\([^)]*\)|;.*|\s")
+_NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
+_LITERAL = re.compile(rb"/?\d*(?:[A-Z]" + _NUMBER + rb")*%?")
+_WORD = re.compile(rb"([A-Z])(" + _NUMBER + rb")")
+_DIGITAL, _ANALOGUE = (62.0, 63.0, 64.0, 65.0), (67.0, 68.0)
+
+
+def require_outputs(file: Path, machine: Machine, reading: ReadOptions) -> None:
+    """Raises InputError, naming the line: a file switches an output that the machine does not have, or to a value that
+    is too large. Standard input cannot be read ahead.
+    """
+    if str(file) == STANDARD_INPUT:
+        return
+    if not is_toolpath(file):
+        for listed in load_paths(file):
+            for one in listed.file.outputs:
+                require_output(listed.file, one, machine)
+        return
+    outputs = machine.outputs
+    if outputs is not None and is_gcode(file) and not _Scan(outputs).is_sure(file):
+        _read(file, outputs, reading)
+
+
+def _read(file: Path, outputs: Outputs, reading: ReadOptions) -> None:
+    """Reads all commands. Raises InputError."""
+    maker = EventMaker(outputs, file)
+    for command in toolpath_commands(file, reading, []):
+        if is_output(command, outputs):
+            maker.changed(0, [command])
+
+
+class _Scan:
+    """What the text of a file is sure to do with outputs."""
+
+    def __init__(self, outputs: Outputs) -> None:
+        own = outputs.channels
+        self._digital = {float(one.number) for one in own if one.digital}
+        self._analogue = {float(one.number): one for one in own if not one.digital}
+        self._speed = outputs.codes.speed
+        self._letters = (b"M", b"m") if self._speed is None else (b"M", b"m", b"S", b"s")
+
+    def is_sure(self, file: Path) -> bool:
+        """Whether the machine has all outputs of the file. Raises InputError: it cannot be read."""
+        try:
+            with file.open("rb") as lines:
+                return all(self._line(line) for line in lines)
+        except OSError as error:
+            raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+
+    def _line(self, line: bytes) -> bool:
+        if not any(letter in line for letter in self._letters):
+            return True
+        text = _COMMENT.sub(b"", line).upper()
+        if not any(letter in text for letter in self._letters):
+            return True
+        if not _LITERAL.fullmatch(text):
+            return False
+        words = [(name, float(value)) for name, value in _WORD.findall(text)]
+        value = dict(words)
+        return all(
+            self._has(number, value) for name, number in words if name == b"M"
+        ) and self._fits(self._speed, value.get(b"S"))
+
+    def _has(self, code: float, value: dict[bytes, float]) -> bool:
+        if code in _DIGITAL:
+            return value.get(b"P") in self._digital
+        if code in _ANALOGUE:
+            channel = self._analogue.get(value.get(b"E", -1.0))
+            return channel is not None and self._fits(channel, value.get(b"Q"))
+        return True
+
+    @staticmethod
+    def _fits(channel: Channel | None, value: float | None) -> bool:
+        if channel is None or value is None:
+            return True
+        try:
+            channel.valued(0, value, "")
+        except InputError:
+            return False
+        return True
