@@ -348,6 +348,14 @@ def _stream(command: Command) -> None:
         help="no bus: plan all chunks, check them and take them over as the controller does",
     )
     stream.add_argument(
+        "--jobs",
+        type=int,
+        choices=(1, 2),
+        default=2,
+        metavar="N",
+        help="processes that prepare the job: 1, or 2 (default); the chunks are the same",
+    )
+    stream.add_argument(
         "--record",
         type=Path,
         metavar="RECORDING",

@@ -34,7 +34,7 @@ from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import Entry, Journal, load, mark
 from ..stream.output_check import require_outputs
-from ..stream.plan import JobFiles, JobPlan, Place
+from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place
 from ..stream.resuming import nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
@@ -191,7 +191,14 @@ def _run(
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
-        with JobPlan(job, most, job_number, begin, stops=not options.no_stops) as plan:
+        with JobPlan(
+            job,
+            most,
+            job_number,
+            begin,
+            stops=not options.no_stops,
+            processes=_processes(options),
+        ) as plan:
             sender = Sender(
                 at,
                 job.machine,
@@ -317,6 +324,11 @@ def _print(done: StreamedJob, options: Namespace) -> None:
     )
 
 
+def _processes(options: Namespace) -> int:
+    """That plan the job; `run`, which streams by itself, has no option for it."""
+    return int(getattr(options, "jobs", PROCESSES))
+
+
 def _simulate(job: JobFiles, options: Namespace) -> None:
     """All chunks through the controller's core, without a bus."""
     machine = job.machine
@@ -325,7 +337,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     found: list[StreamedMotion] = []
     begin_s = time.perf_counter()
     with (
-        JobPlan(job, RING_BYTES // _RING_SHARE, 1, Place()) as plan,
+        JobPlan(job, RING_BYTES // _RING_SHARE, 1, Place(), processes=_processes(options)) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():

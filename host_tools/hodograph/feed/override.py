@@ -117,7 +117,7 @@ class _Piece:
 
         def second(rate: Real) -> Real:
             own = (left_j - 3.0 * at * rate * self.a) / self.v
-            return np.minimum.reduce([own, *(other(rate) for other in others)])
+            return np.asarray(np.minimum.reduce([own, *(other(rate) for other in others)]))
 
         return second
 

@@ -77,11 +77,11 @@ def short_segments(block: Block) -> Block:
 
 
 def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
-    """Segments first … last - 1 of a curve."""
+    """Segments first … last - 1 of a curve, in memory of their own: sums do not depend on where they come from."""
     part = slice(first, last)
     if isinstance(curve, PHSpline):
-        return PHSpline(curve.origin[part], curve.w[part], False)
-    return SpatialPHSpline(curve.origin[part], curve.preimage[part], False)
+        return PHSpline(curve.origin[part].copy(), curve.w[part].copy(), False)
+    return SpatialPHSpline(curve.origin[part].copy(), curve.preimage[part].copy(), False)
 
 
 def joined(curves: Sequence[Curve]) -> Curve:

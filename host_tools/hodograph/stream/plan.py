@@ -26,6 +26,10 @@ from .chunks import JobPlace, SectionChunks
 from .geometry import begun_with, blocks_from, switching
 from .paths import PathsJob
 from .reading import StreamReader, StreamSection
+from .reading_process import ParallelReader
+
+PROCESSES = 2
+"""Of a job that is planned: one reads and fits, the other plans."""
 
 _MEETS_MM = 1e-6
 """A section that begins so near to the end of the one before goes on from there."""
@@ -72,12 +76,21 @@ class JobPlan:
     """
 
     def __init__(
-        self, job: JobFiles, most_bytes: int, number: int, begin: Place, *, stops: bool = True
+        self,
+        job: JobFiles,
+        most_bytes: int,
+        number: int,
+        begin: Place,
+        *,
+        stops: bool = True,
+        processes: int = PROCESSES,
     ) -> None:
         """`number`: of the job in the controller that begins with section 0, others have it plus the number of their
-        first section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator.
+        first section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator;
+        `processes`: 1 reads and fits in this one too. The chunks are the same.
         """
         self.stops = stops
+        self._processes = processes
         self._job, self._most, self._number, self._begin = job, most_bytes, number, begin
         self.notes: list[str] = []
         self.after: tuple[Command, ...] = ()
@@ -220,9 +233,7 @@ class JobPlan:
                 continue
             place: JobPlace | None = None
             first = number
-            reader = StreamReader(
-                file, self._job.machine, self._job.tolerance_mm, self._job.reading, self.notes
-            )
+            reader = self._reader(file)
             carried, switched = self.after, SwitchedOutputs()
             for section in reader.sections():
                 begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
@@ -262,6 +273,11 @@ class JobPlan:
                 carried = ()
                 number += 1
             self.after = reader.after
+
+    def _reader(self, file: Path) -> StreamReader | ParallelReader:
+        job = self._job
+        reader = StreamReader(file, job.machine, job.tolerance_mm, job.reading, self.notes)
+        return ParallelReader(reader) if self._processes > 1 else reader
 
     def _paths(
         self, file: Path, number: int, carried: tuple[Command, ...]

@@ -32,7 +32,7 @@ from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
-from .geometry import Block, with_joints
+from .geometry import Block, sliced, with_joints
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -286,4 +286,4 @@ def block_of(section: JobSection) -> Block:
     padded = np.append(np.minimum(reference.feed_mm_s, GREATEST_FEED_MM_S), np.inf)
     ranges = np.column_stack((low, high)).ravel()
     feed = np.minimum.reduceat(padded, ranges)[::2]
-    return Block(curve, feed, reference.line[low])
+    return Block(sliced(curve, 0), feed, reference.line[low])

@@ -387,7 +387,7 @@ class SectionFeed:
             tried.add(at)
             high = float(ends[at])
             limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
-            one = plan_window(curve, limits, low, high, state, self._period_s)
+            one = plan_window(curve, limits, low, high, state, self._period_s, hurried=True)
             one = None if one is None else measured(curve, one)
             if one is None or one.excess > _TAIL_EXCESS - 1.0:
                 continue

@@ -29,7 +29,7 @@ ALLOWED = 5e-4
 """Excess that a plan may have, as a share of a limit."""
 
 _MOST_ROUNDS = 9
-_GAIN = 1e-4
+_GAIN, _HURRIED_GAIN = 1e-4, 0.1
 _BESIDE = 1e-7
 _LEAST_Q = 1e-14
 _LEAST_TYPICAL = 1e-12
@@ -107,10 +107,14 @@ def plan_window(
     period_s: float,
     known: Solution | None = None,
     known_to: float = 0.0,
+    *,
+    hurried: bool = False,
 ) -> Solution | None:
     """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
 
-    known  an earlier solution that is good up to arc length known_to
+    known    an earlier solution that is good up to arc length known_to
+    hurried  the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
+             hundred slower
     """
     guess = first_estimate(spline, limits, low, high, None if start is None else start.q, period_s)
     s, t, step = guess.s, guess.t, guess.step_s
@@ -122,10 +126,11 @@ def plan_window(
         knots = choose_knots(spline, limits, s, t, step, period_s)
         if known is not None:
             knots = _same_knots(knots, known, known_to)
-        last = trial == _MOST_TRIALS - 1
+        last = hurried or trial == _MOST_TRIALS - 1
         even = partial(_even, guess, known_to, period_s)
         setting = _setting(spline, limits, knots, start)
-        best = _Rounds(setting, about).run(None if last else even)
+        gain = _HURRIED_GAIN if hurried else _GAIN
+        best = _Rounds(setting, about).run(None if last else even, gain)
         if best is None or last or even(best):
             break
         about = best.squared_feed
@@ -308,10 +313,13 @@ class _Rounds:
             self.about = About(np.maximum(p, _LEAST_P), (d, dd))
             self.typical_q, self.duration_s = known.q, known.duration_s
 
-    def run(self, even: Callable[[Solution], bool] | None = None) -> Solution | None:
+    def run(
+        self, even: Callable[[Solution], bool] | None = None, least_gain: float = _GAIN
+    ) -> Solution | None:
         """The last solution; None where there is none, or only one above the limits.
 
-        even  of a solution: where it is False after _TRUSTED rounds, further rounds on these knots are useless
+        even        of a solution: where it is False after _TRUSTED rounds, further rounds on these knots are useless
+        least_gain  share of the time that a further round has to gain
         """
         for rounds in range(1, _MOST_ROUNDS + 1):
             unknowns = self._solved()
@@ -322,7 +330,7 @@ class _Rounds:
             if rounds == _TRUSTED and even is not None and not even(self.best):
                 return self.best
             self.select.everything = rounds >= _PATIENCE
-            if self.best.excess <= ALLOWED and abs(gain) < _GAIN * self.duration_s:
+            if self.best.excess <= ALLOWED and abs(gain) < least_gain * self.duration_s:
                 break
         moving = self.setting.start is not None
         return None if self.exceeded and moving and not self._tolerable else self.best

@@ -61,11 +61,24 @@ def smoothed(
 
 
 @dataclass(frozen=True, eq=False)
+class _Shifted:
+    """Shifts (n, m), and what follows from them: what is left of the squares of the bounds (n,), the third differences
+    (n - 3, 3), and the cost with the barrier at a level.
+    """
+
+    shift: Real
+    room: Real
+    difference: Real
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
 class _Problem:
     """The cost as |residual + linear part|^2 / 2, banded."""
 
     stations: Stations
     free: NDArray[np.bool_]
+    square: Real  # (n,) of the bounds; 1 where they are 0
     coefficient: Real  # (n - 3, 4), weighted
     band: Real  # upper banded storage of the Hessian
 
@@ -77,32 +90,28 @@ class _Problem:
         coefficient = coefficient * np.sqrt(width * middle)[:, None]
         coefficient[group[_ORDER:] != group[:-_ORDER]] = 0.0
         free = stations.bound > 0.0
-        return cls(stations, free, coefficient, _hessian(stations.normal, free, coefficient))
+        band = _hessian(stations.normal, free, coefficient)
+        return cls(stations, free, np.where(free, stations.bound, 1.0) ** 2, coefficient, band)
 
     def minimum(self, shift: Real, level: float) -> Real:
         """Newton's method with a line search that stays inside the bounds."""
-        value = self._value(shift, level)
+        at = self._at(shift, level)
         for _ in range(_MOST_STEPS):
-            gradient = self._gradient(shift, level)
-            step = self._newton(shift, level, gradient)
+            gradient = self._gradient(at, level)
+            step = self._newton(at, level, gradient)
             decrease = -float(np.sum(gradient * step))
             if not decrease > _CLOSE * level:
                 break
-            along = min(1.0, 0.95 * self._longest(shift, step))
+            along = min(1.0, 0.95 * self._longest(at, step))
             for _ in range(40):
-                tried = shift + along * step
-                new = self._value(tried, level)
-                if new <= value - 0.1 * along * decrease:
+                tried = self._at(at.shift + along * step, level)
+                if tried.value <= at.value - 0.1 * along * decrease:
                     break
                 along *= 0.5
             else:
                 break
-            shift, value = tried, new
-        return shift
-
-    def _room(self, shift: Real) -> Real:
-        bound = np.where(self.free, self.stations.bound, 1.0)
-        return np.asarray(bound**2 - np.sum(shift * shift, axis=1))
+            at = tried
+        return at.shift
 
     def _differences(self, shift: Real) -> Real:
         point = self.stations.moved(shift)
@@ -111,33 +120,34 @@ class _Problem:
             sum(self.coefficient[:, k, None] * point[k : k + rows] for k in range(_ORDER + 1))
         )
 
-    def _value(self, shift: Real, level: float) -> float:
-        room = self._room(shift)
-        if room.min() <= 0.0:
-            return float("inf")
-        bound = np.where(self.free, self.stations.bound, 1.0)
-        cost = 0.5 * float(np.sum(self._differences(shift) ** 2))
-        return cost - level * float(np.sum(np.log(room / bound**2)))
-
-    def _gradient(self, shift: Real, level: float) -> Real:
+    def _at(self, shift: Real, level: float) -> _Shifted:
+        room = self.square - np.sum(shift * shift, axis=1)
         difference = self._differences(shift)
+        if room.min() <= 0.0:
+            return _Shifted(shift, room, difference, float("inf"))
+        cost = 0.5 * float(np.sum(difference**2))
+        value = cost - level * float(np.sum(np.log(room / self.square)))
+        return _Shifted(shift, room, difference, value)
+
+    def _gradient(self, at: _Shifted, level: float) -> Real:
         pull = np.zeros_like(self.stations.point)
-        rows = difference.shape[0]
+        rows = at.difference.shape[0]
         for k in range(_ORDER + 1):
-            pull[k : k + rows] += self.coefficient[:, k, None] * difference
+            pull[k : k + rows] += self.coefficient[:, k, None] * at.difference
         out = np.einsum("nkm,nk->nm", self.stations.normal, pull)
-        out += 2.0 * level * shift / self._room(shift)[:, None]
+        out += 2.0 * level * at.shift / at.room[:, None]
         out[~self.free] = 0.0
         return np.asarray(out)
 
-    def _newton(self, shift: Real, level: float, gradient: Real) -> Real:
+    def _newton(self, at: _Shifted, level: float, gradient: Real) -> Real:
+        shift, room = at.shift, at.room
         size = shift.shape[1]
-        room = self._room(shift)
         band = self.band.copy()
         flat = 2.0 * level / room
+        squared = room**2
         for a in range(size):
             for b in range(a, size):
-                own = 4.0 * level * shift[:, a] * shift[:, b] / room**2
+                own = 4.0 * level * shift[:, a] * shift[:, b] / squared
                 band[-1 - (b - a), b::size] += own + (flat if a == b else 0.0)
         scale = 1.0 / np.sqrt(band[-1])
         width = band.shape[0]
@@ -149,12 +159,12 @@ class _Problem:
             return np.asarray(-gradient / flat[:, None])
         return np.asarray((step * scale).reshape(shift.shape))
 
-    def _longest(self, shift: Real, step: Real) -> float:
+    def _longest(self, at: _Shifted, step: Real) -> float:
         """The greatest multiple of the step that stays inside the bounds."""
         a = np.sum(step * step, axis=1)
-        b = np.sum(shift * step, axis=1)
+        b = np.sum(at.shift * step, axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach = (-b + np.sqrt(b * b + a * self._room(shift))) / a
+            reach = (-b + np.sqrt(b * b + a * at.room)) / a
         return float(np.where(self.free & (a > 0.0), reach, np.inf).min(initial=np.inf))
 
 
