@@ -32,7 +32,9 @@ MACHINES = {
 }
 TARGETS = tuple(MACHINES)
 _SHIFTS = {"microbit": 5}
-"""Of -icount: an instruction takes 2**shift ns, 6 where nothing is said. 32 ns: a Cortex-M0 of 48 MHz, about."""
+"""Of -icount: an instruction takes 2**shift ns. 32 ns: a Cortex-M0 of 48 MHz, about."""
+_SHIFT = 6
+"""Of the other boards, where --icount does not say another one."""
 _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
 _GRACE_S = 60.0
 """For the board to notice that its bridge is gone, and the other way round: at once, if they get the processor."""
@@ -79,6 +81,12 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         metavar="HOST:PORT",
         help="SLCAN on this TCP port instead of a bus (python-can, with pyserial: slcan:socket://HOST:PORT)",
     )
+    parser.add_argument(
+        "--icount",
+        type=int,
+        choices=range(3, 8),
+        help="an instruction takes 2^N ns of the board's time (default 6, microbit 5); fifo only",
+    )
     parser.add_argument("--image", type=Path, help="another image than that of make firmware")
     parser.add_argument("--plugin", help="a plugin for QEMU, with its words (tools/count_til.py)")
     parser.add_argument("--build", type=Path, default=ROOT / "build", help=argparse.SUPPRESS)
@@ -101,7 +109,9 @@ def qemu_command(options: argparse.Namespace, ports: tuple[int, int]) -> list[st
     command = ["qemu-system-arm", "-M", *MACHINES[options.target], "-display", "none"]
     command += ["-monitor", "none", "-accel", "tcg,tb-size=32"]
     if options.link == "fifo":
-        shift = _SHIFTS.get(options.target, 6)
+        shift = options.icount
+        if shift is None:
+            shift = _SHIFTS.get(options.target, _SHIFT)
         command += ["-serial", "none", "-icount", f"shift={shift},sleep=off"]
     else:
         command += ["-chardev", f"{_uart(options, ports)},id=uart,mux=on"]

@@ -344,7 +344,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
             found.append(simulate_chunks(chunks, limits, kernel, machine.counts_per_mm))
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
-        counted = {"chunks": plan.chunks, "bytes": plan.bytes}
+        counted = {"chunks": plan.chunks, "bytes": plan.byte_count}
     took_s = time.perf_counter() - begin_s
     for line in notes:
         note(line)

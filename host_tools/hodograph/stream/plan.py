@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: MIT
-"""The plan of a job, made ahead by a thread and kept in a file, so that it takes no memory."""
+"""The plan of a job, made ahead by a thread and kept on the disk, so that it takes no memory."""
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from array import array
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
 from math import ceil
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
+from ..errors import RunError
 from ..events import SwitchedOutputs
 from ..names import is_toolpath
 from ..toolpath.files import ReadOptions
@@ -27,12 +29,17 @@ from .geometry import begun_with, blocks_from, switching
 from .paths import PathsJob
 from .reading import StreamReader, StreamSection
 from .reading_process import ParallelReader
+from .store import PART_BYTES, RESERVE_BYTES, ChunkStore
 
 PROCESSES = 2
 """Of a job that is planned: one reads and fits, the other plans."""
 
 _MEETS_MM = 1e-6
 """A section that begins so near to the end of the one before goes on from there."""
+_RATE_S, _FOR_EVER_S = 3.0, 1e6
+MOST_WAITING_BYTES, _MOST_WAITING = 512 << 20, 100_000
+"""Planned chunks that wait for those who read them: where there are so many, planning waits. Each keeps its section in
+memory."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,10 @@ class PlannedSection:
 class JobPlan:
     """Chunks of a job in order, planned ahead of those who read them. A context manager: its end ends the planning.
 
-    notes  of reading and fitting; grows
+    Chunks wait on the disk. Planning pauses while much waits, or while the disk has no room.
+
+    notes          of reading and fitting; grows
+    section_count  sections planned so far
     """
 
     def __init__(
@@ -94,39 +104,44 @@ class JobPlan:
         self._job, self._most, self._number, self._begin = job, most_bytes, number, begin
         self.notes: list[str] = []
         self.after: tuple[Command, ...] = ()
-        self.sections: list[PlannedSection] = []
-        self._file = tempfile.TemporaryFile(prefix="hodograph-stream-")  # noqa: SIM115
-        self._ends = array("q", [0])
+        self.section_count = 0
+        self._store = ChunkStore()
         self._motion_s = array("d", [0.0])
-        self._section_of = array("l")
+        self._waits_s = array("d", [0.0])
+        self._waiting: deque[PlannedSection] = deque()
+        """Of the chunks that may still be read, one for each."""
+        self._rate = _GreatestRate()
         self._error: BaseException | None = None
         self._done = self._ending = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, name="planner", daemon=True)
 
-    def __enter__(self) -> JobPlan:
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._ending = True
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
         self._thread.join()
-        self._file.close()
+        self._store.forget_all()
 
     def item(self, index: int, wait_s: float) -> tuple[PlannedSection, Chunk, float] | None:
         """The chunk with this index, its section and its new motion in s. None: not yet planned after `wait_s`.
 
-        Raises IndexError behind the last one, and what planning raised where it comes to that.
+        Those before it cannot be read again. Raises IndexError behind the last one, and what planning raised where it
+        comes to that.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._planned > index or self._done, wait_s)
-            if self._planned > index:
-                begin, end = self._ends[index], self._ends[index + 1]
-                self._file.seek(begin)
-                chunk = parse(self._file.read(end - begin))
-                self._file.seek(0, 2)
+            self._changed.wait_for(lambda: self.chunks > index or self._done, wait_s)
+            if self.chunks > index:
+                chunk = parse(self._store.get(index))
+                while len(self._waiting) > self.chunks - index:
+                    self._waiting.popleft()
+                self._changed.notify_all()
                 new_s = self._motion_s[index + 1] - self._motion_s[index]
-                return self.sections[self._section_of[index]], chunk, new_s
+                return self._waiting[0], chunk, new_s
             if self._error is not None:
                 raise self._error
             if self._done:
@@ -156,28 +171,23 @@ class JobPlan:
     @property
     def chunks(self) -> int:
         """Planned so far."""
-        return self._planned
+        return self._store.count
 
     @property
-    def bytes(self) -> int:
+    def byte_count(self) -> int:
         """Of these chunks."""
-        return self._ends[-1]
-
-    @property
-    def _planned(self) -> int:
-        return len(self._section_of)
+        return self._store.byte_count
 
     def behind_s(self, index: int) -> float | None:
         """Motion and dwells behind the chunk with this index; None: not known before all is planned."""
         with self._changed:
             if not self._done or self._error is not None:
                 return None
-            at = min(index + 1, self._planned)
-            own = self._section_of[at - 1] if at else -1
-            waits_s = sum(self._waits_s(section) for section in self.sections[own + 1 :])
+            at = min(index + 1, self.chunks)
+            waits_s = self._waits_s[-1] - self._waits_s[at]
             return self._motion_s[-1] - self._motion_s[at] + waits_s + dwell_s(self.after)
 
-    def _waits_s(self, section: PlannedSection) -> float:
+    def _wait_s(self, section: PlannedSection) -> float:
         """Standstill before a section, program stops aside."""
         if section.rest is None:
             return dwell_s(section.before)
@@ -191,37 +201,52 @@ class JobPlan:
 
     def greatest_rate(self) -> float:
         """Greatest bytes for each second of motion, over about _RATE_S, so far."""
-        with self._changed:
-            worst, first = 0.0, 0
-            for last in range(1, self._planned + 1):
-                while self._motion_s[last] - self._motion_s[first + 1] > _RATE_S:
-                    first += 1
-                time_s = self._motion_s[last] - self._motion_s[first]
-                if time_s >= _RATE_S:
-                    worst = max(worst, (self._ends[last] - self._ends[first]) / time_s)
-            return worst
+        return self._rate.worst
 
     def _work(self) -> None:
         try:
+            last: PlannedSection | None = None
             for section, chunk, new_s in self._planning():
                 data = chunk.encode()
                 with self._changed:
-                    self._file.write(data)
-                    self._file.flush()
-                    if not self.sections or self.sections[-1] is not section:
-                        self.sections.append(section)
-                    self._ends.append(self._ends[-1] + len(data))
+                    if not self._put(data):
+                        return
+                    waits_s = 0.0
+                    if section is not last:
+                        last = section
+                        self.section_count += 1
+                        waits_s = self._wait_s(section)
+                    self._waiting.append(section)
                     self._motion_s.append(self._motion_s[-1] + new_s)
-                    self._section_of.append(len(self.sections) - 1)
+                    self._waits_s.append(self._waits_s[-1] + waits_s)
+                    self._rate.extend(self._store, self._motion_s)
                     self._changed.notify_all()
-                if self._ending:
-                    return
         except BaseException as error:
             self._error = error
         finally:
             with self._changed:
                 self._done = True
                 self._changed.notify_all()
+
+    def _put(self, data: bytes) -> bool:
+        """Keeps a chunk as soon as there is room. False: the plan ends. Raises RunError: there will be no room."""
+        store, changed = self._store, self._changed
+        changed.wait_for(lambda: self._ending or not _is_full(store))
+        while not self._ending and not store.put(data):
+            if not store.waiting:
+                store.forget_all()
+                if store.put(data):
+                    break
+                raise RunError(
+                    f"{store.folder}: the disk is full, and the plan of the job is kept there: free "
+                    f"{(RESERVE_BYTES + PART_BYTES) >> 20} MiB, or set TMPDIR to a folder with room"
+                )
+            waiting = store.waiting
+            changed.wait_for(partial(self._fewer_than, waiting))
+        return not self._ending
+
+    def _fewer_than(self, waiting: int) -> bool:
+        return self._ending or self._store.waiting < waiting
 
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         number = 0
@@ -307,7 +332,26 @@ class JobPlan:
         return bool(np.abs(machine_mm - end_q40 * 2.0**-40).max() < _MEETS_MM)
 
 
-_RATE_S, _FOR_EVER_S = 3.0, 1e6
+def _is_full(store: ChunkStore) -> bool:
+    return store.waiting_bytes >= MOST_WAITING_BYTES or store.waiting >= _MOST_WAITING
+
+
+class _GreatestRate:
+    """The most bytes of chunks for each second of their motion, over about _RATE_S, kept up to date."""
+
+    def __init__(self) -> None:
+        self.worst = 0.0
+        self._first = 0
+
+    def extend(self, store: ChunkStore, motion_s: Sequence[float]) -> None:
+        """Another chunk has come."""
+        last = store.count
+        while motion_s[last] - motion_s[self._first + 1] > _RATE_S:
+            self._first += 1
+        time_s = motion_s[last] - motion_s[self._first]
+        if time_s >= _RATE_S:
+            size = store.end_of(last) - store.end_of(self._first)
+            self.worst = max(self.worst, size / time_s)
 
 
 def rest_of(commands: Sequence[Command], *, stops: bool) -> Rest:

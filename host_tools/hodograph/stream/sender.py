@@ -116,24 +116,21 @@ class Sender:
         while item is not None:
             self._job(item[0], item[1])
             item = self._wait_item()
-        if self.plan.sections:
-            at_rest(self.at, self._file_of_last(), self.plan.after, self.operator)
+        if self._ahead:
+            at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
         else:
             self.at.note("nothing of the job is left")
         if self.journal is not None:
             self.journal.update(done=True)
         took_s = self.at.controller.clock.now_s() - begun_s
         return StreamedJob(
-            len(self.plan.sections),
+            self.plan.section_count,
             self._next,
             self._bytes,
             self._motion_s,
             took_s,
             self._underruns,
         )
-
-    def _file_of_last(self) -> Path:
-        return self.plan.sections[-1].file
 
     def _wait_item(self) -> tuple[PlannedSection, Chunk, float] | None:
         """The next chunk, as soon as it is planned; None: there is no more."""
@@ -276,8 +273,10 @@ class Sender:
 
     def _slow_down(self) -> None:
         """Lowers the feed override where the bus has not the bytes that the job needs."""
+        if self.slow is None:
+            return
         needed = self.plan.greatest_rate()
-        if self.slow is None or needed * 0.01 * self._percent <= self.slow:
+        if needed * 0.01 * self._percent <= self.slow:
             return
         percent = max(int(100.0 * self.slow / needed), 1)
         self._percent = percent

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,9 +43,15 @@ class StreamedMotion:
 
 
 def simulate_chunks(
-    chunks: Iterable[Chunk], limits: NativeLimits, kernel: str, counts_per_mm: int
+    chunks: Iterable[Chunk],
+    limits: NativeLimits,
+    kernel: str,
+    counts_per_mm: int,
+    setpoints: Callable[[NDArray[np.int32]], None] | None = None,
 ) -> StreamedMotion:
     """Runs the chunks of a job through the controller's core: each is given when its predecessor is under way.
+
+    `setpoints` gets them, (n, A), part by part.
 
     Raises RunError: a chunk is refused.
     """
@@ -58,6 +64,8 @@ def simulate_chunks(
         outputs.update(values.tobytes())
         counts = counts_from_q40_mm(points["position_q40"][:, :axes], counts_per_mm)
         digest.update(counts.tobytes())
+        if setpoints is not None:
+            setpoints(counts)
         return len(points)
 
     for chunk in chunks:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -37,12 +38,13 @@ def machine() -> Machine:
 def _planned(machine: Machine, begin: Place) -> list[tuple[int, Chunk, tuple[object, ...]]]:
     job = JobFiles((PATHS,), machine, 0.01, ReadOptions())
     with JobPlan(job, CHUNK_BYTES, 7, begin) as plan:
-        chunks = [chunk for chunks in plan.by_job() for chunk in chunks]
-        assert len(plan.sections) == len(chunks)
-        return [
-            (section.number, chunk, section.before)
-            for section, chunk in zip(plan.sections, chunks, strict=True)
-        ]
+        found = []
+        with suppress(IndexError):
+            while (item := plan.item(len(found), 100.0)) is not None:
+                section, chunk, _ = item
+                found.append((section.number, chunk, section.before))
+        assert plan.section_count == len(found)
+        return found
 
 
 def test_paths_are_one_job(machine: Machine) -> None:
