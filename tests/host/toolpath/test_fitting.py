@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -20,7 +22,11 @@ from hodograph.toolpath.fit.reference import (
     spline_points,
 )
 from hodograph.toolpath.fit.speeds import MotionLimits
-from hodograph.toolpath.moves import ArcMove, Feed, FeedMode, Plane, SplineMove
+from hodograph.toolpath.fit.stations import turns
+from hodograph.toolpath.gcode import read_gcode
+from hodograph.toolpath.moves import ArcMove, Feed, FeedMode, Plane, SplineMove, StraightMove
+from linuxcnc import programs
+from marks import long
 
 LIMITS = MotionLimits(200.0, 2000.0, 50000.0)
 FEED = Feed(FeedMode.PER_MINUTE, 100.0)
@@ -186,14 +192,82 @@ def test_chords_of_a_smooth_curve_are_passed_at_full_feed() -> None:
     assert least_time_s(found, 60.0) < found.curve.length_mm / 60.0 + 0.12
 
 
-@pytest.mark.parametrize("points", [wave(240), np.pad(staircase(6, 4.0), ((0, 0), (0, 1)))])
-def test_noise_of_a_micrometre_changes_the_time_by_less_than_a_percent(points: np.ndarray) -> None:
-    plain = least_time_s(fitted(points), 100.0)
-    for seed in (1, 2):
-        noise = np.random.default_rng(seed).uniform(-0.001, 0.001, size=(len(points), 2))
-        noisy = points.copy()
-        noisy[:, :2] += noise
-        assert least_time_s(fitted(noisy), 100.0) == pytest.approx(plain, rel=0.01)
+def rounded_rectangle(chord_mm: float) -> np.ndarray:
+    """100 x 60 mm with arcs of 5 mm, from the middle of a side."""
+    turn = np.linspace(-0.5, 0.0, round(2.5 * np.pi / chord_mm) + 1) * np.pi
+    corner = 5.0 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    centres = np.array([[45.0, 5.0], [45.0, 55.0], [-45.0, 55.0], [-45.0, 5.0]])
+    points = [[[0.0, 0.0]]]
+    for k, centre in enumerate(centres):
+        points.append(corner @ np.linalg.matrix_power(quarter, k).T + centre)
+    points.append([[0.0, 0.0]])
+    outline = np.vstack(points)
+    place = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(outline, axis=0), axis=1)))
+    even = np.union1d(np.arange(0.0, place[-1], chord_mm), place)
+    even = even[np.append(True, np.diff(even) > 0.1 * chord_mm)]
+    return np.stack([np.interp(even, place, column) for column in outline.T], axis=1)
+
+
+def walls() -> np.ndarray:
+    """Rows over a surface with steep walls; some points are 8 um apart, also on straight lines."""
+    rows = [(0.0, 0.0), (2.9, 0.0), (3.16, -0.24), (3.32, -0.5), (3.392, -0.9), (3.4, -1.03)]
+    rows += [(3.4, -14.0), (9.5, -14.0), (9.65, -14.0), (10.025, -14.0), (10.267, -14.0)]
+    rows += [(10.275, -14.0), (10.603, -14.0), (10.611, -1.9), (10.619, -1.8), (10.66, -1.53)]
+    rows += [(10.71, -1.26), (10.9, -0.35), (11.4, 0.4), (12.5, 1.1), (20.0, 1.1), (20.008, 1.1)]
+    rows += [(20.016, -14.0), (20.3, -14.0), (23.3, -14.0), (40.0, -14.0)]
+    y, z = np.array(rows).T
+    return np.stack((np.zeros_like(y), y, z), axis=1)
+
+
+NOISY = {
+    "wave": (wave(240), 0.01),
+    "staircase": (np.pad(staircase(6, 4.0), ((0, 0), (0, 1))), 0.01),
+    "rectangle": (np.pad(rounded_rectangle(0.06), ((0, 0), (0, 1))), 0.02),
+    "walls": (walls(), 0.01),
+}
+"""Points, and by how much noise may change the time. Chords of 0.06 mm turn by more than the arc does: the goal of 1 % is
+missed there, by half a percent.
+"""
+
+
+@pytest.mark.parametrize("feed_mm_s", [100.0, long(200.0)])
+@pytest.mark.parametrize("name", NOISY)
+def test_noise_of_a_micrometre_hardly_changes_the_time(
+    name: str, feed_mm_s: float
+) -> None:
+    points, share = NOISY[name]
+    plain = least_time_s(fitted(points), feed_mm_s)
+    moving = np.ptp(points, axis=0) > 0.0
+    for seed in (1, 2, 3):
+        noise = np.random.default_rng(seed).uniform(-0.001, 0.001, size=points.shape)
+        noisy = least_time_s(fitted(points + moving * noise), feed_mm_s)
+        assert noisy == pytest.approx(plain, rel=share), seed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("name", ["3D_Chips.ngc", "spiral.ngc"])
+def test_noise_on_programs_of_linuxcnc(name: str, seed: int) -> None:
+    program = next(path for path in programs() if path.name == name)
+    lines = program.read_text(encoding="utf-8", errors="surrogateescape").splitlines()[:2000]
+    moves = [move for move in read_gcode([*lines, "M2"], name) if isinstance(move, StraightMove)]
+    points = np.array([move.end[:3] for move in moves])
+    points = points[np.append(True, (np.diff(points, axis=0) != 0.0).any(axis=1))]
+    noise = np.random.default_rng(seed).uniform(-0.001, 0.001, size=points.shape)
+    moving = np.ptp(points, axis=0) > 0.0
+    plain, noisy = (
+        sum(least_time_s(one, 100.0) for one in fitted_sections(each))
+        for each in (points, points + moving * noise)
+    )
+    assert noisy == pytest.approx(plain, rel=0.01)
+
+
+def fitted_sections(points: np.ndarray) -> list[FittedPath]:
+    """The curves between the turns that are stops."""
+    stop = np.flatnonzero(turns(points) > SHARPEST_RAD)
+    ends = [0, *stop.tolist(), len(points) - 1]
+    return [fitted(points[a : b + 1]) for a, b in itertools.pairwise(ends)]
 
 
 @pytest.mark.parametrize("turns", [1, -1, 3])

@@ -30,7 +30,7 @@ _CORNER_SHARE, _ROOM_SHARE = 0.985, 0.97
 """Of the tolerance: for corner curves, and for stations of smoothed stretches."""
 
 _LEG_SHARE = 0.98
-_ENDS = 4.0
+_ENDS = 8.0
 _BARRIER = 1e-6
 _POWER = 5
 _ROUNDS = 4
@@ -39,7 +39,10 @@ _MOST_FOR_CHOICE = 20_000
 _SLOW_SHARES = (0.5, 0.25)
 """Of the speed at which full acceleration is reached within a length that jerk allows: caps of further estimates."""
 
-_LESS_ROOM = 0.75
+_LESS_ROOM = (0.95, 0.95, 0.95, 0.75)
+"""Of the room, where a curve was out of it: in the first rounds of repair, then in all. At first the new stations help,
+and less room costs time.
+"""
 _THIN_SHARE = 0.01
 _THIN_ROUNDS = 4
 
@@ -96,10 +99,11 @@ def fit(
     path = outline(reference, how.tolerance_mm, tied)
     plan = _Plan.of(path, how, tied).with_stretches(_ROOM_SHARE).with_choice(_caps(reference, how))
     bad = np.zeros(0, dtype=np.intp)
-    for _ in range(_REPAIRS):
+    for less in _LESS_ROOM + _LESS_ROOM[-1:] * (_REPAIRS - len(_LESS_ROOM)):
         segments, failed = plan.segments()
         if failed.size:
-            plan, bad = plan.tightened(failed[:, 0], failed[:, 1]), _chords(reference, failed)
+            plan = plan.tightened(failed[:, 0], failed[:, 1], less)
+            bad = _chords(reference, failed)
             continue
         own = with_lines(segments, path.point[0], path.point[-1], float(reference.place_mm[-1]))
         curve = SpatialPHSpline(own.origin, own.preimage, False)
@@ -112,7 +116,7 @@ def fit(
         low = np.concatenate((own.low[wide], reference.place_mm[:-1][missed]))
         high = np.concatenate((own.high[wide], reference.place_mm[1:][missed]))
         bad = _chords(reference, np.stack((low, high), axis=1))
-        plan = plan.tightened(low, high)
+        plan = plan.tightened(low, high, less)
     return Unfit(bad)
 
 
@@ -164,7 +168,7 @@ class _Plan:
 
     @classmethod
     def of(cls, path: Outline, how: Tolerance, tied: tuple[bool, bool]) -> _Plan:
-        long, reach = path.anchored, path.reach_mm
+        long, reach = path.anchored, path.room_mm
         leg, count = path.leg_mm, path.leg_mm.size
         both = reach[:-1] + reach[1:]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -215,11 +219,9 @@ class _Plan:
             shaped=[found[k][index] for index, k in enumerate(best)],
         )
 
-    def tightened(self, low: Real, high: Real) -> _Plan:
-        """With less room, and more stations, in stretches that reach between places low (n,) and high (n,)."""
-        made = [
-            tightened(one, low, high, _LESS_ROOM, self.how.tolerance_mm) for one in self.stretches
-        ]
+    def tightened(self, low: Real, high: Real, less: float) -> _Plan:
+        """With `less` of the room, and more stations, in stretches that reach between places low (n,) and high (n,)."""
+        made = [tightened(one, low, high, less, self.how.tolerance_mm) for one in self.stretches]
         kept = [one is old for one, old in zip(made, self.stretches, strict=True)]
         known = [own if keep else None for own, keep in zip(self.known, kept, strict=True)]
         shaped = [own if keep else None for own, keep in zip(self.shaped, kept, strict=True)]

@@ -16,9 +16,16 @@ from .reference import Reference, distance_to_chord
 
 Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Index = NDArray[np.intp]
 
-THIN_SHARE = 0.06
-"""Of the tolerance: how far a point that is left out may lie from the chord that passes it."""
+_THIN_SHARE = 0.06
+"""Of the tolerance: how far a point that is left out may lie from the leg that passes it."""
+
+_LINE_SHARE = 0.25
+"""The same for points on a leg that is left alone: noise on a straight line does not keep corners from their room."""
+
+_NEAREST = 11.0
+"""In tolerances: how near vertices of smoothed stretches may be that are not needed to keep `_LINE_SHARE`."""
 
 _THIN_ROUNDS = 12
 _GRADES = np.array([0.4, 1.0, 2.4, 6.0, 15.0])
@@ -26,6 +33,10 @@ _GRADES = np.array([0.4, 1.0, 2.4, 6.0, 15.0])
 
 _MIDDLE = 0.2
 """A leg longer than this share of the room at its ends has a station in its middle."""
+
+_STRAIGHT = np.array([0.0, 0.2])
+"""Stations at the ends of long legs that stay on them, as shares of the part that is taken: the curve leaves a leg with
+its direction and without curvature."""
 
 _LONG = 4.0
 """A leg this many times as long as the room that corners at its ends need at least is left alone between them."""
@@ -43,6 +54,8 @@ class Outline:
     off_mm    (n,) how far points that were left out lie from each leg
     turn_rad  (n + 1,) change of direction; 0 at the ends
     reach_mm  (n + 1,) how far a corner curve would take each leg; 0 at the ends and where it goes straight on
+    room_mm   (n + 1,) the same, where smaller turns between long legs are left out
+    anchored  (n,) legs so long that the corners at both ends leave a part of them alone
     reference   that it is the outline of
     """
 
@@ -51,6 +64,8 @@ class Outline:
     off_mm: Real
     turn_rad: Real
     reach_mm: Real
+    room_mm: Real
+    anchored: Flags
     reference: Reference
 
     def feed_at(self, place_mm: Real) -> Real:
@@ -68,11 +83,6 @@ class Outline:
     def direction(self) -> Real:
         """Unit vectors (n, 3) along the legs."""
         return np.asarray(np.diff(self.point, axis=0) / self.leg_mm[:, None])
-
-    @property
-    def anchored(self) -> Flags:
-        """Legs (n,) so long that the corners at both ends leave a part of them alone."""
-        return np.asarray(self.leg_mm >= _LONG * (self.reach_mm[1:] + self.reach_mm[:-1]))
 
 
 def turns(point: Real) -> Real:
@@ -93,38 +103,78 @@ def outline(
 
     tied  whether the first and the last leg have to be the first and the last chord
     """
-    point, place, off = _thinned(reference, THIN_SHARE * tolerance_mm, tied)
+    every = np.arange(reference.count + 1)
+    fine = _thinned(reference, every, _THIN_SHARE * tolerance_mm, tied)
+    coarse = _thinned(reference, fine, _LINE_SHARE * tolerance_mm, tied)
+    room = _reach(reference.point[coarse], tolerance_mm)
+    long = _is_long(reference.point[coarse], room)
+    kept = _between(reference, fine, coarse, long, _NEAREST * tolerance_mm)
+    point = reference.point[kept]
+    reach = _reach(point, tolerance_mm)
+    roomy = reach.copy()
+    roomy[np.isin(kept, coarse)] = room
+    own = _is_long(point, reach) | long[np.searchsorted(coarse, kept[:-1], side="right") - 1]
+    off = _off(reference, kept)
+    return Outline(point, reference.place_mm[kept], off, turns(point), reach, roomy, own, reference)
+
+
+def _between(
+    reference: Reference, fine: Index, coarse: Index, long: Flags, nearest_mm: float
+) -> Index:
+    """The coarse vertices, and those of the fine ones between which smoothing moves the path.
+
+    There are none on long legs (n,); elsewhere they are about `nearest_mm` apart at least. More of them would only
+    follow the noise, and make the third differences of smoothing inexact.
+    """
+    leg = np.clip(np.searchsorted(coarse, fine, side="right") - 1, 0, long.size - 1)
+    begin, end = reference.place_mm[coarse[leg]], reference.place_mm[coarse[leg + 1]]
+    parts = np.maximum(np.floor((end - begin) / nearest_mm), 1.0)
+    part = np.floor((reference.place_mm[fine] - begin) / (end - begin) * parts)
+    first = np.append(True, part[1:] != part[:-1]) & (part > 0.0)
+    few = np.bincount(leg, minlength=long.size)[leg] <= parts
+    return fine[(~long[leg] & (first | few)) | np.isin(fine, coarse)]
+
+
+def _reach(point: Real, tolerance_mm: float) -> Real:
+    """How far (n,) a corner curve would take the legs at points (n, 3)."""
     turn = turns(point)
     with np.errstate(divide="ignore", invalid="ignore"):
-        reach = np.where(turn > 0.0, tolerance_mm * extent(np.minimum(turn, SHARPEST_RAD)), 0.0)
-    return Outline(point, place, off, turn, reach, reference)
+        reach = tolerance_mm * extent(np.minimum(turn, SHARPEST_RAD))
+    return np.where(turn > 0.0, reach, 0.0)
 
 
-def _thinned(
-    reference: Reference, off_mm: float, tied: tuple[bool, bool]
-) -> tuple[Real, Real, Real]:
-    """Kept points, their places, and how far what lies between is from the legs."""
-    point, place = reference.point, reference.place_mm
-    off = np.zeros(reference.count)
+def _is_long(point: Real, reach: Real) -> Flags:
+    """Legs (n,) between points (n + 1, 3) so long that corners at both ends leave a part of them alone."""
+    leg = np.linalg.norm(np.diff(point, axis=0), axis=1)
+    return np.asarray(leg >= _LONG * (reach[1:] + reach[:-1]))
+
+
+def _thinned(reference: Reference, kept: Index, off_mm: float, tied: tuple[bool, bool]) -> Index:
+    """Those of the kept points (n,) without which no point of the reference is farther than this from its leg."""
     for _ in range(_THIN_ROUNDS):
-        if point.shape[0] < 3:
-            break
-        aside = distance_to_chord(point[1:-1], point[:-2], point[2:])
-        total = aside + np.maximum(off[:-1], off[1:])
-        drop = np.zeros(point.shape[0], dtype=np.bool_)
-        drop[1:-1] = total <= off_mm
+        point = reference.point[kept]
+        drop = np.zeros(kept.size, dtype=np.bool_)
+        drop[1:-1] = distance_to_chord(point[1:-1], point[:-2], point[2:]) <= off_mm
         drop[1] &= not tied[0]
         drop[-2] &= not tied[1]
         # No two neighbours in one round: of each run every second one.
         run = np.arange(drop.size) - np.maximum.accumulate(np.where(drop, 0, np.arange(drop.size)))
         drop &= run % 2 == 1
+        at = np.flatnonzero(drop)
+        wide = _off(reference, kept[~drop]) > off_mm
+        drop[at] = ~wide[np.searchsorted(kept[~drop], kept[at]) - 1]
         if not drop.any():
             break
-        at = np.flatnonzero(drop)
-        off[at - 1] = total[at - 1]
-        off = np.delete(off, at)
-        point, place = point[~drop], place[~drop]
-    return point, place, off
+        kept = kept[~drop]
+    return kept
+
+
+def _off(reference: Reference, kept: Index) -> Real:
+    """How far (n,) the points between the kept ones (n + 1,) lie from the legs."""
+    point = reference.point
+    leg = np.repeat(np.arange(kept.size - 1), np.diff(kept))
+    aside = distance_to_chord(point[:-1], point[kept[leg]], point[kept[leg + 1]])
+    return np.asarray(np.maximum.reduceat(aside, kept[:-1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,12 +231,13 @@ def stations(
         room_mm - np.maximum(off[:-1], off[1:])[vertex - first],
         room_mm - path.off_mm[legs[leg]],
     ]
-    for used, leg_at, at in ((before > 0.0, 0, low[0]), (after > 0.0, legs.size - 1, high[-1])):
-        if used:
-            parts_point.append((path.point[legs[leg_at]] + at * direction[leg_at])[None])
-            parts_direction.append(direction[leg_at][None])
-            parts_place.append(np.array([base[leg_at] + at * scale[leg_at]]))
-            parts_room.append(np.zeros(1))
+    for leg_at, at, inward in ((0, low[0], before), (legs.size - 1, high[-1], -after)):
+        if inward != 0.0:
+            fixed = at + inward * _STRAIGHT
+            parts_point.append(path.point[legs[leg_at]] + fixed[:, None] * direction[leg_at])
+            parts_direction.append(np.repeat(direction[leg_at][None], fixed.size, axis=0))
+            parts_place.append(base[leg_at] + fixed * scale[leg_at])
+            parts_room.append(np.zeros(fixed.size))
     place = np.concatenate(parts_place)
     order = np.argsort(place, kind="stable")
     room = np.concatenate(parts_room)[order]
