@@ -18,7 +18,7 @@ import os
 import signal
 import sys
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -51,18 +51,28 @@ class Run:
         self.groups = Groups(ROOT, self.build / "tests", is_long=self.suite == "all")
 
     def everything(self, only: str | None) -> None:
-        """All tests of the suite: the C tests beside the free Python tests, then what must be alone."""
-        with ThreadPoolExecutor(1) as pool:
-            unit = None
+        """All tests of the suite: C tests and those that need a bus beside the free ones, then what must be alone.
+
+        Tests on a bus wait for its clock most of their time, and none of their verdicts depends on load.
+        """
+        with ThreadPoolExecutor(2) as pool:
+            beside = []
             if only != "python":
                 workers = _UNIT_WORKERS if only is None else os.cpu_count() or 1
-                unit = pool.submit(self._units, self.units.binaries(), workers)
-            if only != "unit":
-                self._group("free")
-            self._wait(unit)
+                beside.append(pool.submit(self._units, self.units.binaries(), workers))
+            try:
+                if only != "unit":
+                    beside.append(pool.submit(self._group, "bus", log=self.groups.out / "bus.log"))
+                    self.total.add(self._group("free"))
+                for part in beside:
+                    self.total.add(part.result())
+            except BaseException:
+                self.groups.end()
+                raise
         if only != "unit":
-            self._group("serial")
-            self._group("bus")
+            print((self.groups.out / "bus.log").read_text(encoding="utf-8", errors="replace"))
+            self.total.add(self._group("serial"))
+            self.total.failures += self.groups.unnamed()
 
     def chosen(self, choice: Choice) -> None:
         """What `check` has chosen."""
@@ -70,8 +80,8 @@ class Run:
             unit = pool.submit(self._units, choice.binaries, _UNIT_WORKERS)
             for group in MARKS:
                 if choice.files[group]:
-                    self._group(group, choice.files[group])
-            self._wait(unit)
+                    self.total.add(self._group(group, choice.files[group]))
+            self.total.add(unit.result())
 
     def keep(self) -> None:
         """Stamps for the Python test files that have passed."""
@@ -105,17 +115,13 @@ class Run:
             self.times.append(("C", time.monotonic() - began_s, str(count)))
         return count
 
-    def _wait(self, unit: Future[Count] | None) -> None:
-        if unit is not None:
-            self.total.add(unit.result())
-
-    def _group(self, group: str, files: list[str] | None = None) -> None:
+    def _group(self, group: str, files: list[str] | None = None, log: Path | None = None) -> Count:
         print(f"\n== Python tests: {group}", flush=True)
         began_s = time.monotonic()
-        count = self.groups.run(group, files or ())
+        count = self.groups.run(group, files or (), log)
         sys.stdout.flush()
         self.times.append((group, time.monotonic() - began_s, str(count)))
-        self.total.add(count)
+        return count
 
 
 def _ended(number: int, _: object) -> None:

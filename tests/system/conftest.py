@@ -14,6 +14,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
+from shared_programs import share_programs
 
 from bench import EXAMPLES, PAPER_ALPHA, VCAN0, Bench, MakeAlpha, MakeBench
 from hodograph.bus.address import BUS_VARIABLE
@@ -83,15 +84,23 @@ def make_bench(request: pytest.FixtureRequest) -> Iterator[MakeBench]:
         yield _benches(stack, request)
 
 
-@pytest.fixture
-def alpha_at(tmp_path: Path) -> MakeAlpha:
-    """Makes a path file of the alpha at another feed: mm/s, about 100 mm of way."""
+@pytest.fixture(autouse=True)
+def _shared_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+    share_programs(monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def alpha_at(tmp_path_factory: pytest.TempPathFactory) -> MakeAlpha:
+    """Makes a path file of the alpha at another feed: mm/s, about 100 mm of distance. One file for each feed, so that
+    tests share its program.
+    """
+    folder = tmp_path_factory.mktemp("alpha")
 
     def make(nominal_mm_s: float) -> Path:
         text = (EXAMPLES / "alpha.toml").read_text()
         text = text.replace("nominal_mm_s = 100", f"nominal_mm_s = {nominal_mm_s:g}")
         text = text.replace('"exponential"', '"quintic"')
-        file = tmp_path / f"alpha_{nominal_mm_s:g}.toml"
+        file = folder / f"alpha_{nominal_mm_s:g}.toml"
         file.write_text(text.replace("machines/", f"{EXAMPLES}/machines/"))
         return file
 

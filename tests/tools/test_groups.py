@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import os
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -161,6 +163,29 @@ def test_a_test_that_takes_pytest_down_is_named(root: Path) -> None:
     write(root, "dies", "import os\ndef test_dies(): os._exit(3)\ndef test_b(): pass\n")
     count = groups(root).run("free")
     assert [failure.rpartition("::")[2] for failure in count.failures] == ["test_dies"]
+
+
+def test_a_mark_that_its_file_does_not_name_is_a_failure(root: Path) -> None:
+    (root / "tests/alone.py").write_text("import pytest\nalone = pytest.mark.serial\n")
+    named = write(root, "named", "@pytest.mark.serial\ndef test(): pass\ndef test_free(): pass\n")
+    hidden = write(root, "hidden", "from alone import alone\n@alone\ndef test(): pass\n")
+    ran = groups(root)
+    assert (ran.run("free").passed, ran.run("serial").passed) == (1, 1)
+    assert ran.marked("serial") == [named]
+    (failure,) = ran.unnamed()
+    assert failure.startswith(f"{hidden}: its tests marked serial do not run")
+
+
+def test_a_group_in_the_background_ends_on_request(root: Path) -> None:
+    write(root, "waits", "pytestmark = pytest.mark.serial\ndef test(): time.sleep(600)\n")
+    ran, log = groups(root), root / "log"
+    with ThreadPoolExecutor(1) as pool:
+        count = pool.submit(ran.run, "serial", (), log)
+        while not any(list(ran.out.glob("record-serial/*.jsonl"))):
+            time.sleep(0.05)
+        ran.end()
+        assert count.result().passed == 0
+    assert log.exists()
 
 
 def test_the_first_check_runs_what_needs_no_bus(root: Path) -> None:

@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: MIT
 """Runs Python tests in groups, by what they need of the machine.
 
-`free` tests run in parallel; those marked `serial` measure time and run alone; those marked `bus` run alone inside
-tools/with-vcan, which gives all of them one vcan0. Tests marked `long` are chosen only where all are wanted.
+`free` tests run in parallel; those marked `serial` measure time and run alone; those marked `bus` run one at a time
+inside tools/with-vcan, which gives all of them one vcan0. Tests marked `long` are chosen only where all are wanted.
+
+Importing all test files takes as long as many tests. So pytest gets only the files that name the mark of the group;
+`unnamed` finds those of which another group has seen that they have the mark without naming it.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from testing import recording
-from testing.reach import Recorded
+from testing.reach import Recorded, test_files
 from testing.verdict import Count, read_junit
 
 MARKS = {
@@ -40,9 +45,10 @@ class Groups:
     is_long: bool = False
     last_limit_s: float = LAST_LIMIT_S
     records: list[Path] = field(default_factory=list)
+    _running: list[subprocess.Popen[bytes]] = field(default_factory=list)
 
-    def run(self, group: str, files: Sequence[str] = ()) -> Count:
-        """One group: all of its tests, or those of some files."""
+    def run(self, group: str, files: Sequence[str] = (), log: Path | None = None) -> Count:
+        """One group: all of its tests, or those of some files. `log`: a file that takes what pytest prints."""
         record = self.out / f"record-{group}"
         report = self.out / f"pytest-{group}.xml"
         self.out.mkdir(parents=True, exist_ok=True)
@@ -58,17 +64,47 @@ class Groups:
                 [str(self.root / "tools"), *filter(None, [os.environ.get("PYTHONPATH")])]
             ),
         }
-        process = subprocess.Popen(
-            self._command(group, report, files),
-            cwd=self.root,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            process_group=0,
-        )
+        with open(log, "wb") if log else nullcontext() as out:
+            process = subprocess.Popen(
+                self._command(group, report, files or self.marked(group)),
+                cwd=self.root,
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=out,
+                stderr=out,
+                process_group=0,
+            )
+        self._running.append(process)
         hung = self._wait(process, record)
+        self._running.remove(process)
         count = read_junit(report, group, process.returncode)
         count.failures += [f"{test}: hung" for test in hung]
         return count
+
+    def end(self) -> None:
+        """Ends the groups that run in other threads."""
+        for process in list(self._running):
+            _end(process)
+
+    def marked(self, group: str) -> list[str]:
+        """Test files that name the mark of a group; none for `free`: it has those of all files."""
+        if group == "free":
+            return []
+        mark = re.compile(rf"\bmark\.{group}\b")
+        return [
+            file
+            for file in test_files(self.root)
+            if mark.search((self.root / file).read_text(encoding="utf-8"))
+        ]
+
+    def unnamed(self) -> list[str]:
+        """Failures: files with tests of a group, as a group that collected them saw, that do not name its mark."""
+        return [
+            f"{file}: its tests marked {group} do not run: write pytest.mark.{group} in this file"
+            for file, groups in sorted(self.recorded().marks.items())
+            for group in sorted(groups)
+            if file not in self.marked(group)
+        ]
 
     def recorded(self) -> Recorded:
         """What all groups that have run wrote down."""

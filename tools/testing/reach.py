@@ -144,6 +144,9 @@ class Recorded:
     cpu_s: dict[str, float] = field(default_factory=dict)  # test file, its processes included
     groups: dict[str, dict[str, int]] = field(default_factory=dict)  # test file, group: tests
     failed: set[str] = field(default_factory=set)  # test files
+    marks: dict[str, set[str]] = field(
+        default_factory=dict
+    )  # test file: groups of tests left to them
 
     def add(self, other: Recorded) -> None:
         """Takes in what another group recorded."""
@@ -156,6 +159,8 @@ class Recorded:
             self.cpu_s[file] = self.cpu_s.get(file, 0.0) + cpu_s
         for file, groups in other.groups.items():
             self.groups.setdefault(file, {}).update(groups)
+        for file, marks in other.marks.items():
+            self.marks.setdefault(file, set()).update(marks)
         self.processes |= other.processes
         self.failed |= other.failed
 

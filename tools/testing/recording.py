@@ -29,6 +29,7 @@ _PREFIX = str(ROOT) + os.sep
 _PASSED_OVER = (".venv/", ".git/", ".hypothesis/", ".pytest_cache/", ".mypy_cache/", "build/tests/")
 _OF_PYTHON = f"{os.sep}__pycache__{os.sep}"
 # Programs that read what their arguments name and run nothing else of the tree.
+_GROUPS = {"bus", "serial"}  # marks of tests that do not run with the others
 _PLAIN_PROGRAMS = (
     "gcc",
     "clang",
@@ -181,6 +182,16 @@ class Plugin:
         finally:
             self.recorder.of(None)
 
+    def pytest_deselected(self, items: list[pytest.Item]) -> None:
+        """Which files have tests for other groups."""
+        left: dict[str, list[str]] = {}
+        for item in items:
+            file = in_tree(item.path)
+            if file is not None:
+                marks = {mark.name for mark in item.iter_markers()} & _GROUPS
+                left[file] = sorted({*left.get(file, ()), *marks})
+        self.recorder.line(what="left", files=left)
+
     @pytest.hookimpl(trylast=True)
     def pytest_collection_finish(self, session: pytest.Session) -> None:
         """How many tests of each file have been chosen."""
@@ -246,6 +257,9 @@ def read(out: Path) -> Recorded:
         if what == "chosen":
             for name, tests in line["files"].items():
                 recorded.groups.setdefault(name, {})[line["group"]] = tests
+        elif what == "left":
+            for name, marks in line["files"].items():
+                recorded.marks.setdefault(name, set()).update(marks)
         elif file is None:
             continue
         elif what == "failed":

@@ -7,6 +7,7 @@ import argparse
 import difflib
 import re
 from collections.abc import Sequence
+from functools import cache
 from typing import Any, NoReturn
 
 from .. import __version__
@@ -56,8 +57,9 @@ class _Parser(argparse.ArgumentParser):
         return f'; did you mean "{near[0]}"?' if near else ""
 
 
+@cache
 def make_parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+    """The whole command line, made once for all calls of `main` in a process."""
     parser = _Parser(prog="hodograph", description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument("--version", action="version", version=f"hodograph {__version__}")
     everywhere = _Parser(add_help=False)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from ..names import (
@@ -18,12 +19,12 @@ from ..names import (
     POINT_SUFFIXES,
     STANDARD_INPUT,
 )
-from .drawing import DrawingOptions
-from .dxf import read_dxf
-from .gcode import read_gcode
 from .moves import Command
-from .points import PointOptions, read_points
-from .svg import read_svg
+
+# A reader is imported when a file of its kind is read: together they load much that no other command needs.
+if TYPE_CHECKING:
+    from .drawing import DrawingOptions
+    from .points import PointOptions
 
 
 @dataclass(frozen=True)
@@ -75,9 +76,14 @@ def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
     """
     _check_options(file, options)
     suffix = file.suffix.lower()
-    if suffix in DRAWING_SUFFIXES:
-        read = read_dxf if suffix == ".dxf" else read_svg
-        yield from read(file, _drawing_options(file, options))
+    if suffix == ".dxf":
+        from .dxf import read_dxf
+
+        yield from read_dxf(file, _drawing_options(file, options))
+    elif suffix in DRAWING_SUFFIXES:
+        from .svg import read_svg
+
+        yield from read_svg(file, _drawing_options(file, options))
     else:
         yield from _read_lines(file, options)
 
@@ -90,6 +96,8 @@ def _check_options(file: Path, options: ReadOptions) -> None:
 
 
 def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
+    from .drawing import DrawingOptions
+
     if options.feed_mm_s is None:
         raise InputError(f"{file}: a drawing has no feed: add --feed MM/S")
     given = {
@@ -115,8 +123,12 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
             place, encoding="utf-8", errors="surrogateescape", closefd=not from_input
         ) as lines:
             if is_gcode(file):
+                from .gcode import read_gcode
+
                 yield from read_gcode(lines, str(file))
             else:
+                from .points import read_points
+
                 yield from read_points(lines, str(file), _point_options(options))
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
@@ -125,6 +137,8 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
 
 
 def _point_options(options: ReadOptions) -> PointOptions:
+    from .points import PointOptions
+
     return PointOptions(
         feed_mm_s=options.feed_mm_s,
         unit_mm=1.0 if options.unit_mm is None else options.unit_mm,
