@@ -226,8 +226,8 @@ NOISY = {
     "rectangle": (np.pad(rounded_rectangle(0.06), ((0, 0), (0, 1))), 0.02),
     "walls": (walls(), 0.01),
 }
-"""Points, and by how much noise may change the time. Chords of 0.06 mm turn by more than the arc does: the goal of 1 % is
-missed there, by half a percent.
+"""Points, and by how much noise may change the time. Chords of 0.06 mm turn by more than the arc does: the goal of 1 %
+is missed there, by half a percent.
 """
 
 
