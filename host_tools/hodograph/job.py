@@ -145,8 +145,8 @@ class JobSection:
     before  commands that happen at rest, before it starts
     events  commands on the way, with the arc lengths in mm where they happen
     tied    whether it begins and ends in motion, as a part of a longer section
-    stands_at  of a section that turns axes alone: where x, y and z stand, mm; its lengths and feeds are in degrees. None: it
-               goes a way
+    stands_at  of a section that turns axes alone: where x, y and z stand, mm; its lengths and feeds are in degrees.
+               None: it goes a way
     """
 
     fitted: FittedPath
@@ -161,6 +161,28 @@ class JobSection:
     def length_mm(self) -> float:
         """Way of x, y and z."""
         return self.fitted.curve.length_mm if self.stands_at is None else 0.0
+
+    @property
+    def deviation_um(self) -> float:
+        """Bound of the distance of x, y and z between the programmed path and the curve, both ways."""
+        return 1000.0 * self.fitted.deviation_mm if self.stands_at is None else 0.0
+
+    @property
+    def turning_summary(self) -> dict[str, object]:
+        """Of a section that turns axes alone: the length of its path, and a bound of how far it is from the program."""
+        if self.stands_at is None:
+            return {}
+        return {
+            "turned_deg": self.fitted.curve.length_mm,
+            "deviation_bound_deg": self.fitted.deviation_mm,
+        }
+
+    def places(self, moved_mm: Real) -> Real:
+        """Positions (n, axes) of the path's axes, without the work offset, of those (n, k) of its program's axes."""
+        machine = self.pipeline.machine
+        own = moved_mm - np.array(machine.offset_mm)
+        stands = np.broadcast_to(self.standing_mm, (len(own), machine.first_axis))
+        return np.concatenate((stands, own), axis=1)
 
     @property
     def standing_mm(self) -> Real:
@@ -180,7 +202,8 @@ class JobSection:
 
     def lines_summary(self) -> dict[str, object]:
         """Its source lines, for JSON."""
-        return {"first_line": self.first_line, "last_line": self.last_line}
+        lines: dict[str, object] = {"first_line": self.first_line, "last_line": self.last_line}
+        return lines | self.turning_summary
 
     def line_at(self, s_mm: Real) -> Int:
         """Source lines (n,) of places of the curve at arc lengths (n,)."""
@@ -217,8 +240,7 @@ class Job:
     @property
     def deviation_um(self) -> float:
         """Bound of the distance between the programmed path and the curves, both ways."""
-        ways = [one.fitted.deviation_mm for one in self.sections if one.stands_at is None]
-        return 1000.0 * max(ways, default=0.0)
+        return max(section.deviation_um for section in self.sections)
 
     @property
     def lines(self) -> int:
@@ -265,6 +287,10 @@ class Job:
             raise PlanError(
                 f"{self.file}: has {len(self.sections)} sections from rest to rest (the second from line {second}), "
                 f"but {command} takes one program: simulate and run take them all"
+            )
+        if self.sections[0].stands_at is not None:
+            raise PlanError(
+                f"{self.file}: turns axes alone, while x, y and z stand: simulate and run take it, not {command}"
             )
         return self.sections[0]
 
@@ -561,7 +587,7 @@ class JobMotion:
         return (self.ticks - 1) * self.period_s
 
     @property
-    def _on_the_way(self) -> Iterator[Motion]:
+    def on_the_way(self) -> Iterator[Motion]:
         """Those in which x, y or z move: errors of the others are in degrees."""
         for section, motion in zip(self.job.sections, self.motions, strict=True):
             if section.stands_at is None:
@@ -575,10 +601,10 @@ class JobMotion:
             "planning_s": self.planning_s,
             "fit_s": self.job.fit_s,
             "max_contour_error_um": max(
-                (motion.max_contour_error_um for motion in self._on_the_way), default=0.0
+                (motion.max_contour_error_um for motion in self.on_the_way), default=0.0
             ),
             "max_following_error_um": max(
-                (motion.max_following_error_um for motion in self._on_the_way), default=0.0
+                (motion.max_following_error_um for motion in self.on_the_way), default=0.0
             ),
             "section": [
                 section.lines_summary() | motion.summary()
@@ -610,8 +636,8 @@ def simulate_job(
 def write_job_trace(run: JobMotion, file: Path) -> None:
     """One row a tick: tick, t_s, source line, arc length, feed, commanded and actual positions of the axes.
 
-    Positions are in the program's own coordinates: without the work offset. In sections that turn axes alone, arc length
-    stands still and the feed is in degrees a second. Raises InputError.
+    Positions are in the program's own coordinates: without the work offset. In sections that turn axes alone, arc
+    length stands still and the feed is in degrees a second. Raises InputError.
     """
     machine = run.job.machine
     named = [(axis.name, axis.unit) for axis in machine.path_axes]
@@ -642,18 +668,10 @@ def _trace_rows(run: JobMotion) -> Iterator[str]:
             section.line_at(own),
             passed_mm + (own if section.stands_at is None else np.zeros(count)),
             motion.feed_mm_s[rows],
-            *_places(section, motion.cmd_mm[rows]),
-            *_places(section, motion.act_mm[rows]),
+            *section.places(motion.cmd_mm[rows]).T,
+            *section.places(motion.act_mm[rows]).T,
         ]
         texts = [map(repr, column.tolist()) for column in columns]
         yield from (",".join(row) + "\n" for row in zip(*texts, strict=True))
         tick += count
         passed_mm += section.length_mm
-
-
-def _places(section: JobSection, moved_mm: Real) -> Real:
-    """Positions (axes, n) of the path's axes without the work offset, of those (n, k) of the axes of a program."""
-    machine = section.pipeline.machine
-    own = moved_mm - np.array(machine.offset_mm)
-    stands = np.broadcast_to(section.standing_mm, (len(own), machine.first_axis))
-    return np.concatenate((stands, own), axis=1).T

@@ -11,6 +11,9 @@ KERNELS = ("fixed", "float", "double")
 AXES = ("x", "y", "z", "a", "b", "c")
 """What the axes of a path are called where no machine names them."""
 
+FIRST_AXIS_SHIFT = 8
+"""Where the flags of a program's header have which axis of the machine its first one is (core/first_axis.h)."""
+
 UNITS = ("mm", "deg")
 """What an axis is measured in: an axis in degrees turns."""
 

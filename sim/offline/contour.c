@@ -131,21 +131,20 @@ double contour_distance_mm(struct contour *c, double arc_length_mm, const double
 
 /* x, y, z of a row of counts. */
 static void contour_point(const struct contour *c, const int32_t *act_counts,
-                          uint32_t counts_per_mm, double point[3])
+                          const uint32_t *counts_per_unit, double point[3])
 {
-    const double mm_per_count = 1.0 / (double)counts_per_mm;
     for (uint32_t j = 0; j < 3; j++) {
-        point[j] = j < c->axes ? (double)act_counts[j] * mm_per_count : 0.0;
+        point[j] = j < c->axes ? (double)act_counts[j] * (1.0 / (double)counts_per_unit[j]) : 0.0;
     }
 }
 
 void contour_errors_um(struct contour *c, uint32_t n, const int64_t *arc_length_q40_mm,
-                       const int32_t *act_counts, uint32_t stride, uint32_t counts_per_mm,
+                       const int32_t *act_counts, uint32_t stride, const uint32_t *counts_per_unit,
                        double *errors_um)
 {
     for (uint32_t i = 0; i < n; i++) {
         double point[3];
-        contour_point(c, &act_counts[(size_t)stride * i], counts_per_mm, point);
+        contour_point(c, &act_counts[(size_t)stride * i], counts_per_unit, point);
         errors_um[i] = 1000.0 * contour_distance_mm(c, contour_q40(arc_length_q40_mm[i]), point);
     }
 }
@@ -176,7 +175,7 @@ void contour_extra_errors(struct contour *c, const struct program *program, uint
         struct place place;
         struct program_segment segment;
         double point[3];
-        contour_point(c, act, counts_per_unit[0], point);
+        contour_point(c, act, counts_per_unit, point);
         (void)contour_foot(c, contour_q40(arc_length_q40_mm[i]), point, &place);
         program_segment_get(program, place.segment, &segment);
         const double xi = place.xi < 0.0 ? 0.0 : (place.xi > 1.0 ? 1.0 : place.xi);

@@ -6,6 +6,7 @@
 #include <stddef.h>
 
 #include "core/counts.h"
+#include "core/first_axis.h"
 
 typedef char offline_assert_row_has_no_holes[sizeof(struct offline_row) == 144 ? 1 : -1];
 
@@ -34,13 +35,15 @@ static int offline_drives(struct offline *sim, const struct program *program,
             return OFFLINE_ERR_PERIOD;
         }
     }
+    const bool in_mm = first_axis(&program->header) == 0u;
     for (uint32_t axis = 1; axis < program_curve_axes(sim->axis_count); axis++) {
-        if (drives[axis].counts_per_mm != drives[0].counts_per_mm) {
+        if (in_mm && drives[axis].counts_per_mm != drives[0].counts_per_mm) {
             return OFFLINE_ERR_COUNTS;
         }
     }
     for (uint32_t axis = 0; axis < sim->axis_count; axis++) {
         sim->configs[axis] = drives[axis];
+        sim->counts_per_unit[axis] = drives[axis].counts_per_mm;
     }
     return 0;
 }
@@ -300,8 +303,7 @@ int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n)
         }
         offline_move(sim, &rows[i]);
         contour_errors_um(&sim->contour, 1, &rows[i].arc_length_q40_mm, rows[i].act_counts,
-                          sim->axis_count, sim->configs[0].counts_per_mm,
-                          &rows[i].contour_error_um);
+                          sim->axis_count, sim->counts_per_unit, &rows[i].contour_error_um);
     }
     return 0;
 }

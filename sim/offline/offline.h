@@ -68,7 +68,7 @@ struct offline_stop {
 enum offline_error {
     OFFLINE_ERR_COEFFICIENTS = -100, /* the program has no coefficient records */
     OFFLINE_ERR_PERIOD = -101,       /* a drive's period is not the program's */
-    OFFLINE_ERR_COUNTS = -102,       /* counts per mm of the axes that draw the path differ */
+    OFFLINE_ERR_COUNTS = -102,       /* counts per mm of x, y and z differ */
     OFFLINE_ERR_FAULT = -103,        /* a fault or an order that cannot be carried out */
     OFFLINE_ERR_DRIVE = -200,        /* minus 10 * axis, plus the enum drive_error of that axis */
     OFFLINE_ERR_INTERP = -300,       /* the interpolator failed: the program was not checked */
@@ -88,6 +88,7 @@ struct offline {
     uint32_t axis_count; /* of the program */
     struct drive drives[PROGRAM_AXES];
     struct drive_config configs[PROGRAM_AXES];
+    uint32_t counts_per_unit[PROGRAM_AXES]; /* those of the drives */
     struct influence influences[PROGRAM_AXES];
     struct feedforward feedforwards[PROGRAM_AXES];
     struct feedforward_gains gains[PROGRAM_AXES];

@@ -99,6 +99,25 @@ def test_every_kind_and_any_number_of_sections(
     assert same_sections(result(capsys, "run", *common), simulated)
 
 
+@pytest.mark.usefixtures("hub")
+def test_axes_turn_alone_while_the_others_hold_their_counts(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """From rest to rest between moves on a path; the first section turns before anything else moves."""
+    text = "G1 A20 F3600\nX3 Y1 F1200\nC90 A0 F7200\nX0 A10 F1200\nM2\n"
+    file, machine = job_file(tmp_path, text), str(EXAMPLES / "machines" / "mill_five_axes.toml")
+    traces = [tmp_path / "simulated.csv", tmp_path / "recorded.csv"]
+    common = (file, "--machine", machine, "--json", "--trace")
+    simulated = result(capsys, "simulate", *common, str(traces[0]))
+    recorded = result(capsys, "run", *common, str(traces[1]))
+    assert recorded["sections"] == 4
+    assert same_sections(recorded, simulated)
+    assert traces[0].read_text() == traces[1].read_text()
+    assert [round(one.get("turned_deg", 0.0), 3) for one in recorded["section"]] == [
+        *(20.0, 0.0, 92.195, 0.0)
+    ]
+
+
 @pytest.fixture
 def bench(make_bench: MakeBench) -> Bench:
     return make_bench(file=MILL)

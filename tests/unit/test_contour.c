@@ -283,7 +283,8 @@ static void test_many_points_in_counts(void)
     const int64_t s[2] = {0, INT64_C(2) << 40};
     const int32_t act[4] = {10000000, -1000250, 12000000, -999999};
     double errors[2];
-    contour_errors_um(&contour, 2, s, act, 2, 1000000, errors);
+    const uint32_t counts_per_unit[2] = {1000000, 1000000};
+    contour_errors_um(&contour, 2, s, act, 2, counts_per_unit, errors);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.25, errors[0]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.001, errors[1]);
 }

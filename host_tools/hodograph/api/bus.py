@@ -90,6 +90,10 @@ class Controller:
         """
         machine = self._machine._file
         native = NativeProgram(program.image)
+        if native.first_axis:
+            raise InputError(
+                "goto_start: the program turns axes alone: goto with its start, then upload"
+            )
         _, first = native.setpoints(machine.kernel, machine.path_counts, 0, 1)
         start = tuple(int(counts) for counts in first[0])
         distance_mm = goto(self._node, machine, start, unhomed=unhomed)

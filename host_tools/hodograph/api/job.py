@@ -48,7 +48,7 @@ class Section:
     @property
     def deviation_um(self) -> float:
         """Certified bound of the distance between the programmed path and the curve, both ways."""
-        return 1000.0 * self._section.fitted.deviation_mm
+        return self._section.deviation_um
 
     @cached_property
     def path(self) -> Path:

@@ -110,7 +110,11 @@ def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> li
 
 
 def require_axes(program: NativeProgram, machine: Machine) -> None:
-    """Raises InputError: the program has more path axes than the machine."""
+    """Raises InputError: the program has more path axes than the machine, or turns axes alone."""
+    if program.first_axis:
+        raise InputError(
+            "the program turns axes alone, as a section of a toolpath: hodograph run takes the toolpath"
+        )
     if program.axis_count > len(machine.path_axes):
         raise InputError(
             f"the program has {program.axis_count} path axes, {machine.file} has {len(machine.path_axes)}: "

@@ -115,8 +115,8 @@ def import_(options: Namespace) -> None:
         )
         for k, one in enumerate(job.sections, start=1):
             print(
-                f"{k:8} {f'{one.first_line} … {one.last_line}':>15} {number(one.fitted.curve.length_mm):>12} "
-                f"{one.fitted.curve.segment_count:9} {1000.0 * one.fitted.deviation_mm:9.3f} "
+                f"{k:8} {f'{one.first_line} … {one.last_line}':>15} {number(one.length_mm):>12} "
+                f"{one.fitted.curve.segment_count:9} {one.deviation_um:9.3f} "
                 f"{number(_duration_s(one)):>9}"
             )
 
@@ -145,11 +145,12 @@ def imported(job: Job) -> dict[str, object]:
             "first_line": one.first_line,
             "last_line": one.last_line,
             "tolerance_mm": one.tolerance_mm,
-            "length_mm": one.fitted.curve.length_mm,
+            "length_mm": one.length_mm,
             "segments": one.fitted.curve.segment_count,
-            "deviation_bound_um": 1000.0 * one.fitted.deviation_mm,
+            "deviation_bound_um": one.deviation_um,
             "duration_s": _duration_s(one),
         }
+        | one.turning_summary
         for one in job.sections
     ]
     events = [

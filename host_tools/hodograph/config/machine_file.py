@@ -107,7 +107,7 @@ class Machine:
 
         Asserts that the machine has extra axes.
         """
-        assert self.path_count > SPACE_AXES and not self.first_axis, "no extra axes"
+        assert self.path_count > SPACE_AXES, "no extra axes"
         first = min(SPACE_AXES, self.path_count - PLANE_AXES)
         return replace(
             self,

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import SPACE_AXES
+from ..errors import InputError
 from ..native import Contour, NativeProgram
 from .decoder import Floats, Samples
 
@@ -38,6 +39,8 @@ class ProgramPath:
 
     def __init__(self, image: bytes, counts_per_mm: int) -> None:
         program = NativeProgram(image)
+        if program.first_axis:
+            raise InputError("the program turns axes alone: there is no path to draw")
         self._contour = Contour(program)
         self._counts_per_mm = counts_per_mm
         self.crc32 = zlib.crc32(image[16:])

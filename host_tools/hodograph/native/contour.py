@@ -33,7 +33,7 @@ class Contour:
         self,
         arc_length_q40_mm: NDArray[np.int64],
         act_counts: NDArray[np.int32],
-        counts_per_mm: int,
+        counts_per_mm: Counts,
     ) -> NDArray[np.float64]:
         """Contour errors in um, (n,), of encoder positions (n, A) beside commanded arc lengths (n,).
 
@@ -56,7 +56,7 @@ class Contour:
             ffi.from_buffer("int64_t[]", arc),
             ffi.from_buffer("int32_t[]", act),
             act.shape[1],
-            counts_per_mm,
+            counts_by_axis(counts_per_mm, act.shape[1]),
             ffi.from_buffer("double[]", errors),
         )
         return errors

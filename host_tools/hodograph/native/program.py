@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import HodographError, InputError
 from ..events import ANALOGUES, EVENT, Events
-from ..names import KERNELS
+from ..names import FIRST_AXIS_SHIFT, KERNELS
 from .library import library, text
 
 AXES = 6
@@ -103,6 +103,11 @@ class NativeProgram:
     def axis_count(self) -> int:
         """Number of path axes: 2 in the plane, 3 and more in space."""
         return int(self.pointer.header.axis_count)
+
+    @property
+    def first_axis(self) -> int:
+        """The axis of the machine that the program's first one is; more than 0: it turns axes alone."""
+        return int(self.pointer.header.flags) >> FIRST_AXIS_SHIFT
 
     @property
     def segment_count(self) -> int:

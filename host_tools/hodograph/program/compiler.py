@@ -53,8 +53,8 @@ class ProgramOptions:
 
     `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
     only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
-    beside the plan's limits. `events`: outputs on the path, by place. `first_axis`: of the machine, that the first axis of
-    the program is.
+    beside the plan's limits. `events`: outputs on the path, by place. `first_axis`: of the machine, that the first axis
+    of the program is.
     """
 
     name: str = ""

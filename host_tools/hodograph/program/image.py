@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..events import EVENT, Events, no_events
 from ..feed.override_levels import LEVELS
 from ..feed.pieces import FeedPieces
+from ..names import FIRST_AXIS_SHIFT
 from .codes import ProgramError
 from .stops import Stops
 
@@ -26,7 +27,7 @@ HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
 """Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
 PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
 FLAG_CLOSED, FLAG_MOVING = 1, 2
-FIRST_AXIS_SHIFT, _FIRST_AXIS_FLAGS = 8, 0x0700
+_FIRST_AXIS_FLAGS = 7 << FIRST_AXIS_SHIFT
 NAME_SIZE = 32
 
 _HEADER = struct.Struct("<4sHHII III HH Q qqq III I 32s 4I".replace(" ", ""))

@@ -47,6 +47,8 @@ def path_figure(run: JobMotion) -> bytes:
     figure, axes = pyplot.subplots(figsize=(9.6, 6.4))
     points, feeds = [], []
     for section, motion in zip(run.job.sections, run.motions, strict=True):
+        if section.stands_at is not None:
+            continue
         at = motion.cmd_mm[: motion.ticks, :2]
         rapid = section.is_rapid_at(motion.arc_length_mm[: motion.ticks])
         for first, last in _stretches(rapid):
@@ -55,8 +57,10 @@ def path_figure(run: JobMotion) -> bytes:
         cutting = ~rapid[:-1]
         points.append(np.stack([at[:-1], at[1:]], axis=1)[cutting])
         feeds.append(motion.feed_mm_s[: motion.ticks - 1][cutting])
-    lines = LineCollection(list(np.concatenate(points)), linewidths=1.8, zorder=3)
-    lines.set_array(np.concatenate(feeds))
+    lines = LineCollection(
+        list(np.concatenate(points or [np.zeros((0, 2, 2))])), linewidths=1.8, zorder=3
+    )
+    lines.set_array(np.concatenate(feeds or [np.zeros(0)]))
     axes.add_collection(lines)
     axes.autoscale()
     plan_axes(axes)
@@ -73,7 +77,8 @@ def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def widest_corners(job: Job) -> list[Place]:
     """The vertices that the curve passes at the greatest distance, one for each kind of corner."""
-    found = [place for section in job.sections for place in _corners_of(section)]
+    ways = [section for section in job.sections if section.stands_at is None]
+    found = [place for section in ways for place in _corners_of(section)]
     found.sort(key=lambda place: -place.distance_mm)
     shown: list[Place] = []
     kinds: set[tuple[int, int, int]] = set()
@@ -180,12 +185,14 @@ def feed_figure(run: JobMotion) -> bytes:
     """The feed over time; dashed: where a section ends."""
     figure, axes = pyplot.subplots(figsize=(9.6, 2.8))
     begin = 0
+    turns = any(section.stands_at is not None for section in run.job.sections)
+    unit = "feed, mm/s; deg/s where axes turn alone" if turns else "feed, mm/s"
     for motion in run.motions:
         t_s = (begin + np.arange(motion.ticks)) * run.period_s
         axes.plot(t_s, motion.feed_mm_s[: motion.ticks], color=BLUE, linewidth=1.1)
         begin += motion.ticks - 1
         axes.axvline(begin * run.period_s, color=GREY, linewidth=0.7, linestyle=(0, (2, 3)))
-    axes.set(xlabel="time, s (dashed: ends of sections)", ylabel="feed, mm/s")
+    axes.set(xlabel="time, s (dashed: ends of sections)", ylabel=unit)
     axes.set_title("Feed")
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0)

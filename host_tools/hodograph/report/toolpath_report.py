@@ -72,13 +72,13 @@ def _summary(run: JobMotion) -> list[tuple[str, str]]:
         ("duration without dwells, s", f"{run.duration_s:.3f}"),
         ("dwells, s", f"{job.dwell_s:g}"),
         ("certified deviation, µm", f"{job.deviation_um:.3f}"),
-        ("greatest contour error, µm", _most(m.max_contour_error_um for m in run.motions)),
-        ("greatest following error, µm", _most(m.max_following_error_um for m in run.motions)),
+        ("greatest contour error, µm", _most(m.max_contour_error_um for m in run.on_the_way)),
+        ("greatest following error, µm", _most(m.max_following_error_um for m in run.on_the_way)),
     ]
 
 
 def _most(values: Iterable[float]) -> str:
-    return f"{max(values):.3f}"
+    return f"{max(values, default=0.0):.3f}"
 
 
 def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
@@ -86,9 +86,9 @@ def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
         (
             str(number),
             f"{section.first_line} … {section.last_line}",
-            f"{section.fitted.curve.length_mm:.3f}",
+            f"{section.length_mm:.3f}",
             str(section.fitted.curve.segment_count),
-            f"{1000.0 * section.fitted.deviation_mm:.3f}",
+            f"{section.deviation_um:.3f}",
             f"{(motion.ticks - 1) * run.period_s:.3f}",
         )
         for number, (section, motion) in enumerate(
@@ -100,12 +100,11 @@ def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
 def view_data(run: JobMotion) -> dict[str, object]:
     """What the view draws: columns of ticks in the program's own coordinates, and the source lines that they name."""
     step = max(1, -(-run.ticks // MOST_POINTS))
-    offset = np.array(run.job.machine.offset_mm)
     columns: dict[str, list[object]] = {name: [] for name in ("x", "y", "z", "f", "l", "r")}
     for section, motion in zip(run.job.sections, run.motions, strict=True):
         rows = np.unique(np.append(np.arange(0, motion.ticks, step), motion.ticks - 1))
         s_mm = motion.arc_length_mm[rows]
-        at = motion.cmd_mm[rows, : offset.size] - offset[: motion.cmd_mm.shape[1]]
+        at = section.places(motion.cmd_mm[rows])
         z = at[:, 2] if at.shape[1] > 2 else np.zeros(rows.size)
         for name, values in zip(
             columns,

@@ -13,7 +13,7 @@ from ..config.outputs import Outputs
 from ..errors import RunError
 from ..names import AXES
 from ..native import ROW, Contour, NativeProgram
-from ..native.program import Counts, counts_by_axis
+from ..native.program import Counts
 from .motion import Motion, settling_ticks
 from .simulation import make_tally
 
@@ -59,7 +59,7 @@ def analyse(
     rows["volts_mv"][:, :axes] = volts_mv[:wanted]
     rows["tick"] = np.arange(wanted)
     rows["contour_error_um"] = Contour(program).errors_um(
-        rows["arc_length_q40_mm"], act_counts[:wanted], counts_by_axis(counts_per_mm, axes)[0]
+        rows["arc_length_q40_mm"], act_counts[:wanted], counts_per_mm
     )
     if outputs is not None and latched is not None:
         _put_outputs(rows, program, outputs, latched)

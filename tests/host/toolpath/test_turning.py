@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError, PlanError
-from hodograph.job import load_job, simulate_job
+from hodograph.job import load_job, simulate_job, write_job_trace
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream.reading import StreamReader
 from hodograph.toolpath.files import ReadOptions
@@ -131,7 +132,8 @@ def test_a_program_of_five_axes_runs_to_its_end(tmp_path: Path, five: Machine) -
 def test_what_cannot_turn_is_refused_with_its_line(tmp_path: Path, five: Machine) -> None:
     mill = load_machine(MACHINES / "mill.toml")
     cases = (
-        (five, "F600\nG1 X5\nG0 A90\n", ":3: the move turns A alone"),
+        (five, "F600\nG1 X5\nG0 B9\n", ":3: the move turns B, but no axis b of"),
+        (mill, "F600\nG1 X5\nG0 A90\n", ":3: the move turns A, but no axis a of mill.toml"),
         (five, "F600\nG1 X5\nG1 X6 B9\n", ":3: the move turns B, but no axis b of"),
         (mill, "F600\nG1 X5 A1\n", ":2: the move turns A, but no axis a of mill.toml"),
     )
@@ -155,3 +157,84 @@ def test_axes_that_the_program_does_not_turn_stand(tmp_path: Path, five: Machine
     assert isinstance(plain, SpatialPHSpline)
     assert plain.axes == 5
     assert not plain.extra.any()
+
+
+ALONE = """G21 G94 G64
+G1 X30 Y5 Z-2 F1200
+A90 F360
+X33 A80 F1200
+C90 A0 F3600
+C180 A30
+G93 A10 F30
+G94 X40 F1200
+M2
+"""
+
+
+def test_moves_that_only_turn_are_programs_with_the_feed_of_the_file(
+    tmp_path: Path, five: Machine
+) -> None:
+    job = load_job(program(tmp_path, ALONE), five)
+    alone = [section.stands_at for section in job.sections]
+    assert alone == [None, (30.0, 5.0, -2.0), None, (33.0, 5.0, -2.0), None]
+    assert job.length_mm == pytest.approx(np.sqrt(30.0**2 + 5**2 + 2**2) + 10.0, abs=0.01)
+    run = simulate_job(job)
+    first, last = run.motions[1], run.motions[3]
+    assert first.feed_mm_s.max() == pytest.approx(6.0, rel=1e-3)
+    assert 15.0 < first.ticks * run.period_s < 15.3, "90 degrees at 360 degrees a minute"
+    line = job.sections[3].line_at(last.arc_length_mm[: last.ticks])
+    timed_s = np.count_nonzero(line == 7) * run.period_s
+    assert 2.0 <= timed_s < 2.3, "G93 F30 asks for two seconds, a stop comes at the end"
+    ends = [job.sections[k].places(run.motions[k].cmd_mm)[-1] for k in range(5)]
+    assert np.allclose(ends[1], [30.0, 5.0, -2.0, 90.0, 0.0], atol=1e-9)
+    assert np.allclose(ends[3], [33.0, 5.0, -2.0, 10.0, 180.0], atol=1e-9)
+    for end, motion, section in zip(ends, run.motions[1:], job.sections[1:], strict=False):
+        assert np.allclose(section.places(motion.cmd_mm)[0], end, atol=1e-9)
+
+
+def test_the_trace_of_a_move_that_only_turns_has_all_axes(tmp_path: Path, five: Machine) -> None:
+    offset = replace(five, offset_mm=(100.0, 0.0, 20.0, 5.0, 0.0))
+    file = tmp_path / "trace.csv"
+    write_job_trace(simulate_job(load_job(program(tmp_path, "G1 X3 F600\nG0 A40\n"), offset)), file)
+    table = np.genfromtxt(file, delimiter=",", names=True)
+    turns = table["line"] == 2
+    assert np.ptp(table["arc_length_mm"][turns]) == 0.0
+    assert set(table["x_cmd_mm"][turns]) == set(table["x_act_mm"][turns]) == {3.0}
+    assert set(table["z_cmd_mm"]) == {0.0}
+    assert table["a_cmd_deg"][-1] == pytest.approx(40.0, abs=1e-9)
+    assert table["a_act_deg"][-1] == pytest.approx(40.0, abs=1e-3)
+
+
+def test_one_turning_axis_is_enough(tmp_path: Path, five: Machine) -> None:
+    four = replace(five, path_count=4, offset_mm=five.offset_mm[:4])
+    job = load_job(program(tmp_path, "G1 Z4 X1 F600\nG1 A40 F3600\nX3\n"), four)
+    (_, turning, _) = simulate_job(job).motions
+    moved = job.sections[1].pipeline.machine
+    assert moved.path_names == ("z", "a")
+    assert np.allclose(turning.cmd_mm[[0, -1]], [[4.0, 0.0], [4.0, 40.0]], atol=1e-9)
+    assert np.ptp(turning.cmd_mm[:, 0]) == 0.0
+
+
+def test_three_turning_axes_draw_a_path_in_space(tmp_path: Path, five: Machine) -> None:
+    b = replace(five.axes[4], name="b", node=7)
+    six = replace(five, axes=(*five.axes, b), path_count=6, offset_mm=(0.0,) * 6)
+    job = load_job(program(tmp_path, "G1 X1 F600\nA10 B20 C30 F3600\nA0 C40\n"), six)
+    turning = simulate_job(job).motions[1]
+    assert job.sections[1].fitted.deviation_mm <= TOLERANCE
+    assert np.allclose(turning.cmd_mm[-1], [0.0, 40.0, 20.0], atol=1e-9), "a, c, b"
+
+
+def test_turning_alone_is_one_program_that_only_run_takes(tmp_path: Path, five: Machine) -> None:
+    job = load_job(program(tmp_path, "G0 C-90\n"), five)
+    with pytest.raises(PlanError, match=r"turns axes alone.*not compile"):
+        job.only_section("compile")
+    with pytest.raises(PlanError, match=r":1: c goes to -4000 … 0 deg"):
+        load_job(program(tmp_path, "G0 C-4000\n"), five)
+
+
+def test_less_way_than_a_path_needs_is_made_good_later(tmp_path: Path, five: Machine) -> None:
+    text = "G1 X5 F600\nX5.001 A10 F3600\nX5.0015 A20\nX5.01 F600\nX9\n"
+    job = load_job(program(tmp_path, text), five)
+    assert [section.stands_at for section in job.sections] == [None, (5.0, 0.0, 0.0), None]
+    points = job.sections[2].fitted.reference.point
+    assert points[[0, -1], 0].tolist() == [5.0, 9.0]

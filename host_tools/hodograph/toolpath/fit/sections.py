@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
 from ..moves import (
     ORIGIN,
     AnalogOutput,
@@ -144,8 +143,8 @@ class Divider:
             self.stop()
 
     def _turned_alone(self, move: Move) -> StraightMove | None:
-        """The move as one of (a, b, c) in place of x, y, z, where it turns axes and x, y and z go less than a path needs;
-        None: it goes a way.
+        """The move as one of (a, b, c) in place of x, y, z, where it turns axes while x, y and z go less than a path
+        needs; None: it goes a way.
         """
         if not isinstance(move, StraightMove):
             return None
