@@ -28,7 +28,7 @@ _ALPHA = [(0, 0), (12, 18), (24, 27), (36, 9), (24, -9), (12, 0), (0, 18)]
 _HEART = [(-20, -50), (0, 5), (0, -5), (-20, 50), (40, 50), (75, -5), (75, 5), (40, -50)]
 _PAPER_ACCELERATION_MM_S2, _PAPER_JERK_MM_S3 = 2000.0, 50_000.0
 _ALPHA_PITCH_MM, _STOP_TIME_MS = 30, 2000
-_HELIX_TURNS, _STEP_S = 8, 0.005
+_HELIX_TURNS, _STEP_S = 10, 0.005
 PARTS = (
     "header",
     "shared pieces",
@@ -52,15 +52,15 @@ class Streamed:
 
 def example_jobs(most_bytes: int) -> Iterator[Streamed]:
     """Jobs of the density of the optimal examples, in chunks of at most so many bytes."""
-    alpha = [(x, y + _ALPHA_PITCH_MM * k) for k in range(5) for x, y in _ALPHA]
-    heart = [(x + k, y) for k in range(4) for x, y in _HEART]
+    alpha = [(x, y + _ALPHA_PITCH_MM * k) for k in range(-4, 4) for x, y in _ALPHA]
+    heart = [(x + k, y) for k in range(6) for x, y in _HEART]
     for name, polygon in (("alpha", alpha), ("heart", heart)):
         curve = from_control_polygon(np.array(polygon, dtype=np.float64), closed=False).spline
         yield streamed(f"{name}_optimal, repeated", _paper(name), curve, most_bytes)
     turn = 0.25 * np.pi * np.arange(8 * _HELIX_TURNS + 1)
     helix = np.stack((20 * np.cos(turn), 20 * np.sin(turn), 5 * turn / np.pi), axis=1)
     space = spatial_through_points(helix, closed=False).spline
-    yield streamed("helix, 8 turns", load_machine(MACHINES / "mill.toml"), space, most_bytes)
+    yield streamed("helix, longer", load_machine(MACHINES / "mill.toml"), space, most_bytes)
 
 
 def _paper(name: str) -> Machine:

@@ -31,6 +31,7 @@ from ..feed.optimal.track import Ends, Track, ends_of, make_track
 from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
+from ..feed.plan import FeedCurve
 from ..feed.request import LONGEST_S, OPTIMAL
 from ..pipeline import axis_limits, controller_limits, plants
 from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
@@ -100,6 +101,7 @@ class Window:
     count   intervals that are kept; all of them where `rests`: the motion is at rest there
     joints  (j,) numbers of the knots at which tails may begin, JOINTS for a chunk; the last one is `count`
     end_mm  where the kept part ends, in the arc length of the path in memory
+    first   number of the solution's knot at which the stretch begins
     """
 
     solution: Solution
@@ -110,6 +112,7 @@ class Window:
     joints: tuple[int, ...]
     rests: bool
     end_mm: float
+    first: int = 0
 
     def joint_q40(self, joint: int) -> int:
         """Arc length of the section at a knot."""
@@ -191,12 +194,12 @@ class SectionFeed:
         high, stop_s = self._high(limits)
         found = self._solved(limits, high, stop_s)
         if found is None:
-            return self._to_rest()
+            return self._to_rest(limits, given)
         made, bad = self._lowered(
             found, lambda one: self._window(one, limits, given, high, stop_s), lambda w: w.stretch
         )
         if self._moving is not None and bad[: made.count].any():
-            return self._to_rest()
+            return self._to_rest(limits, given)
         return made
 
     def _lowered(
@@ -244,16 +247,26 @@ class SectionFeed:
         end_mm = float(found.grid.s[count])
         return Window(found, limits, plan, stretch, count, joints, rests, end_mm)
 
-    def _to_rest(self) -> Window:
+    def _to_rest(
+        self, limits: PlanLimits, given: tuple[FeedRequest, Limits, Plants | None]
+    ) -> Window:
         """The rest of the last window, to its end: nothing is found that goes on in motion."""
         last, held = self._last, self._held
         assert last is not None
         assert held is not None
+        first = last.first + last.count
         pieces = taken(last.stretch.pieces, slice(last.count, None))
         stretch, count = Stretch(pieces, last.stretch.end_q40), len(pieces)
-        end_mm = float(held.grid.s[-1])
-        return replace(
-            last, stretch=stretch, count=count, joints=(count,), rests=True, end_mm=end_mm
+        return Window(
+            held,
+            limits,
+            self._plan(given, last.plan.curve),
+            stretch,
+            count,
+            self._joints(held, count, first),
+            rests=True,
+            end_mm=float(held.grid.s[-1]),
+            first=first,
         )
 
     def _read(self) -> None:
@@ -307,7 +320,7 @@ class SectionFeed:
         found = gather(request, limits, controller_limits(machine), own, machine.period_us)
         return found, (request, limits, own)
 
-    def _plan(self, given: tuple[FeedRequest, Limits, Plants | None], track: Track) -> FeedPlan:
+    def _plan(self, given: tuple[FeedRequest, Limits, Plants | None], track: FeedCurve) -> FeedPlan:
         request, limits, own = given
         machine = self.machine
         bounds = PathBounds(self.path.curve, limits, own)
@@ -335,14 +348,16 @@ class SectionFeed:
             )
         return None
 
-    def _joints(self, found: Solution, count: int) -> tuple[int, ...]:
-        """Knots up to `count`, JOINTS of them for the time and the bytes of a chunk, evenly in the greater one."""
-        t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[: count + 1]
-        knots = found.grid.s[: count + 1]
-        segments = np.searchsorted(self.path.curve.segment_starts_mm, knots)
+    def _joints(self, found: Solution, count: int, first: int = 0) -> tuple[int, ...]:
+        """Knots up to `count`, counted from knot `first`: JOINTS of them for the time and the bytes of a chunk, evenly
+        in the greater one.
+        """
+        part = slice(first, first + count + 1)
+        t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[part]
+        segments = np.searchsorted(self.path.curve.segment_starts_mm, found.grid.s[part])
         own = np.arange(count + 1) * PIECE_BYTES + segments * segment_size(self.path.curve.axes)
-        own = own + EVENT.itemsize * self.path.events_before(knots)
-        share = np.maximum(t / self._joint.time_s, (own - own[0]) / self._joint.bytes)
+        own = own + EVENT.itemsize * self.path.events_before(found.grid.s[part])
+        share = np.maximum((t - t[0]) / self._joint.time_s, (own - own[0]) / self._joint.bytes)
         parts = JOINTS * max(1, ceil(float(share[-1]) - _SLIGHTLY_MORE))
         at = np.searchsorted(share, share[-1] * np.arange(1, parts) / parts)
         inner = [int(k) for k in np.unique(at) if 2 < k < count - 2]
@@ -374,8 +389,9 @@ class SectionFeed:
         refuse that. The last one is the rest of the window.
         """
         found, curve = window.solution, self.path.curve
-        low = float(found.grid.s[joint])
-        state = State(float(found.q[joint]), float(found.slope[joint]))
+        knot = window.first + joint
+        low = float(found.grid.s[knot])
+        state = State(float(found.q[knot]), float(found.slope[knot]))
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
         tried: set[int] = set()
