@@ -159,7 +159,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "job_run": {"errors", "config", "native", "program", "simulate", "bus", "job", "toolpath"},
     "stream": {
         *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
-        *("toolpath", "job", "job_outputs", "job_run", "names"),
+        *("toolpath", "job", "job_outputs", "job_run", "names", "events", "path_outputs"),
     },
     "paper": {
         "errors",
