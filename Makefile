@@ -120,7 +120,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak soak-stream bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -172,6 +172,8 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
 	@$(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
+soak-stream: build firmware ## a streamed job of SOAK_S seconds of motion on the emulated M4F in virtual time: setpoints against the offline simulation, memory of both sides
+	@$(PY) tools/stream_soak.py --seconds $(SOAK_S) --json $(BUILD)/stream_soak.json
 
 # TARGET: one of an385 an386 an500 an505 microbit; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386

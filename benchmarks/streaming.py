@@ -18,10 +18,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from math import sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
 
 if TYPE_CHECKING:
     from hodograph.stream.plan import JobFiles
@@ -31,7 +32,7 @@ sys.path[:0] = [str(ROOT / "host_tools")]
 MILL = ROOT / "examples" / "machines" / "mill.toml"
 LINES, FIT_LINES = (300, 1200, 100_000), (2000, 20_000)
 _ROW_LINES, _STEP_MM, _PITCH_MM = 400, 0.25, 0.5
-FOR_EVER_S = 1e6
+FOR_EVER_S, START_LINES = 1e6, 1200
 
 
 def write_job(file: Path, lines: int, step_mm: float = _STEP_MM) -> None:
@@ -98,18 +99,50 @@ def _resident_mb() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
 
-def apart(lines: int, fit_only: bool, step_mm: float) -> dict[str, Any]:
+def measure_start(lines: int) -> dict[str, Any]:
+    """From the command to the start of the motion, on a machine that is there: processor time of the command with the
+    start of Python, and bus time that passes meanwhile. Virtual time stands still while the command computes, and
+    planning goes on beside what it waits for, so their sum is the most that it takes on a computer without other work.
+    """
+    from hodograph.bus.clock import VirtualClock
+    from hodograph.bus.hub import LocalHub
+    from hodograph.bus.processes import SimulatedMachine, virtual_clock
+    from hodograph.bus.sdo.controller import OFF, Controller, connect
+    from hodograph.cli.main import main as command
+    from hodograph.config import load_machine
+
+    machine, ended = load_machine(MILL), {}
+
+    def start(controller: Controller, *_: object, **__: object) -> None:
+        ended["processor_s"], ended["bus_s"] = time.process_time(), controller.clock.now_s()
+        raise KeyboardInterrupt
+
+    with tempfile.TemporaryDirectory() as folder, LocalHub() as hub, ExitStack() as stack:
+        file = Path(folder) / "job.ngc"
+        write_job(file, lines)
+        imported_s = time.process_time()
+        clock = virtual_clock(hub.address)
+        assert isinstance(clock, VirtualClock)
+        stack.callback(clock.release)
+        stack.enter_context(SimulatedMachine(machine, hub.address, "fast"))
+        with connect(hub.address, machine.node, machine.bitrate) as controller:
+            controller.require(20.0)
+            controller.wait_for((OFF,), 20.0)
+        begun_s, begun_bus_s = time.process_time(), clock.now_s()
+        words = ["stream", str(file), "--machine", str(MILL), "--bus", str(hub.address)]
+        with patch.object(Controller, "start", start):
+            command([*words, "--journal", str(Path(folder) / "stream.json"), "--quiet"])
+    return {
+        "lines": lines,
+        "start_processor_s": imported_s + ended["processor_s"] - begun_s,
+        "start_bus_s": ended["bus_s"] - begun_bus_s,
+    }
+
+
+def apart(lines: int, *words: str) -> dict[str, Any]:
     """The same in a process of its own."""
     alone = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    command = [
-        sys.executable,
-        __file__,
-        "--one",
-        str(lines),
-        "--step",
-        str(step_mm),
-        *(["--fit"] if fit_only else []),
-    ]
+    command = [sys.executable, __file__, "--one", str(lines), *words]
     done = subprocess.run(command, check=True, capture_output=True, text=True, env=alone)
     found: dict[str, Any] = json.loads(done.stdout)
     return found
@@ -123,13 +156,19 @@ def main() -> None:
     parser.add_argument("--fit-lines", type=int, nargs="*", default=list(FIT_LINES))
     parser.add_argument("--step", type=float, default=_STEP_MM, help="length of a line in mm")
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--start", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--fit", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.one is not None and options.start:
+        print(json.dumps(measure_start(options.one)))
+        return
     if options.one is not None:
         print(json.dumps(measure(options.one, options.fit, options.step)))
         return
-    rows = [apart(lines, False, options.step) for lines in options.lines]
-    rows += [apart(lines, True, options.step) for lines in options.fit_lines]
+    step = ("--step", str(options.step))
+    rows = [apart(lines, *step) for lines in options.lines]
+    rows += [apart(lines, *step, "--fit") for lines in options.fit_lines]
+    begun = apart(START_LINES, "--start")
     print("| lines | processor s | first chunk s | motion s | times as fast | kB/s | memory MB |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     for row in rows:
@@ -143,8 +182,13 @@ def main() -> None:
             f"| {row['motion_s']:.2f} | {row['times_as_fast']:.2f} | {row['bytes_per_s'] / 1000:.1f} "
             f"| {row['memory_mb']:.0f} |"
         )
+    print(
+        f"start of the motion after the command, {START_LINES} lines: {begun['start_processor_s']:.2f} s of processor "
+        f"time and {begun['start_bus_s']:.2f} s of bus time"
+    )
     if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        found = {"jobs": rows, "start": begun}
+        options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,6 +53,33 @@ def _continued(clock: VirtualClock, folder: Path) -> str:
     return done.stdout
 
 
+def test_a_second_command_leaves_the_first_one_alone(
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path
+) -> None:
+    """With the same journal, with one of its own, and with a job that the controller does not have."""
+    part, kept, other = (
+        str(tmp_path / "part.ngc"),
+        tmp_path / "stream.json",
+        tmp_path / "other.json",
+    )
+    machine = ("--machine", str(MILL))
+    same = run_command(clock, "stream", part, *machine, "--journal", str(kept))
+    again = run_command(clock, "stream", "--continue", "--journal", str(kept))
+    for done in (same, again):
+        assert done.returncode == 2
+        assert "another hodograph stream writes this journal" in done.stderr
+    entry = json.loads(kept.read_text()) | {"job0": 1}
+    other.write_text(json.dumps(entry))
+    own = run_command(clock, "stream", part, *machine, "--journal", str(tmp_path / "own.json"))
+    lost = run_command(clock, "stream", "--continue", "--journal", str(other))
+    for done in (own, lost):
+        assert done.returncode == 5
+        assert "is running: wait until the axes stand" in done.stderr
+    assert bench.controller.state() == RUNNING
+    assert under_way.wait(WAIT_S) == 0, under_way.err
+    assert _at_the_end(bench)
+
+
 def _at_the_end(bench: Bench) -> bool:
     at = bench.controller.targets(3)
     return at == [0, 0, -3 * COUNTS_PER_MM] and stream_status(bench.controller).state == ENDED
@@ -82,11 +110,13 @@ def test_a_killed_host_leaves_the_machine_on_its_path(
     assert _at_the_end(bench)
 
 
+@pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupt_rests_on_the_path(
-    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path, end: signal.Signals
 ) -> None:
-    under_way.signal(signal.SIGINT)
-    assert under_way.wait(WAIT_S) == 130
+    """Ctrl-C, a kill, and a terminal that is closed."""
+    under_way.signal(end)
+    assert under_way.wait(WAIT_S) == 128 + end
     x, y, z = bench.controller.targets(3)
     assert (x, z) == (12 * COUNTS_PER_MM, 0)
     assert 4 * COUNTS_PER_MM <= y < 15 * COUNTS_PER_MM

@@ -10,10 +10,10 @@ from contextlib import contextmanager, suppress
 
 @contextmanager
 def unbroken() -> Iterator[None]:
-    """Ignores Ctrl-C and SIGTERM while the axes are being stopped."""
+    """Ignores Ctrl-C, SIGTERM and SIGHUP while the axes are being stopped."""
     kept = {}
     with suppress(ValueError):  # only the main thread may
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             kept[number] = signal.signal(number, signal.SIG_IGN)
     try:
         yield

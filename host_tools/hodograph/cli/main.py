@@ -10,7 +10,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from importlib import import_module
 from types import FrameType
 
@@ -21,6 +21,8 @@ from .waiting import waiting
 
 TERMINATED_EXIT_STATUS = 143
 """Exit status after SIGTERM (128 + SIGTERM)."""
+HUNG_UP_EXIT_STATUS = 129
+"""Exit status after SIGHUP (128 + SIGHUP)."""
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -75,6 +77,10 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM: everything that Ctrl-C tidies up is tidied up."""
 
 
+class HungUp(KeyboardInterrupt):
+    """SIGHUP: the terminal was closed. Everything that Ctrl-C tidies up is tidied up."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns the exit status."""
     debug = bool(os.environ.get("HODOGRAPH_DEBUG"))
@@ -82,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = make_parser().parse_args(arguments)
         debug = debug or options.debug
-        _on_sigterm()
+        _on_signals()
         _run(options)
         sys.stdout.flush()
         return 0
@@ -90,6 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _end(str(error), error.exit_status, debug)
     except Terminated:
         return _end("terminated", TERMINATED_EXIT_STATUS, debug)
+    except HungUp:
+        return _end("the terminal was closed", HUNG_UP_EXIT_STATUS, debug)
     except KeyboardInterrupt:
         return _end("interrupted", INTERRUPTED_EXIT_STATUS, debug)
     except BrokenPipeError:
@@ -143,16 +151,22 @@ def _run(options: argparse.Namespace) -> None:
 def _end(message: str, status: int, debug: bool) -> int:
     if debug:
         traceback.print_exc()
-    complain(" ".join(message.split()))
+    with suppress(OSError):  # the terminal may be gone
+        complain(" ".join(message.split()))
     return status
 
 
-def _on_sigterm() -> None:
+def _on_signals() -> None:
     def terminate(number: int, frame: FrameType | None) -> None:
         raise Terminated
 
+    def hang_up(number: int, frame: FrameType | None) -> None:
+        raise HungUp
+
     try:
         signal.signal(signal.SIGTERM, terminate)
+        if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup
+            signal.signal(signal.SIGHUP, hang_up)
     except ValueError:  # not the main thread: whoever called us decides
         return
 

@@ -8,7 +8,7 @@ import random
 import time
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from ..native.program import NativeLimits
 from ..pipeline import Pipeline, program_limits
 from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
-from ..stream.journal import Entry, Journal, load, mark
+from ..stream.journal import Entry, Journal, journal_lock, load, mark
 from ..stream.output_check import require_outputs
 from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place
 from ..stream.resuming import nearest_place
@@ -75,7 +75,9 @@ def stream_on(options: Namespace, address: BusAddress) -> None:
     job = _job(options)
     require_fit(job.machine)
     number = random.SystemRandom().randrange(1, 2**31)
-    _run(job, options, address, number, Place(), _journal(job, options, number))
+    entry = _entry(job, number)
+    with nullcontext() if entry is None else journal_lock(journal_file(options)):
+        _run(job, options, address, number, Place(), entry)
 
 
 def _require_job_file(options: Namespace, file: Path) -> None:
@@ -123,14 +125,14 @@ def journal_file(options: Namespace) -> Path:
     return Path(home) / "hodograph" / "stream.json"
 
 
-def _journal(job: JobFiles, options: Namespace, number: int) -> Journal | None:
+def _entry(job: JobFiles, number: int) -> Entry | None:
+    """What the journal of a job begins with; None: it has none."""
     if any(str(file) == STANDARD_INPUT for file in job.files):
         note("standard input cannot be read again: --continue is not possible for this job")
         return None
     marks = tuple(mark(file) for file in job.files)
     own = {"tolerance_mm": job.tolerance_mm, "reading": asdict(job.reading)}
-    machine = str(job.machine.file.resolve())
-    return Journal(journal_file(options), Entry(marks, machine, own, number))
+    return Entry(marks, str(job.machine.file.resolve()), own, number)
 
 
 def _continue(options: Namespace) -> None:
@@ -138,19 +140,20 @@ def _continue(options: Namespace) -> None:
     if options.files:
         raise InputError("stream --continue: goes on with the files of the last job: give none")
     file = journal_file(options)
-    entry = load(file)
-    own = entry.options
-    given: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in own["reading"].items()
-    }
-    files = tuple(Path(one.path) for one in entry.files)
-    machine = load_machine(Path(entry.machine))
-    job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
-    _require_outputs(job)
-    require_fit(job.machine)
-    with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
-        _run(job, options, address, random.SystemRandom().randrange(1, 2**31), None, None, entry)
+    with journal_lock(file):
+        entry = load(file)
+        own = entry.options
+        given: dict[str, Any] = {
+            key: tuple(value) if isinstance(value, list) else value
+            for key, value in own["reading"].items()
+        }
+        files = tuple(Path(one.path) for one in entry.files)
+        machine = load_machine(Path(entry.machine))
+        job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
+        _require_outputs(job)
+        require_fit(job.machine)
+        with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
+            _run(job, options, address, random.SystemRandom().randrange(1, 2**31), None, entry)
 
 
 def _run(
@@ -159,10 +162,11 @@ def _run(
     address: BusAddress,
     job_number: int,
     begin: Place | None,
-    journal: Journal | None,
-    entry: Entry | None = None,
+    entry: Entry | None,
 ) -> None:
+    """Streams a job from a place; None: from the one where the job of `entry`, its journal, rests."""
     kernel = options.kernel or job.machine.kernel
+    continued = begin is None
     if begin is None:
         assert entry is not None
         begin = _rests_at(entry, job.machine, address, options.wait)  # None: the job is lost
@@ -174,11 +178,12 @@ def _run(
         if begin is None:
             assert entry is not None
             begin = _nearest(at, job, entry, unhomed=options.unhomed)
-        if entry is not None:
+        if continued:
+            assert entry is not None
             note(
                 f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
             )
-            fresh = replace(
+            entry = replace(
                 entry,
                 job0=job_number,
                 section=begin.section,
@@ -187,7 +192,7 @@ def _run(
                 first=begin.section,
                 starts=((begin.section, 0),),
             )
-            journal = Journal(journal_file(options), fresh)
+        journal = None if entry is None else Journal(journal_file(options), entry)
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
@@ -246,11 +251,11 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
     with connect(address, machine.node, machine.bitrate) as controller:
         if not controller.answers(wait_s):
             return None
+        if stream_status(controller).job != entry.job:
+            return None  # what moves there is none of ours
         if controller.state() in ON_PATH:
             controller.stop_and_wait()
         status = stream_status(controller)
-        if status.job != entry.job:
-            return None
         return Place(*entry.place_at(round(status.way_mm * 2**40)))
 
 

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
+
+from filelock import lock_descriptor
 
 from ..errors import InputError
 
@@ -77,6 +81,29 @@ def mark(file: Path) -> FileMark:
     return FileMark(str(file.resolve()), found.st_size, found.st_mtime_ns)
 
 
+@contextmanager
+def journal_lock(file: Path) -> Iterator[None]:
+    """Keeps a journal for this process. Raises InputError: another one has it, or its folder cannot be written."""
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(file.with_name(file.name + ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise _cannot_be_written(file, error) from None
+    try:
+        if not lock_descriptor(descriptor, blocking=False):
+            raise InputError(
+                f"{file}: another hodograph stream writes this journal: wait for its end, or give this job "
+                "a journal of its own (--journal FILE)"
+            )
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _cannot_be_written(file: Path, error: OSError) -> InputError:
+    return InputError(f"{file}: the journal cannot be written: {error.strerror}")
+
+
 class Journal:
     """Writes the journal of one job."""
 
@@ -103,9 +130,7 @@ class Journal:
                 os.fsync(out.fileno())
             fresh.replace(self.file)
         except OSError as error:
-            raise InputError(
-                f"{self.file}: the journal cannot be written: {error.strerror}"
-            ) from None
+            raise _cannot_be_written(self.file, error) from None
 
 
 def load(file: Path) -> Entry:
@@ -119,11 +144,14 @@ def load(file: Path) -> Entry:
         found["files"] = tuple(FileMark(**one) for one in found["files"])
         found["starts"] = tuple((int(number), int(start)) for number, start in found["starts"])
         entry = Entry(**found)
+        _check(entry)
     except FileNotFoundError:
         raise InputError(
             f"{file}: no job was streamed with this journal: nothing to continue"
         ) from None
-    except (OSError, ValueError, KeyError, TypeError):
+    except OSError as error:
+        raise InputError(f"{file}: the journal cannot be read: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
     if entry.done:
         raise InputError(f"{file}: the last job came to its end: nothing to continue")
@@ -133,3 +161,14 @@ def load(file: Path) -> Entry:
                 f"{one.path}: has been changed since the job was streamed: stream it from its start"
             )
     return entry
+
+
+def _check(entry: Entry) -> None:
+    """Raises KeyError and TypeError: something is missing, or is not what it should be."""
+    whole = (entry.job0, entry.section, entry.way_q40, entry.committed_q40, entry.first)
+    if not all(isinstance(one, int) for one in whole) or not isinstance(entry.machine, str):
+        raise TypeError
+    if not isinstance(entry.options["tolerance_mm"], int | float):
+        raise TypeError
+    if not isinstance(entry.options["reading"], dict):
+        raise TypeError

@@ -18,14 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
-from ..errors import RunError
+from ..errors import InputError, RunError
 from ..events import SwitchedOutputs
-from ..names import is_toolpath
+from ..names import STANDARD_INPUT, is_toolpath
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
 from .chunk import Chunk, Rest, parse
 from .chunks import JobPlace, SectionChunks
 from .geometry import begun_with, blocks_from, switching
+from .journal import mark
 from .paths import PathsJob
 from .reading import StreamReader, StreamSection
 from .reading_process import ParallelReader
@@ -37,6 +38,8 @@ PROCESSES = 2
 _MEETS_MM = 1e-6
 """A section that begins so near to the end of the one before goes on from there."""
 _RATE_S, _FOR_EVER_S = 3.0, 1e6
+_INPUT_WAIT_S = 1.0
+"""For the end of a planner that may wait for standard input, which nothing interrupts. It ends with the process."""
 MOST_WAITING_BYTES, _MOST_WAITING = 512 << 20, 100_000
 """Planned chunks that wait for those who read them: where there are so many, planning waits. Each keeps its section in
 memory."""
@@ -111,6 +114,7 @@ class JobPlan:
         self._waiting: deque[PlannedSection] = deque()
         """Of the chunks that may still be read, one for each."""
         self._rate = _GreatestRate()
+        self._marks = {file: mark(file) for file in job.files if str(file) != STANDARD_INPUT}
         self._error: BaseException | None = None
         self._done = self._ending = False
         self._changed = threading.Condition()
@@ -124,8 +128,10 @@ class JobPlan:
         with self._changed:
             self._ending = True
             self._changed.notify_all()
-        self._thread.join()
-        self._store.forget_all()
+        from_input = any(str(file) == STANDARD_INPUT for file in self._job.files)
+        self._thread.join(_INPUT_WAIT_S if from_input else None)
+        if not self._thread.is_alive():
+            self._store.forget_all()
 
     def item(self, index: int, wait_s: float) -> tuple[PlannedSection, Chunk, float] | None:
         """The chunk with this index, its section and its new motion in s. None: not yet planned after `wait_s`.
@@ -208,6 +214,7 @@ class JobPlan:
             last: PlannedSection | None = None
             for section, chunk, new_s in self._planning():
                 data = chunk.encode()
+                self._require_unchanged(section.file)
                 with self._changed:
                     if not self._put(data):
                         return
@@ -227,6 +234,17 @@ class JobPlan:
             with self._changed:
                 self._done = True
                 self._changed.notify_all()
+                if self._ending:
+                    self._store.forget_all()
+
+    def _require_unchanged(self, file: Path) -> None:
+        """Raises InputError: the file is not what it was when the job began. Half a line of it may have been read."""
+        known = self._marks.get(file)
+        if known is not None and file.is_file() and mark(file) != known:
+            raise InputError(
+                f"{file}: has been changed while it was streamed: the job ends before what may have been read of it "
+                "half written: stream it again when it is complete"
+            )
 
     def _put(self, data: bytes) -> bool:
         """Keeps a chunk as soon as there is room. False: the plan ends. Raises RunError: there will be no room."""

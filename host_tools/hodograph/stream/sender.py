@@ -21,13 +21,15 @@ from ..bus.sdo.stream_channel import (
     ENDED,
     PROGRAM_STOP,
     STOPPED,
+    UNDERRUN,
     StreamStatus,
     close_stream,
     send_chunk,
     stream_status,
 )
+from ..bus.signals import unbroken
 from ..config import Machine
-from ..errors import RunError
+from ..errors import HodographError, RunError
 from ..job_run import Operator, at_rest, say, stops
 from ..native import NativeProgram
 from .chunk import Chunk
@@ -41,6 +43,7 @@ _POLL_S = 0.05
 _PLAN_WAIT_S = 0.05
 _JOURNAL_S = 1.0
 _RECORD_S = 0.5
+_UNDERRUN_S = 10.0
 _START_COUNTS = 2
 _PASSED_Q40 = 1 << 20
 """A section is in motion when the way is so far behind its start, 2^-20 mm."""
@@ -105,11 +108,25 @@ class Sender:
     _underruns: int = 0
     _journal_s: float = field(default=-1e9)
     _kept_s: float = field(default=-1e9)
+    _underrun_s: float = field(default=-1e9)
     _percent: int = 100
     _ahead: deque[PlannedSection] = field(default_factory=deque)
+    _unplanned: HodographError | None = None
+    """Why the job cannot be planned on. What was sent is still carried out."""
 
     def run(self) -> StreamedJob:
-        """Raises RefusedError, BusError, RunError, and what planning raises, when the motion rests."""
+        """Raises RefusedError, BusError, RunError, and what planning raises, when the motion rests.
+
+        Whatever ends it early stops the axes on their path at once; nothing is waited for before.
+        """
+        try:
+            return self._run()
+        except BaseException:
+            with unbroken(), suppress(HodographError):
+                self.at.controller.stop_and_wait()
+            raise
+
+    def _run(self) -> StreamedJob:
         begun_s = self.at.controller.clock.now_s()
         close_stream(self.at.controller)
         item = self._wait_item()
@@ -203,13 +220,16 @@ class Sender:
                     self._at_program_stop()
                 follower()
             last = None
-            if not all_sent and (status is None or status.committed_s < AHEAD_S):
+            more = not all_sent and self._unplanned is None
+            if more and (status is None or status.committed_s < AHEAD_S):
                 last = self._send_one(status)
             if last is not None:
                 sent, all_sent = sent + 1, last
                 first_s = first_s or controller.clock.now_s()
             else:
                 controller.clock.sleep(_POLL_S)
+            if self._unplanned is not None and not started:
+                raise self._unplanned
             if not started and sent and (all_sent or self._may_start(first_s)):
                 self._slow_down()
                 controller.start(unhomed=self.unhomed)
@@ -251,7 +271,11 @@ class Sender:
 
     def _send_one(self, status: StreamStatus | None) -> bool | None:
         """Sends the next chunk, if it is planned and there is room: whether it is the last one of the job."""
-        item = self.plan.item(self._next, 0.0)
+        try:
+            item = self.plan.item(self._next, 0.0)
+        except HodographError as error:
+            self._unplanned = error
+            return None
         if item is None:
             return None
         section, chunk, new_s = item
@@ -292,11 +316,7 @@ class Sender:
         if self.journal is not None and now_s - self._journal_s >= _JOURNAL_S:
             self._journal_s = now_s
             self._note_place(way_q40=round(status.way_mm * 2**40) - section.start_q40)
-        if status.underruns > self._underruns:
-            self._underruns = status.underruns
-            self.at.note(
-                f"{section.file}:{status.line}: the next part came too late: the motion rested on the path and goes on"
-            )
+        self._note_underruns(status, now_s)
         self._slow_down()
         if self.progress is not None:
             behind_s = self.plan.behind_s(self._next - 1)
@@ -313,9 +333,25 @@ class Sender:
                 )
             )
 
+    def _note_underruns(self, status: StreamStatus, now_s: float) -> None:
+        """Says that the motion rested for want of chunks, now and then: a slow bus may make it rest at each."""
+        if status.underruns <= self._underruns or self._unplanned is not None:
+            return
+        self._underruns = status.underruns
+        if now_s - self._underrun_s < _UNDERRUN_S:
+            return
+        self._underrun_s = now_s
+        times = "once" if status.underruns == 1 else f"{status.underruns} times so far"
+        self.at.note(
+            f"{self._section.file}:{status.line}: the next part came too late: the motion rested on the path ({times}) "
+            "and goes on"
+        )
+
     def _over(self, status: StreamStatus, *, all_sent: bool) -> bool:
         """Whether the job came to its end. Raises RunError: it was stopped, or there is a fault."""
         controller = self.at.controller
+        if status.state == UNDERRUN and self._unplanned is not None:
+            raise self._unplanned
         if status.state == ENDED and all_sent:
             controller.wait_for((READY,), 10.0)
             return True

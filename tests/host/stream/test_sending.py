@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -15,12 +16,21 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
 from hodograph.bus.sdo.objects import STREAM
-from hodograph.bus.sdo.stream_channel import ABORT_NO_ROOM, close_stream, send_chunk, stream_status
+from hodograph.bus.sdo.stream_channel import (
+    ABORT_NO_ROOM,
+    OPEN,
+    UNDERRUN,
+    StreamStatus,
+    close_stream,
+    send_chunk,
+    stream_status,
+)
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli.stream_command import _free_rate
 from hodograph.config import load_machine
-from hodograph.errors import BusError, InputError, RefusedError
-from hodograph.stream.journal import Entry, Journal, load, mark
+from hodograph.errors import BusError, InputError, PlanError, RefusedError
+from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
+from hodograph.stream.plan import PlannedSection
 from hodograph.stream.sender import Sender
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -130,7 +140,7 @@ def test_only_an_open_stream_is_closed() -> None:
 
 
 def _entry(file: Path) -> Entry:
-    return Entry((mark(file),), "mill.toml", {"tolerance_mm": 0.01}, 100)
+    return Entry((mark(file),), "mill.toml", {"tolerance_mm": 0.01, "reading": {}}, 100)
 
 
 def test_the_journal_comes_back(tmp_path: Path) -> None:
@@ -162,7 +172,9 @@ def test_a_job_that_is_done_is_not_continued(tmp_path: Path) -> None:
         load(journal.file)
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '{"version": 1}', json.dumps({"version": 9})])
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[1]", "null", '"text"', '{"version": 1}', json.dumps({"version": 9})]
+)
 def test_a_damaged_journal_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "stream.json"
     file.write_text(text)
@@ -173,6 +185,129 @@ def test_a_damaged_journal_is_refused(tmp_path: Path, text: str) -> None:
 def test_no_journal(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="nothing to continue"):
         load(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("job0", "7"),
+        ("way_q40", None),
+        ("options", {"tolerance_mm": 0.01}),
+        ("options", {"tolerance_mm": "fine", "reading": {}}),
+        ("options", {"tolerance_mm": 0.01, "reading": 1}),
+        ("machine", 1),
+        ("files", 3),
+        ("starts", [1]),
+    ],
+)
+def test_a_journal_with_a_wrong_value_is_refused(tmp_path: Path, key: str, value: object) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("G1 X1 F100\n")
+    journal = Journal(tmp_path / "stream.json", _entry(part))
+    text = json.loads(journal.file.read_text()) | {key: value}
+    journal.file.write_text(json.dumps(text))
+    with pytest.raises(InputError, match=r"stream\.json: is no journal"):
+        load(journal.file)
+
+
+def test_half_a_journal_is_refused(tmp_path: Path) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("G1 X1 F100\n")
+    journal = Journal(tmp_path / "stream.json", _entry(part))
+    text = journal.file.read_text()
+    for end in range(0, len(text) - 2, 7):
+        journal.file.write_text(text[:end])
+        with pytest.raises(InputError, match=r"stream\.json: is no journal"):
+            load(journal.file)
+
+
+def test_a_disk_that_is_full_keeps_the_old_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("G1 X1 F100\n")
+    journal = Journal(tmp_path / "stream.json", _entry(part))
+
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("hodograph.stream.journal.os.fsync", full)
+    with pytest.raises(InputError, match="the journal cannot be written: No space left"):
+        journal.update(section=3)
+    assert load(journal.file).section == 0
+
+
+def test_a_journal_has_one_writer(tmp_path: Path) -> None:
+    file = tmp_path / "state" / "stream.json"
+    with (
+        journal_lock(file),
+        pytest.raises(InputError, match="another hodograph stream writes this journal"),
+        journal_lock(file),
+    ):
+        pass
+    with journal_lock(file):
+        pass
+
+
+class Stopped:
+    """A session whose controller notes that it was stopped."""
+
+    def __init__(self, controller: object = None) -> None:
+        self.stops = 0
+        self.controller = controller or self
+        self.said: list[str] = []
+        self.note = self.said.append
+
+    def stop_and_wait(self) -> None:
+        self.stops += 1
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), InputError("bad"), ZeroDivisionError()])
+def test_whatever_ends_a_job_stops_the_axes_first(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    """Before the plan is waited for, which may take a while."""
+    at: Any = Stopped()
+    nothing: Any = None
+
+    def fail(_: Sender) -> None:
+        raise error
+
+    monkeypatch.setattr(Sender, "_run", fail)
+    with pytest.raises(type(error)):
+        Sender(at, nothing, nothing, lambda *_: None).run()
+    assert at.stops == 1
+
+
+def _status(state: int, underruns: int = 0) -> StreamStatus:
+    return StreamStatus(state, JOB, 1, 0, 1.0, 0, 12, 3.0, None, underruns)
+
+
+def test_a_job_that_cannot_be_planned_on_runs_to_its_last_chunk() -> None:
+    def item(index: int, wait_s: float) -> None:
+        raise PlanError(f"line 99: {index} {wait_s}")
+
+    at: Any = Stopped(SimpleNamespace(wait_for=lambda *_: None))
+    plan: Any = SimpleNamespace(item=item)
+    nothing: Any = None
+    sender = Sender(at, nothing, plan, lambda *_: None)
+    assert sender._send_one(None) is None
+    assert not sender._over(_status(OPEN), all_sent=False)
+    with pytest.raises(PlanError, match="line 99"):
+        sender._over(_status(UNDERRUN), all_sent=False)
+
+
+def test_rests_for_want_of_chunks_are_said_now_and_then() -> None:
+    at: Any = Stopped()
+    nothing: Any = None
+    sender = Sender(at, nothing, nothing, lambda *_: None)
+    sender._ahead.append(PlannedSection(0, Path("part.ngc"), 1, ()))
+    for tenth in range(121):
+        sender._note_underruns(_status(OPEN, underruns=1 + tenth // 2), 0.1 * tenth)
+    first, second = at.said
+    assert "part.ngc:12: the next part came too late" in first
+    assert "(once)" in first
+    assert "(51 times so far)" in second
 
 
 class Overridden:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from hodograph.config import load_machine
-from hodograph.errors import RunError
+from hodograph.errors import InputError, RunError
 from hodograph.stream import plan as plan_module
 from hodograph.stream import store as store_module
 from hodograph.stream.plan import JobFiles, JobPlan, Place
@@ -162,3 +162,32 @@ def test_a_folder_that_is_gone_is_named(tmp_path: Path, monkeypatch: pytest.Monk
     store.folder = tmp_path / "none"
     with pytest.raises(RunError, match=r"none: the plan of the job cannot be kept there: No such"):
         store.put(b"chunk")
+
+
+def test_a_file_that_changes_meanwhile_ends_the_job(tmp_path: Path) -> None:
+    """Its end may have been read half written: nothing of what was planned since is sent."""
+    job = _job(tmp_path)
+    plan = JobPlan(job, 1 << 20, 1, Place())
+    job.files[0].write_text(job.files[0].read_text() + "G1 X9\n")
+    with plan, pytest.raises(InputError, match=r"part\.ngc: has been changed while"):
+        plan.item(0, PATIENCE_S)
+
+
+def test_a_plan_ends_while_its_input_is_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Standard input that stays open in the middle of a line does not keep the command from its end."""
+    monkeypatch.setattr(plan_module, "_INPUT_WAIT_S", 0.05)
+    reader, writer = os.pipe()
+    kept = os.dup(0)
+    try:
+        os.dup2(reader, 0)
+        os.write(writer, b"F600\nG1 X")
+        job = JobFiles((Path("-"),), load_machine(MILL), 0.01, ReadOptions())
+        with JobPlan(job, 1 << 20, 1, Place()) as plan:
+            assert plan.item(0, 0.0) is None
+        assert plan._thread.is_alive()
+        os.close(writer)
+        plan._thread.join()
+    finally:
+        os.dup2(kept, 0)
+        os.close(kept)
+        os.close(reader)

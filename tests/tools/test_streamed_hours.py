@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""A streamed job on the emulated M4F, as tools/stream_soak.py runs it for hours: here a minute of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stream_soak import MovingHash, main
+
+
+@pytest.mark.long
+def test_the_board_gives_the_setpoints_of_the_chunks(tmp_path: Path) -> None:
+    out = tmp_path / "soak.json"
+    assert main(["--seconds", "60", "--json", str(out)]) == 0
+    found = json.loads(out.read_text())
+    assert found["sha256"][0] == found["sha256"][1]
+    assert found["ticks"][0] > 60_000
+    assert found["underruns"] == 0
+
+
+def test_the_hash_leaves_out_the_standstill_at_both_ends() -> None:
+    """However the setpoints are divided; a rest on the way counts, and so does each setpoint."""
+    moving = np.array([[0, 0], [1, 0], [2, 1], [2, 1], [2, 1], [3, 1]])
+    still = np.zeros((5, 2), dtype=int)
+    whole, parted, other = MovingHash(), MovingHash(), MovingHash()
+    whole.feed(np.concatenate((still, moving, np.repeat(moving[-1:], 4, axis=0))))
+    for part in (still, moving[:3], moving[3:4], moving[4:], moving[-1:], moving[:0]):
+        parted.feed(part)
+    other.feed(np.delete(moving, 3, axis=0))
+    assert (whole.ticks, whole.sha256) == (parted.ticks, parted.sha256)
+    assert whole.ticks == 5
+    assert whole.sha256 != other.sha256
