@@ -42,7 +42,7 @@ abi: library ## is the interface of libhodograph what packaging/library/abi.txt 
 PREFIX  ?= /usr/local
 DESTDIR ?=
 LIBDIR  ?= $(PREFIX)/lib
-placed   = $(PYTHON) tools/dist/install.py $@ --build $(BUILD) --prefix $(PREFIX) --libdir $(LIBDIR) $(if $(DESTDIR),--destdir $(DESTDIR))
+placed   = $(PYTHON) tools/dist/install.py $@ --build $(BUILD) --prefix '$(PREFIX)' --libdir '$(LIBDIR)' $(if $(DESTDIR),--destdir '$(DESTDIR)')
 install: c library ## programs, library, headers, EDS files and examples into PREFIX=/usr/local, below DESTDIR
 	@$(placed)
 uninstall: c library ## take away what make install would write

@@ -109,6 +109,16 @@ def _table(
     return found | ({"required": list(required)} if required else {}) | (more or {})
 
 
+def _table_or_list(text: str, table: Schema, tables: Schema) -> Schema:
+    """One schema rather than a choice of two: editors then mark the wrong key, not the whole table. Conditions on the
+    items of a list and on the keys of a table do not meet, but for those that combine others.
+    """
+    combining = {key: table[key] for key in ("oneOf", "allOf") if key in table}
+    plain = {key: each for key, each in table.items() if key not in combining}
+    of_table = {"if": {"type": "object"}, "then": combining}
+    return plain | tables | of_table | {"type": ["object", "array"], "description": text}
+
+
 def _with(found: Schema, text: str, default: Any) -> Schema:
     if default is not None:
         found["default"] = default
@@ -133,7 +143,7 @@ def _path_file() -> Schema:
     return _table(
         "A path file of Hodograph",
         {
-            "path": _either(
+            "path": _table_or_list(
                 "The path, or [[path]]: several paths with rests between them, as one job",
                 _table("The curve", *_curve()),
                 _list("Paths, each of which begins where the one before ends", _listed_path()),

@@ -203,6 +203,28 @@ def test_install_for_debian(tmp_path: Path, simulated: tuple[Path, list[str]]) -
     check_example(tmp_path / "build/setpoints", simulated)
 
 
+def test_a_prefix_with_spaces(tmp_path: Path, simulated: tuple[Path, list[str]]) -> None:
+    """By make, and found there by pkg-config from the example's Makefile."""
+    prefix = tmp_path / "a prefix"
+    make = ("env", "-u", "MAKEFLAGS", "make", "--no-print-directory", "-C", ROOT)
+    run(*make, "-o", "c", "-o", "library", "install", f"PREFIX={prefix}")
+    (prefix / "share/hodograph/examples/embed").rename(tmp_path / "embed")
+    found = f"PKG_CONFIG_PATH={prefix}/lib/pkgconfig"
+    run("env", "-u", "MAKEFLAGS", found, "make", cwd=tmp_path / "embed")
+    check_example(tmp_path / "embed/setpoints", simulated, "env", f"LD_LIBRARY_PATH={prefix}/lib")
+    removed = run(*make, "-o", "c", "-o", "library", "uninstall", f"PREFIX={prefix}")
+    assert re.match(r"uninstalled \d\d files", removed.stdout)
+    assert not files(prefix)
+
+
+def test_a_place_that_cannot_be_written_is_one_message(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    script = ROOT / "tools/dist/install.py"
+    words = ("install", "--build", ROOT / "build", "--prefix", tmp_path / "file")
+    refused = run(sys.executable, script, *words, status=1).stderr
+    assert refused == f"{tmp_path}/file/lib: Not a directory\n"
+
+
 def test_relative_prefix_is_refused() -> None:
     script = ROOT / "tools/dist/install.py"
     words = ("install", "--build", "build", "--prefix", "usr/local")

@@ -91,7 +91,9 @@ def library_items(library: Path, places: Places) -> list[Item]:
         ("hodograph-config.cmake.in", cmake),
         ("hodograph-config-version.cmake.in", cmake),
     ):
-        text = filled((PARTS / template).read_text(encoding="utf-8"), words)
+        is_pc = template.endswith(".pc.in")
+        named = {name: text.replace(" ", "\\ ") for name, text in words.items()} if is_pc else words
+        text = filled((PARTS / template).read_text(encoding="utf-8"), named)
         items.append(Item(folder / template.removesuffix(".in"), text.encode()))
     return items
 
@@ -131,25 +133,31 @@ def install(items: list[Item], destdir: Path) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
         part = target.with_name(f".{target.name}.part")
         part.unlink(missing_ok=True)
-        if isinstance(item.content, str):
-            part.symlink_to(item.content)
-        else:
-            part.write_bytes(item.content)
-            part.chmod(item.mode)
-        part.replace(target)
+        try:
+            if isinstance(item.content, str):
+                part.symlink_to(item.content)
+            else:
+                part.write_bytes(item.content)
+                part.chmod(item.mode)
+            part.replace(target)
+        except OSError as error:
+            part.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror, str(target)) from None
 
 
-def uninstall(items: list[Item], destdir: Path, prefix: Path) -> None:
-    """Removes all, and the folders of the prefix that are empty then."""
-    folders = set()
+def uninstall(items: list[Item], destdir: Path, prefix: Path) -> int:
+    """Removes all, and the folders of the prefix that are empty then. How many files there were."""
+    folders, removed = set(), 0
     for item in items:
         target = below(destdir, item.target)
+        removed += target.is_symlink() or target.exists()
         target.unlink(missing_ok=True)
         folders |= {folder for folder in item.target.parents if folder.is_relative_to(prefix)}
     for folder in sorted(folders, key=lambda folder: len(folder.parts), reverse=True):
         there = below(destdir, folder)
         if folder != prefix and there.is_dir() and not any(there.iterdir()):
             there.rmdir()
+    return removed
 
 
 def main() -> int:
@@ -170,12 +178,16 @@ def main() -> int:
     try:
         if options.action == "install":
             install(items, destdir)
+            count = len(items)
         else:
-            uninstall(items, destdir, places.prefix)
+            count = uninstall(items, destdir, places.prefix)
     except PermissionError as error:
         print(f"{error.filename}: {error.strerror}; choose PREFIX or run as root", file=sys.stderr)
         return 1
-    print(f"{options.action}ed {len(items)} files: {below(destdir, places.prefix)}")
+    except OSError as error:
+        print(f"{error.filename}: {error.strerror}", file=sys.stderr)
+        return 1
+    print(f"{options.action}ed {count} files: {below(destdir, places.prefix)}")
     return 0
 
 

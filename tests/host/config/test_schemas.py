@@ -130,13 +130,20 @@ COMPLETE: dict[str, list[Document]] = {
     "path": [
         {
             "path": [
-                {"closed": False, "through": [[0, 0], [10, 5], [20, 0]]},
+                {
+                    "closed": False,
+                    "through": [[0, 0], [10, 5], [20, 0]],
+                    "knots": "uniform",
+                    "start_tangent": [1, 1],
+                    "end_tangent": [1, -1],
+                },
                 {
                     "closed": True,
                     "control_points": [[20, 0], [10, 10], [0, 20], [20, 20]],
                     "dwell_ms": 100,
                     "stop": "optional",
                 },
+                {"closed": False, "through": [[20, 0], [30, 5], [40, 0]], "ends": "natural"},
             ],
         },
         {
@@ -438,6 +445,15 @@ def test_complete_documents_have_every_key(kind: str) -> None:
 def varied(way: tuple[str, ...]) -> bool:
     """Keys of [vary.FIGURE], of which every figure has the same."""
     return way[:1] == ("vary",) and len(way) > 1
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_a_wrong_key_of_a_path_is_named(several: bool) -> None:
+    """Rather than the whole table marked as neither a path nor a list of paths."""
+    curve = {"closed": False, "through": [[0, 0], [1, 1]], "cloesd": True}
+    document = {"path": [curve] if several else curve}
+    errors = [each.message for each in VALIDATORS["path"].iter_errors(document)]
+    assert any("'cloesd' was unexpected" in each for each in errors)
 
 
 def all_keys(part: Document, way: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
