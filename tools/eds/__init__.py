@@ -4,7 +4,7 @@
     python -m eds.to_c FILE.eds NAME OUTDIR    OUTDIR/od_NAME.h and OUTDIR/od_NAME.c
     python -m eds.check FILE.eds...            a line for each fault
 
-with tools/ in PYTHONPATH. `make build` calls the first for both dictionaries of this tree, `make lint` the second.
+with tools/ in PYTHONPATH. `make build` calls the first for each dictionary of this tree, `make lint` the second.
 
 | module | what it has |
 | --- | --- |

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The feed that is requested."""
+"""The requested feed: section [feed] of a path file as frozen data, with the ranges of its values.
+
+Made by config/path_file.py, read by the planners in this package. Nothing is computed here but checks.
+"""
 
 from __future__ import annotations
 

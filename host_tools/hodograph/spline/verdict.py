@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Whether a converged solution is decent: no loop, no cusp of its own; docs/theory/numerics.md 3.5."""
+"""The acceptance test of a spline: a converged solution must have no loop and no cusp that its guide curve lacks.
+
+Used by spline/solve.py for each solution that it finds, and by spatial/quality.py. Pure functions.
+docs/theory/numerics.md 3.5.
+"""
 
 from __future__ import annotations
 
