@@ -7,14 +7,20 @@ import json
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, run_command, running
 from hodograph.bus.clock import VirtualClock
+from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import READY, RUNNING
 from hodograph.bus.sdo.stream_channel import ENDED, STOPPED, stream_status
+from hodograph.cli.monitor_command import machine_layout
+from hodograph.config import load_machine
+from hodograph.monitor.pump import Pump
+from hodograph.monitor.source import open_source
 
 pytestmark = pytest.mark.long
 
@@ -124,3 +130,34 @@ def test_an_interrupt_rests_on_the_path(
     assert stream_status(bench.controller).state == STOPPED
     _continued(clock, tmp_path)
     assert _at_the_end(bench)
+
+
+def test_the_page_has_the_contour_error_of_a_job(
+    hub: LocalHub, clock: VirtualClock, tmp_path: Path
+) -> None:
+    """In each tick that moves, though nobody tells the page the path but the chunks on the bus."""
+    machine, published = load_machine(MILL), list[dict[str, Any]]()
+    file = tmp_path / "part.ngc"
+    file.write_text("G64 P0.05\nF3000\nG1 X10\nG3 X20 Y10 Z-2 I0 J10\nG1 Y20\nG61\nG1 X15\nM2\n")
+    pump = Pump(
+        lambda: open_source(hub.address, machine.bitrate),
+        machine_layout(machine),
+        published.append,
+    )
+    pump.start()
+    journal = ("--journal", str(tmp_path / "stream.json"))
+    with running(
+        clock, "stream", str(file), "--machine", str(MILL), *journal, name="stream"
+    ) as command:
+        assert command.wait(WAIT_S) == 0, command.err
+    pump.close()
+    rows = [message for message in published if message["type"] == "rows"]
+    moving = [
+        contour
+        for row in rows
+        for contour, feed in zip(row["contour"][1], row["feed"][0], strict=True)
+        if feed is not None and feed > 1.0
+    ]
+    assert len(moving) > 50
+    assert all(contour is not None and contour < 100.0 for contour in moving)
+    assert max(moving) > 0.01

@@ -4,6 +4,7 @@
 source       where frames come from: a bus, or a recording
 decoder      frames to samples, one a SYNC
 derived      samples and the program's curve to what the plots show: feed, jerk, following and contour error
+job_path     the contour error of a streamed job, from the chunks on the bus
 messages     groups of rows that keep their peaks, as JSON
 pump         all of these, some 25 times a second, in a thread of its own
 link         the controller's state and commands, by SDO, in another

@@ -13,7 +13,7 @@ import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +156,14 @@ def _tangents(arcs: Floats, points: Floats) -> Floats:
     return np.asarray(steps / np.maximum(np.hypot.reduce(steps, axis=1), 1e-12)[:, None])
 
 
+class FollowedPath(Protocol):
+    """A path along which setpoints are followed."""
+
+    def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
+        """See ProgramPath."""
+        ...
+
+
 REACHED_AFTER = 2
 _HALF_WINDOW_S = 0.010
 _LEAST_HALF = 3
@@ -210,7 +218,7 @@ class Derivation:
         self._targets: Floats = np.empty((0, axes))
         self._actual: Floats = np.empty((0, axes))
 
-    def feed(self, samples: Samples, path: ProgramPath | None) -> Rows:
+    def feed(self, samples: Samples, path: FollowedPath | None) -> Rows:
         """The rows that are complete with these samples."""
         self._append(samples)
         first, last = self._half, self._sync.size - max(self._half, REACHED_AFTER)
@@ -241,7 +249,7 @@ class Derivation:
         self._targets = np.concatenate([self._targets, targets])
         self._actual = np.concatenate([self._actual, actual])
 
-    def _rows(self, first: int, last: int, path: ProgramPath | None) -> Rows:
+    def _rows(self, first: int, last: int, path: FollowedPath | None) -> Rows:
         targets = self._targets[first:last]
         actual = self._actual[first + REACHED_AFTER : last + REACHED_AFTER]
         contour, arc_mm = (np.full(last - first, np.nan) for _ in range(2))

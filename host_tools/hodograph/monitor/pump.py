@@ -22,8 +22,9 @@ from ..bus.diagnostics.texts import drive_state
 from ..errors import BusError, InputError
 from ..stream.bus_chunks import ChunkCapture, JobPoints
 from .decoder import Decoder, Samples
-from .derived import Derivation, ProgramPath
+from .derived import Derivation, FollowedPath, ProgramPath
 from .emergencies import Emergencies
+from .job_path import JobPath
 from .messages import job_message, path_message, rows_message
 from .source import Source, Taken
 
@@ -73,6 +74,8 @@ class Pump:
         self._layout = layout
         self._publish = publish
         self._path: ProgramPath | None = None
+        self._job_path = JobPath(layout.counts_per_unit[0])
+        self._streams = False
         self._ending = threading.Event()
         self._again = threading.Event()
         self._tally = Tally()
@@ -113,6 +116,8 @@ class Pump:
             except InputError as error:
                 note = str(error)
         self._path = path
+        if path is not None:
+            self._streams = False
         self._publish(path_message(path, note))
 
     def _fresh_derivation(self) -> Derivation:
@@ -166,7 +171,7 @@ class Pump:
         self._load.feed(taken.frames, newest_us / 1e6)
         self._check_setpoints(taken)
         samples = self._decoder.feed(taken.frames)
-        rows = self._derivation.feed(samples, self._path)
+        rows = self._derivation.feed(samples, self._followed())
         if rows.count:
             age_ms = None if taken.now_us is None else (taken.now_us - newest_us) / 1000
             self._publish(
@@ -187,9 +192,14 @@ class Pump:
         chunks = self._chunks.feed(taken.frames)
         for chunk in chunks:
             self._job.add(chunk)
+            self._job_path.add(chunk)
         if chunks:
-            self._path = None
+            self._path, self._streams = None, True
             self._publish(job_message(self._job.job, self._job.points_mm[:, : self._layout.drawn]))
+
+    def _followed(self) -> FollowedPath | None:
+        """The path of the program, or of the job, whichever came last."""
+        return self._job_path if self._streams else self._path
 
     def _check_setpoints(self, taken: Taken) -> None:
         """Once in half a thousand SYNCs the worst step by each rule, if it breaks its limit."""

@@ -21,7 +21,7 @@ from ..program.image import Program
 from ..spline import PHSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from .chunk import Chunk, parse
-from .geometry import points_at
+from .geometry import Curve, points_at
 
 REQUEST, RESPONSE = 0x600, 0x580
 _CHUNK = struct.pack("<HB", STREAM, 1)
@@ -87,14 +87,19 @@ class ChunkCapture:
         return self._ending and one[0] == _ENDED
 
 
-def _drawn(program: Program) -> tuple[Floats, Floats]:
-    """Arc lengths (n,) of a program and the points there, (n, 2) or (n, 3) in mm."""
-    ways = np.linspace(0.0, program.length_mm, _POINTS)
+def curve_of(program: Program) -> Curve:
+    """The path of a program in mm: in the plane, or in space."""
     origin: Floats = np.ldexp(program.point_q40.astype(np.float64), -40)
     a: Floats = np.ldexp(program.a_q44.astype(np.float64), -44)
     if len(a) == 2:
-        return ways, points_at(PHSpline(origin[0] + 1j * origin[1], a[0] + 1j * a[1], False), ways)
-    return ways, points_at(SpatialPHSpline(origin[:3].T, np.moveaxis(a, 0, 1), False), ways)
+        return PHSpline(origin[0] + 1j * origin[1], a[0] + 1j * a[1], False)
+    return SpatialPHSpline(origin[:3].T, np.moveaxis(a, 0, 1), False)
+
+
+def _drawn(program: Program) -> tuple[Floats, Floats]:
+    """Arc lengths (n,) of a program and the points there, (n, 2) or (n, 3) in mm."""
+    ways = np.linspace(0.0, program.length_mm, _POINTS)
+    return ways, points_at(curve_of(program), ways)
 
 
 class JobPoints:
