@@ -84,9 +84,11 @@ class DrawingOptions:
             if not 0.0 < feed < 1e6:
                 raise InputError(f"feed of {name}: {feed:g} mm/s is not a positive feed")
         if self.unit_mm is not None and not 1e-9 < self.unit_mm < 1e9:
-            raise InputError(f"unit of the drawing: {self.unit_mm:g} mm is not a positive length")
+            raise InputError(
+                f"unit of the drawing: {self.unit_mm:g} mm must be above 1e-9 mm, below 1e9 mm"
+            )
         if not 1e-9 < self.scale < 1e9:
-            raise InputError(f"scale of the drawing: {self.scale:g} is not a positive number")
+            raise InputError(f"scale of the drawing: {self.scale:g} must be above 1e-9, below 1e9")
         if (
             not 0.0 <= self.gap_mm < 1e6
             or not 0.0 <= self.lift_mm < 1e6

@@ -93,9 +93,11 @@ class PointOptions:
         """Check the ranges."""
         if self.feed_mm_s is not None and not 0.0 < self.feed_mm_s < MOST_MM_S:
             raise InputError(f"feed: {self.feed_mm_s:g} mm/s is not a positive feed")
-        if not 1e-9 < self.scale < 1e9 or not 1e-9 < self.unit_mm < 1e9:
+        if not 1e-9 < self.scale < 1e9:
+            raise InputError(f"scale of the points: {self.scale:g} must be above 1e-9, below 1e9")
+        if not 1e-9 < self.unit_mm < 1e9:
             raise InputError(
-                f"scale {self.scale:g} or unit of {self.unit_mm:g} mm is not a positive number"
+                f"unit of the points: {self.unit_mm:g} mm must be above 1e-9 mm, below 1e9 mm"
             )
         if not 0.0 <= self.noise_mm < 1e6:
             raise InputError(f"noise: {self.noise_mm:g} mm is not a number of mm, at least 0")
