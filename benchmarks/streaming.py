@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Streaming: how much faster than it runs a job is planned, how soon its first part is there, and memory by length.
+"""Streaming: how much faster than it runs a job is planned, how soon its first part is there, memory by length, and how
+much motion a ring of 48 KiB holds ahead.
 
     python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…]
 
@@ -19,7 +20,7 @@ import sys
 import tempfile
 import time
 from contextlib import ExitStack, suppress
-from math import sin
+from math import inf, sin
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
@@ -28,9 +29,9 @@ if TYPE_CHECKING:
     from hodograph.stream.plan import JobFiles
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path[:0] = [str(ROOT / "host_tools")]
+sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
 MILL = ROOT / "examples" / "machines" / "mill.toml"
-LINES, FIT_LINES = (300, 1200, 100_000), (2000, 20_000)
+LINES, FIT_LINES, RING_LINES = (300, 1200, 100_000), (2000, 20_000), 2500
 _ROW_LINES, _STEP_MM, _PITCH_MM = 400, 0.25, 0.5
 FOR_EVER_S, START_LINES = 1e6, 1200
 
@@ -158,6 +159,7 @@ def main() -> None:
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     parser.add_argument("--start", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--fit", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--no-ring", action="store_true", help="without the motion ahead in a ring")
     options = parser.parse_args()
     if options.one is not None and options.start:
         print(json.dumps(measure_start(options.one)))
@@ -186,9 +188,38 @@ def main() -> None:
         f"start of the motion after the command, {START_LINES} lines: {begun['start_processor_s']:.2f} s of processor "
         f"time and {begun['start_bus_s']:.2f} s of bus time"
     )
+    found = {"jobs": rows, "start": begun, "ring": {} if options.no_ring else ring_table()}
     if options.json is not None:
-        found = {"jobs": rows, "start": begun}
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+
+
+def ring_table() -> dict[str, Any]:
+    """Bytes of chunks by part, and motion ahead; prints them too."""
+    from ring import BUS_BYTES_S, PARTS, RING, ahead, jobs, parts, worst_hold_s
+
+    print(f"\n| job | chunks | {' | '.join(PARTS)} | ahead s: mean, least | at 17 kB/s | hold s |")
+    print("|" + " --- |" * (len(PARTS) + 5))
+    out: dict[str, Any] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        wave = Path(folder) / "wave.ngc"
+        write_job(wave, RING_LINES)
+        for job in jobs(wave):
+            own = parts(job)
+            rates = [ahead(job, RING, rate) for rate in (inf, BUS_BYTES_S)]
+            hold_s = worst_hold_s(job)
+            sizes = " | ".join(f"{own[part]:.0f}" for part in PARTS)
+            pairs = " | ".join(f"{mean:.2f}, {least:.2f}" for mean, least in rates)
+            print(f"| {job.name} | {len(job.chunks)} | {sizes} | {pairs} | {hold_s:.2f} |")
+            (mean_s, least_s), (bus_mean_s, bus_least_s) = rates
+            out[job.name] = {
+                "bytes": own,
+                "ahead_mean_s": mean_s,
+                "ahead_least_s": least_s,
+                "ahead_mean_on_bus_s": bus_mean_s,
+                "ahead_least_on_bus_s": bus_least_s,
+                "worst_hold_s": hold_s,
+            }
+    return out
 
 
 if __name__ == "__main__":

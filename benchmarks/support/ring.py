@@ -20,10 +20,15 @@ from hodograph.spline.spatial import SpatialPHSpline, spatial_through_points
 from hodograph.stream.chunk import Chunk
 from hodograph.stream.chunks import SectionChunks
 from hodograph.stream.geometry import Block
+from hodograph.stream.reading import StreamReader
 from hodograph.stream.windows import PIECE_BYTES
+from hodograph.toolpath.files import ReadOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MACHINES = EXAMPLES / "machines"
+RING, BUS_BYTES_S = 48 * 1024, 17e3
+"""Of a small controller; what the bus carries beside the setpoints of two axes at 1 kHz."""
+
 _ALPHA = [(0, 0), (12, 18), (24, 27), (36, 9), (24, -9), (12, 0), (0, 18)]
 _HEART = [(-20, -50), (0, 5), (0, -5), (-20, 50), (40, 50), (75, -5), (75, 5), (40, -50)]
 _PAPER_ACCELERATION_MM_S2, _PAPER_JERK_MM_S3 = 2000.0, 50_000.0
@@ -48,6 +53,21 @@ class Streamed:
     axes: int
     chunks: list[Chunk]
     new_s: list[float]
+
+
+def jobs(wave: Path) -> Iterator[Streamed]:
+    """All jobs, in chunks of a third of RING; `wave`: a file of the surface of short lines."""
+    yield from example_jobs(RING // 3)
+    toolpaths = EXAMPLES / "toolpaths"
+    mill = load_machine(MACHINES / "mill.toml")
+    for name, file in (
+        ("surface of short lines", wave),
+        ("engraving", toolpaths / "engraving.ngc"),
+        ("surface", toolpaths / "surface.ngc"),
+    ):
+        sections = StreamReader(file, mill, 0.01, ReadOptions()).sections()
+        made = (SectionChunks(mill, "job", one.blocks, 1, RING // 3) for one in sections)
+        yield max((gathered(name, one) for one in made), key=lambda job: sum(job.new_s))
 
 
 def example_jobs(most_bytes: int) -> Iterator[Streamed]:

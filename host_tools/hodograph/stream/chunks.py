@@ -29,17 +29,21 @@ Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-CHUNK_S = 2.0
+CHUNK_S = 1.0
 """New motion of a chunk."""
 
 CHUNK_BYTES = 24 * 1024 - 64
 """The largest chunk: half of the ring of a small controller, which holds two."""
 
-_NEW_SHARE = 0.6
+_NEW_SHARE = 0.5
 """Of these bytes, for what is new: the rest is for the repeated part and the tail."""
 
 LATENESS_S, SHARED_S = 0.02, 0.1
 """A takeover may be so late without effect on any change of the override, and on a motion at 100 %."""
+
+FEWEST_SHARED_PIECES = 4
+"""Shared where LEAST_SHARED_PIECES take more bytes than a chunk may have: pieces that are long, with many segments. A
+change of the override that looks further then delays the takeover; a motion at 100 % is the same."""
 
 SEARCH_S, GAP_S = 0.02, 0.06
 """Stops may begin about so often, and all pieces are searched where they may not for so long."""
@@ -122,13 +126,15 @@ class _Kept:
         old = [] if self.pieces is None else [self.pieces]
         return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
 
-    def repeated(self) -> tuple[_Kept, int, int]:
-        """The pieces that the next chunk repeats, how many before them it does not, and their time in 2^-32 s."""
+    def repeated(self, least: int) -> tuple[_Kept, int, int]:
+        """The pieces that the next chunk repeats, `least` of them and what SHARED_S asks for; how many before them it
+        does not, and their time in 2^-32 s.
+        """
         if self.pieces is None:
             return self, 0, 0
         count = len(self.codes)
         times = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(self.pieces.duration_q32_s)))
-        looked = max(count - LEAST_SHARED_PIECES, 0)
+        looked = max(count - least, 0)
         late = min(times[looked] - round(LATENESS_S * 2**32), times[-1] - round(SHARED_S * 2**32))
         shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
         kept = _Kept(taken(self.pieces, slice(shift, None)), self.codes[shift:])
@@ -218,8 +224,11 @@ class SectionChunks:
         """
         searched, before, tails = self._searched_in(window), self._kept, _Tails(self._feed, window)
         program, fault = None, None
-        kept, piece_shift, time_shift = before.repeated()
-        for used in range(len(joints), 0, -1):
+        for used, least in [
+            *((count, LEAST_SHARED_PIECES) for count in range(len(joints), 0, -1)),
+            (1, FEWEST_SHARED_PIECES),
+        ]:
+            kept, piece_shift, time_shift = before.repeated(least)
             joint, new = joints[used - 1], slice(first, joints[used - 1])
             pieces = taken(window.stretch.pieces, new)
             self._kept = kept.with_new(pieces, searched.codes[new])

@@ -17,6 +17,8 @@ import pytest
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
 from hodograph.events import SwitchedOutputs
+from hodograph.feed.optimal.plan_limits import PlanLimits
+from hodograph.feed.optimal.window import Solution
 from hodograph.job import load_job
 from hodograph.native import NativeProgram
 from hodograph.native.program import NativeLimits
@@ -26,10 +28,11 @@ from hodograph.program import encode
 from hodograph.program.check import check, check_image
 from hodograph.spline import from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
-from hodograph.stream.chunks import SectionChunks
+from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
 from hodograph.stream.geometry import blocks_from, with_joints
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, simulate_chunks
+from hodograph.stream.windows import SectionFeed
 from hodograph.toolpath.files import ReadOptions
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -68,7 +71,12 @@ def _limits(machine: Machine) -> NativeLimits:
     return NativeLimits(**asdict(program_limits(machine)), chunk=1)
 
 
-def _verify(chunks: list[Chunk], machine: Machine, most: int = MOST) -> None:
+def _verify(
+    chunks: list[Chunk],
+    machine: Machine,
+    most: int = MOST,
+    shared: int = LEAST_SHARED_PIECES,
+) -> None:
     """Both checks of every chunk, the shared parts, and one program of all, whose setpoints are those of the stream."""
     before: Chunk | None = None
     for chunk in chunks:
@@ -76,7 +84,7 @@ def _verify(chunks: list[Chunk], machine: Machine, most: int = MOST) -> None:
         assert check_image(chunk.image, program_limits(machine), chunk=True) is None
         assert shared_fault(chunk, before) is None
         assert chunk.size <= most
-        assert before is None or chunk.header.shared_pieces >= LEAST_SHARED_PIECES
+        assert before is None or chunk.header.shared_pieces >= shared
         before = chunk
     assert before is not None
     assert before.header.last
@@ -102,6 +110,40 @@ def test_random_paths(
     file.write_text(_walk(seed, count, step_mm, turn_rad))
     for chunks in _sections(file, machine):
         _verify(chunks, machine)
+
+
+@pytest.mark.long
+def test_rest_of_a_window_is_divided(
+    tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is found in motion: each window is followed by its own rest, of more bytes than a chunk takes."""
+    solved = SectionFeed._solved
+
+    def none_in_motion(
+        feed: SectionFeed, limits: PlanLimits, high: float, stop_s: float
+    ) -> Solution | None:
+        return solved(feed, limits, high, stop_s) if feed._moving is None else None
+
+    monkeypatch.setattr(SectionFeed, "_solved", none_in_motion)
+    file, most = tmp_path / "wave.ngc", 12 * 1024
+    file.write_text(_wave(300))
+    (chunks,) = _sections(file, machine, most)
+    _verify(chunks, machine, most, FEWEST_SHARED_PIECES)
+
+
+def _wave(count: int) -> str:
+    """Long pieces over many segments: the last 16 before a joint take more than half of a chunk."""
+    lines = [f"G1 X{0.5 * k:.1f} Y{3.0 * np.sin(0.1 * k):.4f}" for k in range(1, count)]
+    return "\n".join(["G21 G90 G64 P0.01", "F3600", *lines, "M2", ""])
+
+
+def test_fewer_pieces_are_shared_where_there_is_no_room(tmp_path: Path, machine: Machine) -> None:
+    """Rather than that the job ends with an error."""
+    file, most = tmp_path / "wave.ngc", 10 * 1024
+    file.write_text(_wave(110))
+    (chunks,) = _sections(file, machine, most)
+    _verify(chunks, machine, most, FEWEST_SHARED_PIECES)
+    assert min(chunk.header.shared_pieces for chunk in chunks[1:]) < LEAST_SHARED_PIECES
 
 
 @pytest.mark.long
