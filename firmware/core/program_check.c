@@ -53,8 +53,9 @@ static int check_header(const struct program *p, const struct program_limits *li
     if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }
+    const uint32_t axes = limits->axis_count;
     if (first_axis_end(h) > PROGRAM_AXES ||
-        (limits->axis_count != 0 && limits->axis_count != h->axis_count)) {
+        (axes != 0 && (axes != h->axis_count || first_axis(h) != 0))) {
         return PROGRAM_ERR_AXES;
     }
     if (h->length_q40_mm <= 0 || h->length_q40_mm >= (int64_t)1 << 62) {

@@ -157,7 +157,7 @@ def program_limits(machine: Machine) -> ProgramLimits:
         axis_velocity_um_s=tuple(round(axis.velocity_mm_s * 1000) for axis in axes),
         axis_acceleration_um_s2=tuple(round(axis.acceleration_mm_s2 * 1000) for axis in axes),
         axis_jerk_mm_s3=tuple(round(axis.jerk_mm_s3) for axis in axes),
-        axis_count=len(axes),
+        axis_count=0 if machine.first_axis else len(axes),
     )
 
 

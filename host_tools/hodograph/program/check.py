@@ -559,8 +559,9 @@ def _header_fault(
         return ProgramError.PERIOD_USED
     if not reserved.flags or (program.moving and not chunk) or (program.first_axis and chunk):
         return ProgramError.FLAGS
+    served = 0 if limits is None else limits.axis_count
     if program.first_axis + program.axis_count > len(AXES) or (
-        limits is not None and limits.axis_count not in (0, program.axis_count)
+        served and (program.first_axis or served != program.axis_count)
     ):
         return ProgramError.AXES
     if not 0 < program.length_q40 < LONGEST_Q40_MM:

@@ -173,6 +173,20 @@ def test_both_checks_refuse_the_same(program, code) -> None:
         assert own[0] == code
 
 
+@pytest.mark.parametrize(
+    ("first_axis", "served", "code"),
+    [(3, 0, 0), (0, 3, 0), (4, 0, ProgramError.AXES), (3, 3, ProgramError.AXES)],
+)
+def test_a_first_axis_is_for_a_machine_that_has_it_and_looks_at_it(
+    first_axis: int, served: int, code: int
+) -> None:
+    image = encode(replace(compiled(0), first_axis=first_axis))
+    assert decode(image).first_axis == NativeProgram(image).first_axis == first_axis
+    fault = check_image(image, replace(LIMITS, axis_count=served))
+    native = NativeProgram(image).check(replace(NATIVE, axis_count=served))
+    assert [0 if one is None else one.code for one in (fault, native)] == [code, code]
+
+
 def test_axes_have_to_be_those_of_the_machine() -> None:
     image = encode(compiled(0))
     planar = replace(LIMITS, axis_count=2)
