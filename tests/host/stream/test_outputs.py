@@ -122,7 +122,9 @@ def _shared_events(first: Chunk, second: Chunk) -> int:
 def test_a_chunk_with_other_events_is_refused(waves: list[list[Chunk]], machine: Machine) -> None:
     """By the controller and by the host: one event less, one more, another place or value in the shared part."""
     starts = [(wave[0], wave[1]) for wave in waves]
-    first, second = next(two for two in starts if 2 < _shared_events(*two) < len(two[1].program.events))
+    first, second = next(
+        two for two in starts if 2 < _shared_events(*two) < len(two[1].program.events)
+    )
     program = decode(second.image)
     moved, valued = program.events.copy(), program.events.copy()
     moved["place"][1] -= 1

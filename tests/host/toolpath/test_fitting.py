@@ -233,9 +233,7 @@ is missed there, by half a percent.
 
 @pytest.mark.parametrize("feed_mm_s", [100.0, long(200.0)])
 @pytest.mark.parametrize("name", NOISY)
-def test_noise_of_a_micrometre_hardly_changes_the_time(
-    name: str, feed_mm_s: float
-) -> None:
+def test_noise_of_a_micrometre_hardly_changes_the_time(name: str, feed_mm_s: float) -> None:
     points, share = NOISY[name]
     plain = least_time_s(fitted(points), feed_mm_s)
     moving = np.ptp(points, axis=0) > 0.0
