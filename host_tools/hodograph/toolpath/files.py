@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 class ReadOptions:
     """How a file is read that does not say all itself. None and empty: not given.
 
-    feed_mm_s  feed: drawings need it, points where they have no column of it; G-code has its own
+    feed_mm_s  feed: drawings need it, points where they have no column of it; of G-code it replaces F
     layers     drawings: only these layers, in this order
     ids        drawings: only elements with these identities (SVG: id, DXF: handle)
     gap_mm     drawings: ends of contours that are this near are joined
@@ -123,9 +123,9 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
             place, encoding="utf-8", errors="surrogateescape", closefd=not from_input
         ) as lines:
             if is_gcode(file):
-                from .gcode import read_gcode
+                from .gcode import Options, read_gcode
 
-                yield from read_gcode(lines, str(file))
+                yield from read_gcode(lines, str(file), Options(feed_mm_s=options.feed_mm_s))
             else:
                 from .points import read_points
 

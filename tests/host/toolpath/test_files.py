@@ -29,6 +29,7 @@ TEXTS = {
     "d.svg": SVG,
     "d.dxf": DXF,
     "G.NGC": "F600\nG1 X8 Y6\nM2\n",
+    "no_f.nc": "G94\nG1 X8 Y6\nM2\n",
 }
 
 
@@ -62,6 +63,7 @@ def imported(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, objec
         (("d.dxf", "--feed", "20", "--unit", "mm", "--layer", "cut"), 10.0),
         (("d.dxf", "--feed", "20", "--unit", "in"), 254.0),
         (("G.NGC",), 10.0),
+        (("no_f.nc", "--feed", "20"), 10.0),
     ],
 )
 def test_every_kind_is_read_with_its_options(

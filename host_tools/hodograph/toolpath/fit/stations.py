@@ -124,7 +124,7 @@ def _between(
     """The coarse vertices, and those of the fine ones between which smoothing moves the path.
 
     There are none on long legs (n,); elsewhere they are about `nearest_mm` apart at least. More of them would only
-    follow the noise, and make the third differences of smoothing inexact.
+    follow the noise.
     """
     leg = np.clip(np.searchsorted(coarse, fine, side="right") - 1, 0, long.size - 1)
     begin, end = reference.place_mm[coarse[leg]], reference.place_mm[coarse[leg + 1]]

@@ -348,8 +348,12 @@ class Interpreter:
             return Feed(FeedMode.INVERSE_TIME, duration_s=60.0 / rate)
         if modes.feed is not None:
             return modes.feed
+        given = self.options.feed_mm_s
+        if given is not None:
+            modes.feed = Feed(FeedMode.PER_MINUTE, feed_mm_s=given, feed_deg_s=given)
+            return modes.feed
         if modes.feed_word == 0.0:
-            raise block.motion_error("the move has no feed: write F before it, or in its block")
+            raise block.motion_error("the move has no feed: write F before it or in its block, or give --feed")
         raise block.motion_error("feed per revolution needs the speed of the spindle: write S")
 
     def _execute_motion(self, block: Block, motion: int, commands: list[Command]) -> None:

@@ -23,6 +23,7 @@ class Options:
     g28, g30        reference points, as machine positions
     tools           offset of each tool by its number. None: every tool has offset 0, so that positions are those of
                     the tool's tip. With a table, a tool that is not in it is refused.
+    feed_mm_s       feed of moves that have none of their own; None: such moves are refused
     block_delete    whether lines that begin with "/" are left out
     most_jumps      most subroutine calls and backward jumps of loops; a program that makes more is refused, since its
                     loops may be without end
@@ -34,6 +35,7 @@ class Options:
     g28: Position = ORIGIN
     g30: Position = ORIGIN
     tools: Mapping[int, Position] | None = None
+    feed_mm_s: float | None = None
     block_delete: bool = False
     most_jumps: int = MOST_JUMPS
     fast_path: bool = True
