@@ -12,8 +12,9 @@ void path_counts_init(struct path_counts *scale, const struct program *program,
 {
     scale->first_axis = first_axis(&program->header);
     scale->axis_count = program->header.axis_count;
-    for (uint32_t i = 0; i < scale->axis_count; ++i) {
-        scale->per_unit[i] = config_counts_per_unit(config, scale->first_axis + i);
+    for (uint32_t i = 0; i < PROGRAM_AXES; ++i) {
+        const uint32_t axis = scale->first_axis + i;
+        scale->per_unit[i] = axis < AXES_MAX ? config_counts_per_unit(config, axis) : 0u;
     }
 }
 
