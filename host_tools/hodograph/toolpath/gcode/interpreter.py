@@ -353,7 +353,9 @@ class Interpreter:
             modes.feed = Feed(FeedMode.PER_MINUTE, feed_mm_s=given, feed_deg_s=given)
             return modes.feed
         if modes.feed_word == 0.0:
-            raise block.motion_error("the move has no feed: write F before it or in its block, or give --feed")
+            raise block.motion_error(
+                "the move has no feed: write F before it or in its block, or give --feed"
+            )
         raise block.motion_error("feed per revolution needs the speed of the spindle: write S")
 
     def _execute_motion(self, block: Block, motion: int, commands: list[Command]) -> None:
