@@ -23,7 +23,7 @@ from ..feed.request import OPTIMAL, PROFILES
 from ..job import JobSection, SectionPipeline
 from ..names import AXES
 from ..pipeline import Pipeline
-from ..spline import PHSpline
+from ..spline import PHSpline, coordinates
 from ..spline.frames import frames
 from ..spline.spatial import SpatialPHSpline
 from ..toolpath.fit.fitting import FittedPath
@@ -188,7 +188,11 @@ class Path:
     def node_points_mm(self) -> Real:
         """Joints of the N segments, (N + 1, A), from start to end."""
         curve = self._curve
-        return curve.axes_nodes if isinstance(curve, SpatialPHSpline) else _rows(curve.nodal_points)
+        return (
+            curve.axes_nodes
+            if isinstance(curve, SpatialPHSpline)
+            else coordinates(curve.nodal_points)
+        )
 
     @property
     def node_arc_lengths_mm(self) -> Real:
@@ -206,7 +210,7 @@ class Path:
 
     def tangent(self, arc_length_mm: ArrayLike) -> Real:
         """Unit tangents (…, 2), in space (…, 3)."""
-        return _rows(self._curve.tangent(arc_length_mm))
+        return coordinates(self._curve.tangent(arc_length_mm))
 
     def curvature_per_mm(self, arc_length_mm: ArrayLike) -> Real:
         """Curvature (…); in the plane positive where the path turns left."""
@@ -413,16 +417,11 @@ def _plane(direction: Real | None) -> complex | None:
     return None if direction is None else complex(direction[0], direction[1])
 
 
-def _rows(values: NDArray[np.complex128] | Real) -> Real:
-    """Points of a spline as rows: x + iy becomes [x, y]."""
-    if np.iscomplexobj(values):
-        return np.stack((values.real, values.imag), axis=-1)
-    return np.asarray(values, dtype=np.float64)
-
-
 def _places(curve: PHSpline | SpatialPHSpline, s: Real) -> Real:
     """All axes (…, A) at arc lengths."""
-    return curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else _rows(curve.point(s))
+    return (
+        curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else coordinates(curve.point(s))
+    )
 
 
 def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan:

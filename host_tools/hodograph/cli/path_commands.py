@@ -21,7 +21,7 @@ from ..program.check import check, coefficients_in_range
 from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate_on, simulate_stop, write_trace
-from ..spline import PHSpline
+from ..spline import PHSpline, coordinates
 from ..spline.spatial import SpatialPHSpline
 from .output import (
     duration_text,
@@ -47,9 +47,9 @@ def spline(options: Namespace) -> None:
     result: dict[str, object] = {
         "closed": curve.closed,
         "segments": curve.segment_count,
-        "nodal_points": _lists(
+        "nodal_points": coordinates(
             curve.axes_nodes if isinstance(curve, SpatialPHSpline) else curve.nodal_points
-        ),
+        ).tolist(),
         "length_mm": curve.length_mm,
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
@@ -62,7 +62,7 @@ def spline(options: Namespace) -> None:
     if options.at is not None:
         s = np.atleast_1d(_within("--at", options.at, curve.length_mm, "mm"))
         result["points"] = _places(curve, s)
-        result["tangents"] = _lists(curve.tangent(s))
+        result["tangents"] = coordinates(curve.tangent(s)).tolist()
         result["curvatures"] = curve.curvature(s).tolist()
         if isinstance(curve, SpatialPHSpline):
             result["torsions"] = curve.torsion(s).tolist()
@@ -95,16 +95,8 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> 
 
 def _places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> list[list[float]]:
     """Points at arc lengths, with the extra axes after x, y, z."""
-    if isinstance(curve, SpatialPHSpline):
-        return _lists(curve.axes_point(s))
-    return _lists(curve.point(s))
-
-
-def _lists(values: NDArray[np.complex128] | NDArray[np.float64]) -> list[list[float]]:
-    """Points (n,) as [[x, y], …], or points in space (n, 3) as [[x, y, z], …]."""
-    if np.iscomplexobj(values):
-        values = np.stack((values.real, values.imag), axis=-1)
-    found: list[list[float]] = values.tolist()
+    points = curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else curve.point(s)
+    found: list[list[float]] = coordinates(points).tolist()
     return found
 
 

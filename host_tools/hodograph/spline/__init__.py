@@ -2,7 +2,7 @@
 """C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths."""
 
 from .build import SplineResult, from_control_polygon, line, through_points
-from .curve import PHSpline
+from .curve import PHSpline, coordinates
 from .ends import END_NAMES
 from .knots import KNOT_NAMES
 
@@ -11,6 +11,7 @@ __all__ = [
     "KNOT_NAMES",
     "PHSpline",
     "SplineResult",
+    "coordinates",
     "from_control_polygon",
     "line",
     "through_points",

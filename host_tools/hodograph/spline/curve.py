@@ -143,3 +143,10 @@ class PHSpline(ArcLengthChain):
         """
         origin, w, _ = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
         return PHSpline(origin, w, self.closed)
+
+
+def coordinates(points: Complex | Real) -> Real:
+    """Points as rows of coordinates: x + iy becomes [x, y]; rows of points in space stay as they are."""
+    if np.iscomplexobj(points):
+        return np.stack((points.real, points.imag), axis=-1)
+    return np.asarray(points, dtype=np.float64)

@@ -20,7 +20,7 @@ from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_e
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
-from ..spline import PHSpline
+from ..spline import PHSpline, coordinates
 from ..spline.spatial import SpatialPHSpline
 from ..spline.splitting import cut_segments, part_of
 
@@ -169,10 +169,7 @@ def _behind_at(w: Any, x: float) -> Any:
 
 def points_at(curve: Curve, s_mm: Real) -> Real:
     """Points (n, 2) or (n, 3) at arc lengths (n,)."""
-    point = curve.point(s_mm)
-    if isinstance(curve, PHSpline):
-        return np.stack((point.real, point.imag), axis=-1)
-    return np.asarray(point, dtype=np.float64)
+    return coordinates(curve.point(s_mm))
 
 
 class StreamPath:
