@@ -76,14 +76,19 @@ class FaultBench:
         more = ["--faults", str(self._rules)] if faulty else []
         axes = self.machine.axes
         groups = [(axis,) for axis in axes] if self._apart else [axes]
+        outputs = [
+            self.machine.outputs,
+            *[None] * len(axes),
+        ]  # the I/O module is with the first drives
         self._gone += self.drives
         self.drives = [
             Process(
                 f"drive-{group[0].node}",
-                drive_command(replace(self.machine, axes=group), self.drives_bus) + more,
+                drive_command(replace(self.machine, axes=group, outputs=module), self.drives_bus)
+                + more,
                 self.clock,
             )
-            for group in groups
+            for group, module in zip(groups, outputs, strict=False)
         ]
 
     def injections(self) -> list[dict[str, Any]]:
