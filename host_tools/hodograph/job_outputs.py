@@ -4,7 +4,8 @@ its sections' programs.
 
 A command on the way acts where the curve has its place. One at rest acts with the first setpoint of the section that
 follows it. One at rest that is followed by a dwell, a tool change or a program stop acts with the last setpoint of the
-section before it, so that it is done when the dwell begins. Each program begins with all outputs off, so each section
+section before it, so that it is done when the dwell begins. The end of the program switches spindle and coolant off
+with the last setpoint, as M5 and M9 do; other outputs stay. Each program begins with all outputs off, so each section
 first repeats what is on.
 """
 
@@ -23,6 +24,7 @@ from .toolpath.moves import (
     Coolant,
     DigitalOutput,
     Dwell,
+    ProgramEnd,
     ProgramStop,
     Rotation,
     Spindle,
@@ -147,6 +149,8 @@ class EventMaker:
             channel = self._numbered(command.output, where, digital=False)
             return [(channel, channel.valued(place_q40, command.value, where))]
         codes = self.outputs.codes
+        if isinstance(command, ProgramEnd):
+            return self._ended(place_q40)
         if isinstance(command, Coolant):
             switches = ((codes.mist, command.mist), (codes.flood, command.flood))
         elif isinstance(command, Spindle):
@@ -160,6 +164,20 @@ class EventMaker:
             speed = command.speed_rev_min if turns else 0.0
             found.append((codes.speed, codes.speed.valued(place_q40, speed, where)))
         return found
+
+    def _ended(self, place_q40: int) -> list[tuple[Channel, Event]]:
+        """What M5 and M9 would do, of outputs that are on."""
+        codes = self.outputs.codes
+        switches = (codes.spindle, codes.spindle_reverse, codes.mist, codes.flood, codes.speed)
+        on = [
+            one
+            for one in switches
+            if one is not None and one.name in self.last and self.last[one.name].value
+        ]
+        return [
+            (one, one.switched(place_q40, False) if one.digital else one.valued(place_q40, 0.0, ""))
+            for one in on
+        ]
 
     def _numbered(self, number: int, where: str, *, digital: bool) -> Channel:
         for one in self.outputs.channels:

@@ -84,6 +84,11 @@ TURNING: Document = {
     },
     "feedforward": {"velocity": 1, "torque_permille_s2_kdeg": 12, "torque_permille_s_kdeg": 3},
 }
+SWITCHED = [
+    {"name": "valve", "at_mm": 1.5, "on": True},
+    {"name": "power", "at_point": 1, "value": 50},
+    {"name": "power", "at_fraction": 0.5, "per_mm_s": 0.1},
+]
 ZONE = {"from_mm": 1, "to_mm": 2, "feed_mm_s": 10}
 MACHINE: Document = {
     "path": ["x", "y"],
@@ -143,7 +148,12 @@ COMPLETE: dict[str, list[Document]] = {
                     "dwell_ms": 100,
                     "stop": "optional",
                 },
-                {"closed": False, "through": [[20, 0], [30, 5], [40, 0]], "ends": "natural"},
+                {
+                    "closed": False,
+                    "through": [[20, 0], [30, 5], [40, 0]],
+                    "ends": "natural",
+                    "output": SWITCHED,
+                },
             ],
         },
         {
@@ -178,11 +188,7 @@ COMPLETE: dict[str, list[Document]] = {
                 "cap": [ZONE],
             },
             "machine": {"file": str(EXAMPLES / "machines/paper_alpha.toml")},
-            "output": [
-                {"name": "valve", "at_mm": 1.5, "on": True},
-                {"name": "power", "at_point": 1, "value": 50},
-                {"name": "power", "at_fraction": 0.5, "per_mm_s": 0.1},
-            ],
+            "output": SWITCHED,
         },
         {
             "path": {"closed": True, "control_points": [[0, 0], [9, 0], [9, 9], [0, 9]]},

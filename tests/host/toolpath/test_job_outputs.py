@@ -43,10 +43,11 @@ def test_synchronised_outputs_stand_at_their_place_on_the_smoothed_path(
         "M62 P0\nG1 X20\nM63 P0\nM67 E0 Q50\nG1 X20 Y20\nM62 P1\nG1 X0",
     )
     (section,) = found.sections
-    on, off, power, needle = section.pipeline.events.tolist()
+    on, off, power, needle, power_off = section.pipeline.events.tolist()
     assert on == (0, 1, 0, 1, 1)
     assert (*off[1:], *power[1:]) == (1, 0, 1, 0, 2, 0, 0, 16384)
     assert off[0] == power[0]
+    assert power_off[1:] == (2, 0, 0, 0)  # it is the speed of the spindle too: M30 switches it off
     for event, corner in ((off, (20.0, 0.0)), (needle, (20.0, 20.0))):
         at = section.pipeline.curve.point(np.array([event[0] / MM]))[0]
         assert abs(at - complex(*corner)) <= 0.02 + 1e-9
