@@ -81,8 +81,9 @@ static void in_level(const struct program_override *own, uint32_t level,
         real_add(real_add(real_mul(f3, at_one[JERK]), mixed), real_mul(second, at_one[VELOCITY]));
 }
 
-/* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration and jerk f v,
- * f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out. docs/theory/numerics.md section 7. */
+/* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
+ * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out.
+ * docs/theory/numerics.md section 7. */
 static void at_all_overrides(const struct way *way, const struct real at_one[QUANTITIES],
                              struct real out[QUANTITIES])
 {

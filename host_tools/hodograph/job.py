@@ -386,13 +386,13 @@ class SectionMaker:
 
     def made(self, section: Section) -> Iterator[JobSection]:
         """The section, or its parts where no curve was found within the tolerance."""
-        if section.stands_at is not None:
-            yield from self._parts(self._on_turning_axes(section))
-            return
         if self.feed_mm_s is not None:
             reference = section.reference
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
             section = replace(section, reference=replace(reference, feed_mm_s=feed))
+        if section.stands_at is not None:
+            yield from self._parts(self._on_turning_axes(section))
+            return
         self._check_plane(section)
         yield from self._parts(section)
 

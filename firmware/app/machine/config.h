@@ -137,8 +137,8 @@ static inline uint32_t config_tolerance_counts(const struct config *config, uint
 bool config_same_zero(const struct config *first, const struct config *second, uint8_t axis);
 
 /* The limits in the form that program_check takes, for a program whose axes begin at this one of the machine
- * (core/first_axis.h); travel is rounded inwards. Axes beyond the last one have no
- * travel. It is no chunk; attend and self are left as they are. Main loop. */
+ * (core/first_axis.h); travel is rounded inwards. Axes beyond the last one have no travel. It is no chunk; attend and
+ * self are left as they are. Main loop. */
 void config_limits(const struct config *config, uint32_t first_axis, struct program_limits *limits);
 
 #endif

@@ -59,8 +59,8 @@ static inline bool motion_wants_records(const struct motion *motion)
     return feed_override_wants_records(&motion->feed, &motion->interp) != 0;
 }
 
-/* The next setpoint: targets of the axes that the program moves, by axis of the machine. 0, or a negative INTERPOLATOR_ERR_... with targets unchanged.
- * Timer. */
+/* The next setpoint: targets of the axes that the program moves, by axis of the machine. 0, or a negative
+ * INTERPOLATOR_ERR_... with targets unchanged. Timer. */
 int motion_step(struct motion *motion, int32_t target_counts[AXES_MAX]);
 
 /* How many axes the motion moves. Pure. */

@@ -104,10 +104,18 @@ def _machine(options: Namespace) -> Machine:
 
 def _job(options: Namespace) -> JobFiles:
     tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
+    for file in options.files:
+        _require_regular(file)
     machine = _machine(options)
     job = JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
     _require_outputs(job)
     return job
+
+
+def _require_regular(file: Path) -> None:
+    """Raises InputError: the file is a pipe or the like, which cannot be read twice."""
+    if str(file) != STANDARD_INPUT and file.exists() and not file.is_file():
+        raise InputError(f"{file}: is no regular file: stream it as -, from standard input")
 
 
 def _require_outputs(job: JobFiles) -> None:

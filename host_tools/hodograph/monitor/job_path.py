@@ -41,14 +41,16 @@ class JobPath:
     def __init__(self, counts_per_mm: int) -> None:
         self._counts_per_mm = counts_per_mm
         self._parts: deque[_Part] = deque()
+        self._job: int | None = None
         self._samples: tuple[Floats, Floats] | None = None
         self._last_mm: float | None = None
         self._last_point: Floats | None = None
 
     def add(self, chunk: Chunk) -> None:
-        """The next chunk of the job; the first one begins anew."""
+        """The next chunk of the job; one of another job begins anew."""
         program = chunk.program
-        if chunk.header.first:
+        if chunk.header.first or chunk.header.job != self._job:
+            self._job = chunk.header.job
             self._parts.clear()
             self._last_mm = self._last_point = None
         begin_mm = chunk.header.job_start_q40 * 2.0**-40

@@ -33,7 +33,7 @@ CHUNK_S = 1.0
 """New motion of a chunk."""
 
 CHUNK_BYTES = 24 * 1024 - 64
-"""The largest chunk: half of the ring of a small controller, which holds two."""
+"""The largest chunk, where a third of the ring is more."""
 
 _NEW_SHARE = 0.5
 """Of these bytes, for what is new: the rest is for the repeated part and the tail."""
@@ -166,8 +166,11 @@ class _Tails:
         return (tail for tail in own if not any(tail is one for one in self._refused))
 
     def refuse(self, tail: Stretch) -> None:
-        """The controller would refuse the motion of a tail: it is not given again."""
-        self._refused.append(tail)
+        """The controller would refuse the motion of a tail: it is not given again. The rest of the window is: behind it
+        there is no other one.
+        """
+        if tail.end_q40 != self.window.stretch.end_q40:
+            self._refused.append(tail)
 
 
 class SectionChunks:

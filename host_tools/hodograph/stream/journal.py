@@ -93,7 +93,7 @@ def journal_lock(file: Path) -> Iterator[None]:
         if not lock_descriptor(descriptor, blocking=False):
             raise InputError(
                 f"{file}: another hodograph stream writes this journal: wait for its end, or give this job "
-                "a journal of its own (--journal FILE)"
+                "a journal of its own (hodograph stream --journal FILE)"
             )
         yield
     finally:

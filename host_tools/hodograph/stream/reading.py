@@ -72,7 +72,8 @@ class _Windows(Divider):
     def _move(self, move: Move) -> None:
         if move.end[3:] != ORIGIN[3:]:
             raise InputError(
-                f"{self.file}:{move.line}: the move turns A, B or C: stream takes x, y and z only: use run"
+                f"{self.file}:{move.line}: the move turns A, B or C, and stream takes x, y and z only: use run, "
+                "with exact stops (G61.1) where a section does not fit the controller"
             )
         super()._move(move)
         while self.builder.count > self.window + self.searched + _SEARCHED:

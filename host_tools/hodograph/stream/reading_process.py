@@ -2,12 +2,14 @@
 """Reads and fits a toolpath in a process of its own, so that the feed is planned on another core meanwhile.
 
 What comes out is what StreamReader gives, in the same order and with the same bits. The process is a copy of this one
-(fork): it begins at once, and holds nothing of its own before it reads. It ends with its reader: when the pipe between
-the two is closed, for whatever reason, its next write fails. It is one part of the path ahead at most.
+(fork): it begins at once, and holds nothing of its own before it reads. It ends with its reader: the system kills it
+when the thread that began it ends, and its next write fails when the pipe between the two is closed. It is one part of
+the path ahead at most.
 """
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import multiprocessing.context
 import os
@@ -30,6 +32,8 @@ from .geometry import Block
 from .reading import StreamReader, StreamSection
 
 _Point = NDArray[np.float64]
+_PR_SET_PDEATHSIG = 1
+"""Of prctl(2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +112,7 @@ class ParallelReader:
     def _item(self, source: Connection) -> _Item:
         try:
             item, notes = pickle.loads(source.recv_bytes())
-        except EOFError:
+        except (EOFError, OSError):  # also in the middle of a message
             raise HodographError(
                 f"{self._reader.file}: the process that reads it has ended: start the job again"
             ) from None
@@ -144,18 +148,36 @@ def _started(
 
 def _read(reader: StreamReader, source: Connection, sink: Connection) -> NoReturn:
     """Sends all items of a reader."""
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    _end_with_parent()
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if callable(signal.getsignal(number)):
+            signal.signal(number, signal.SIG_DFL)
     source.close()
     known = len(reader.notes)
-    with suppress(OSError):  # nobody reads any more
+
+    def send(item: _Item) -> None:
+        nonlocal known
+        message = pickle.dumps((item, reader.notes[known:]), pickle.HIGHEST_PROTOCOL)
+        known = len(reader.notes)
         try:
-            for item in _items(reader):
-                sink.send_bytes(pickle.dumps((item, reader.notes[known:]), pickle.HIGHEST_PROTOCOL))
-                known = len(reader.notes)
-        except HodographError as error:
-            failure = _Failure(type(error), str(error), vars(error))
-            sink.send_bytes(pickle.dumps((failure, reader.notes[known:])))
+            sink.send_bytes(message)
+        except OSError:  # nobody reads any more
+            os._exit(0)
+
+    try:
+        for item in _items(reader):
+            send(item)
+    except HodographError as error:
+        send(_Failure(type(error), str(error), vars(error)))
     os._exit(0)
+
+
+def _end_with_parent() -> None:
+    """Has the system kill this process when its parent dies, where it can: a child that lives on would keep the lock of
+    the journal.
+    """
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _items(reader: StreamReader) -> Iterator[_Item]:

@@ -28,7 +28,9 @@ def store_folder() -> Path:
 
 
 class ChunkStore:
-    """Encoded chunks, numbered from 0. Those before the newest one that was read are forgotten."""
+    """Encoded chunks, numbered from 0. Those before the newest one that was read are forgotten. The newest one is kept
+    in memory too: it is read again when it is sent again, and its file may be gone by then.
+    """
 
     def __init__(self) -> None:
         self.folder = store_folder()
@@ -36,6 +38,7 @@ class ChunkStore:
         self._parts: deque[tuple[int, FileIO]] = deque()
         """First byte of each file, in the order of all bytes that were ever put."""
         self._read = 0
+        self._newest = (-1, b"")
 
     def put(self, data: bytes) -> bool:
         """Appends a chunk. False: the disk has no room for it now, and nothing has changed.
@@ -61,15 +64,18 @@ class ChunkStore:
 
     def get(self, index: int) -> bytes:
         """A chunk; those before it are forgotten."""
+        if index == self._newest[0]:
+            return self._newest[1]
         self._read = max(self._read, index + 1)
         begin, end = self._ends[index], self._ends[index + 1]
         while len(self._parts) > 1 and self._parts[1][0] <= begin:
             self._parts.popleft()[1].close()
         first, part = self._parts[0]
-        return os.pread(part.fileno(), end - begin, begin - first)
+        self._newest = (index, os.pread(part.fileno(), end - begin, begin - first))
+        return self._newest[1]
 
     def forget_all(self) -> None:
-        """Gives back the room of chunks that have all been read, the newest one too."""
+        """Gives back the room of chunks that have all been read."""
         while self._parts:
             self._parts.popleft()[1].close()
 

@@ -98,3 +98,5 @@ def test_what_is_passed_is_forgotten() -> None:
     assert len(path._parts) < 7
     path.add(parse(chunks(2, JOB + 1)[0]))
     assert len(path._parts) == 1
+    path.add(parse(chunks(3, JOB + 2)[1]))  # the first chunk of another job did not come
+    assert len(path._parts) == 1

@@ -110,3 +110,16 @@ def test_a_machine_without_outputs_notes_them(tmp_path: Path) -> None:
     found = job(tmp_path, plain, "M62 P0\nG1 X10")
     assert "outputs (M62 to M65, M67, M68): the machine has none" in found.notes[0]
     assert events(found) == [[]]
+
+
+def test_the_end_of_the_program_switches_the_spindle_off(tmp_path: Path, machine: Machine) -> None:
+    """As M5 does; other outputs stay."""
+    assert events(job(tmp_path, machine, "M64 P1\nM3 S50\nG1 X20")) == [
+        [
+            (0.0, 1, 0, 2, 2),
+            (0.0, 1, 0, 4, 4),
+            (0.0, 2, 0, 0, 16384),
+            (20.0, 1, 0, 4, 0),
+            (20.0, 2, 0, 0, 0),
+        ]
+    ]

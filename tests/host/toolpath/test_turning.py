@@ -238,3 +238,18 @@ def test_less_way_than_a_path_needs_is_made_good_later(tmp_path: Path, five: Mac
     assert [section.stands_at for section in job.sections] == [None, (5.0, 0.0, 0.0), None]
     points = job.sections[2].fitted.reference.point
     assert points[[0, -1], 0].tolist() == [5.0, 9.0]
+
+
+def test_a_feed_that_is_given_replaces_that_of_moves_that_turn(
+    tmp_path: Path, five: Machine
+) -> None:
+    """In degrees per second; F is not needed then."""
+    file = tmp_path / "part.ngc"
+    ticks = []
+    for text in ("G1 A9 F360\n", "G1 A9\n", "G1 A9 F60\n"):
+        file.write_text(text)
+        (section,) = load_job(file, five, reading=ReadOptions(feed_mm_s=30.0)).sections
+        ticks.append(section.pipeline.program.ticks)
+    assert len(set(ticks)) == 1
+    (slow,) = load_job(file, five).sections
+    assert slow.pipeline.program.ticks > 10 * ticks[0]
