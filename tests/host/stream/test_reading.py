@@ -28,11 +28,17 @@ def read(found: StreamReader) -> None:
             pass
 
 
-@pytest.mark.parametrize("word", ["M62 P0", "M67 E0 Q5"])
-def test_an_output_has_its_place(tmp_path: Path, word: str) -> None:
+@pytest.mark.parametrize(
+    ("word", "places"),
+    [
+        ("M62 P0", [10.0]),
+        ("M67 E0 Q5", [10.0, 20.0]),  # the channel of S: the end of the program switches it off
+    ],
+)
+def test_an_output_has_its_place(tmp_path: Path, word: str, places: list[float]) -> None:
     found = reader(tmp_path, "dispenser.toml", f"G1 X10\n{word}\nG1 X20")
     events = [block.events for section in found.sections() for block in section.blocks]
-    assert [round(event["place"] * 2.0**-40, 6) for event in events[0]] == [10.0]
+    assert [round(event["place"] * 2.0**-40, 6) for event in events[0]] == places
     assert not found.notes
 
 
