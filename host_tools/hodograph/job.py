@@ -146,7 +146,7 @@ class JobSection:
     events  commands on the way, with the arc lengths in mm where they happen
     tied    whether it begins and ends in motion, as a part of a longer section
     stands_at  of a section that turns axes alone: where x, y and z stand, mm; its lengths and feeds are in degrees.
-               None: it goes a way
+               None: x, y and z move
     """
 
     fitted: FittedPath

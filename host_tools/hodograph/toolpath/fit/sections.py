@@ -144,7 +144,7 @@ class Divider:
 
     def _turned_alone(self, move: Move) -> StraightMove | None:
         """The move as one of (a, b, c) in place of x, y, z, where it turns axes while x, y and z go less than a path
-        needs; None: it goes a way.
+        needs; None: x, y and z move.
         """
         if not isinstance(move, StraightMove):
             return None
