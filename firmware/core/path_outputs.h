@@ -40,12 +40,14 @@ void path_outputs_clear(struct path_outputs *outputs);
 void path_outputs_begin(struct path_outputs *outputs, const struct program *program,
                         int64_t arc_length_q40_mm);
 
-/* A takeover: the outputs stay, and the next event is the same one in another program, whose arc length 0 is this one of the
- * program before and which has the events of that one from there on (core/chunk.h). Some 32 steps at most. */
+/* Takeover of the next chunk in motion: the outputs stay, and the next event stays the same one. `program` begins at arc
+ * length arc_shift_q40_mm of `before` and has the events of `before` from there on (core/chunk.h). Some 32 steps at
+ * most. */
 void path_outputs_carry(struct path_outputs *outputs, const struct program *before,
                         const struct program *program, int64_t arc_shift_q40_mm);
 
-/* The outputs stay, and all events of this program are to come: its first setpoint is to come, at rest. Constant time. */
+/* Takeover at rest, of a program whose first setpoint is still to come: the outputs stay, and all its events are to come.
+ * Constant time. */
 void path_outputs_begin_next(struct path_outputs *outputs, const struct program *program);
 
 /* The outputs at a setpoint, at this arc length and with this feed along the path. Tick context; at most

@@ -587,8 +587,8 @@ class JobMotion:
         return (self.ticks - 1) * self.period_s
 
     @property
-    def on_the_way(self) -> Iterator[Motion]:
-        """Those in which x, y or z move: errors of the others are in degrees."""
+    def path_motions(self) -> Iterator[Motion]:
+        """Motions in which x, y or z move. The errors of the others are in degrees."""
         for section, motion in zip(self.job.sections, self.motions, strict=True):
             if section.stands_at is None:
                 yield motion
@@ -601,10 +601,10 @@ class JobMotion:
             "planning_s": self.planning_s,
             "fit_s": self.job.fit_s,
             "max_contour_error_um": max(
-                (motion.max_contour_error_um for motion in self.on_the_way), default=0.0
+                (motion.max_contour_error_um for motion in self.path_motions), default=0.0
             ),
             "max_following_error_um": max(
-                (motion.max_following_error_um for motion in self.on_the_way), default=0.0
+                (motion.max_following_error_um for motion in self.path_motions), default=0.0
             ),
             "section": [
                 section.lines_summary() | motion.summary()

@@ -150,7 +150,7 @@ class EventMaker:
             return [(channel, channel.valued(place_q40, command.value, where))]
         codes = self.outputs.codes
         if isinstance(command, ProgramEnd):
-            return self._ended(place_q40)
+            return self._ended(place_q40, command.line)
         if isinstance(command, Coolant):
             switches = ((codes.mist, command.mist), (codes.flood, command.flood))
         elif isinstance(command, Spindle):
@@ -165,18 +165,14 @@ class EventMaker:
             found.append((codes.speed, codes.speed.valued(place_q40, speed, where)))
         return found
 
-    def _ended(self, place_q40: int) -> list[tuple[Channel, Event]]:
-        """What M5 and M9 would do, of outputs that are on."""
-        codes = self.outputs.codes
-        switches = (codes.spindle, codes.spindle_reverse, codes.mist, codes.flood, codes.speed)
-        on = [
-            one
-            for one in switches
-            if one is not None and one.name in self.last and self.last[one.name].value
-        ]
+    def _ended(self, place_q40: int, line: int) -> list[tuple[Channel, Event]]:
+        """What M5 and M9 do, of outputs that are on."""
+        codes = (Spindle(line, Rotation.STOPPED, 0.0), Coolant(line, mist=False, flood=False))
         return [
-            (one, one.switched(place_q40, False) if one.digital else one.valued(place_q40, 0.0, ""))
-            for one in on
+            (channel, event)
+            for code in codes
+            for channel, event in self._events(place_q40, code)
+            if channel.name in self.last and self.last[channel.name].value
         ]
 
     def _numbered(self, number: int, where: str, *, digital: bool) -> Channel:

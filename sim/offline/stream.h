@@ -60,8 +60,9 @@ int offline_stream_check(const struct offline_stream *s, struct offline_part *pa
  * cache is too small. */
 int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 
-/* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind which
- * no chunk is known. Points have arc lengths of the job; `values`, where it is not NULL, are the outputs at them. How many ticks it were, or a negative INTERPOLATOR_ERR_.... */
+/* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind
+ * which no chunk is known. Points have arc lengths of the job; `values`, where it is not NULL, are the outputs at them.
+ * Returns how many ticks there were, or a negative INTERPOLATOR_ERR_.... */
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
                            struct interpolator_point *points, struct path_outputs_values *values);
 

@@ -72,8 +72,8 @@ def _summary(run: JobMotion) -> list[tuple[str, str]]:
         ("duration without dwells, s", f"{run.duration_s:.3f}"),
         ("dwells, s", f"{job.dwell_s:g}"),
         ("certified deviation, µm", f"{job.deviation_um:.3f}"),
-        ("greatest contour error, µm", _most(m.max_contour_error_um for m in run.on_the_way)),
-        ("greatest following error, µm", _most(m.max_following_error_um for m in run.on_the_way)),
+        ("greatest contour error, µm", _most(m.max_contour_error_um for m in run.path_motions)),
+        ("greatest following error, µm", _most(m.max_following_error_um for m in run.path_motions)),
     ]
 
 

@@ -358,13 +358,13 @@ class SectionChunks:
         kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
         if window.rests and joint == window.count:
-            program = self._switching(Stretch(kept, window.stretch.end_q40), codes)
+            program = self._program_with_events(Stretch(kept, window.stretch.end_q40), codes)
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in tails.behind(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail, thorough)
-            program, fault = self._switching(whole, np.concatenate((codes, own))), None
+            program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 break
             fault = self._fault(program)
@@ -381,8 +381,8 @@ class SectionChunks:
                 break  # more codes are the better remedy; with them, a longer tail has more room for brakes
         return program, fault
 
-    def _switching(self, stretch: Stretch, codes: Codes) -> Program:
-        """The same as `_program`, with the events of its path."""
+    def _program_with_events(self, stretch: Stretch, codes: Codes) -> Program:
+        """The program of a chunk: `_program` with the events of its path."""
         program = self._program(stretch, codes)
         base_q40 = stretch.end_q40 - program.length_q40
         return replace(program, events=self._feed.path.events_on(base_q40, stretch.end_q40))
