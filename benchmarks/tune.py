@@ -5,7 +5,7 @@ one; plants found from noisy reports.
 Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
 (examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the
 search finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a
-servo sample late. Between SYNCs the drive is computed again here, servo sample by servo sample, which tells how many of
+servo sample late. Between SYNCs the drive is computed again here, servo sample by servo sample, which shows how many of
 them are at the voltage limit. Where the plant is another the optimal feeds are those for 4.5 V, as in the examples, and
 for 3.5 V.
 """

@@ -104,7 +104,7 @@ class BusChecker:
 
     @property
     def late(self) -> int:
-        """Frames of a SYNC that came after the next one: no finding, but worth telling."""
+        """Frames of a SYNC that came after the next one: no finding, but reported."""
         return sum(s.late for drive in self._drives.values() for s in drive.streams.values())
 
     @property

@@ -3,7 +3,7 @@
 """emulate.py TARGET --bus INTERFACE ...: the controller on an emulated board, in place of hodograph-controller.
 
 Starts QEMU with the image of `make firmware`, and hodograph-bridge, which joins it to the bus; ends both. Takes the
-options of hodograph-controller and has its exit status. docs/guides/target.md tells more.
+options of hodograph-controller and has its exit status. docs/guides/target.md has more.
 """
 
 from __future__ import annotations
@@ -174,7 +174,7 @@ def datagrams() -> tuple[socket.socket, tuple[int, int]]:
 
 
 def spawn(command: list[str], folder: Path, *descriptors: int) -> subprocess.Popen[bytes]:
-    """A child that does not outlive us, and hears no Ctrl-C: we stop it in our way."""
+    """A child that does not outlive us, and gets no Ctrl-C: we stop it in our way."""
     guard = shutil.which("setpriv")
     guarded = [guard, "--pdeathsig", "KILL", "--", *command] if guard else command
     return subprocess.Popen(

@@ -27,7 +27,7 @@ _LATEST_S = 1.0
 
 
 class Beats:
-    """What has been heard of the controller and of the drives."""
+    """What has been received of the controller and of the drives."""
 
     def __init__(self, controller: int, drives: Collection[int]) -> None:
         self._controller, self._drives = controller, tuple(drives)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """run_tests.py: runs tests, C and Python, and counts them together: `make check`, `make test` and `make test-all`.
 
-    --suite check   what a change can reach since it last passed, as much as the budget allows; says what is left
+    --suite check   what a change can reach since it last passed, as much as the budget allows; says what remains
     --suite test    everything but the tests marked `long`
     --suite all     everything
 

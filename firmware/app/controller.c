@@ -537,11 +537,11 @@ static uint32_t quick_time_us(const struct controller *controller)
 static uint32_t path_time_us(const struct controller *controller)
 {
     const struct program_slot *slot = &controller->slot;
-    const uint32_t told_us = stream_is_open(&controller->stream)
-                                 ? stream_hold_worst_us(&controller->stream)
-                             : slot->present ? slot->program.header.hold_worst_us
-                                             : 0u;
-    const uint32_t bound_us = told_us < STOP_BOUND_MOST_US ? told_us : STOP_BOUND_MOST_US;
+    const uint32_t reported_us = stream_is_open(&controller->stream)
+                                     ? stream_hold_worst_us(&controller->stream)
+                                 : slot->present ? slot->program.header.hold_worst_us
+                                                 : 0u;
+    const uint32_t bound_us = reported_us < STOP_BOUND_MOST_US ? reported_us : STOP_BOUND_MOST_US;
     return 3u * bound_us + (MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS + AXIS_STANDSTILL_SYNCS) *
                                controller->config.period_us;
 }

@@ -57,7 +57,7 @@ bool cia402_device_control(struct cia402_device *device, uint16_t controlword);
  * stop. */
 bool cia402_device_fault(struct cia402_device *device);
 
-/* The stop that cia402_device_action asked for is finished: transitions 5, 8, 14, or 12 when 0x605A
+/* The stop that cia402_device_action requested is finished: transitions 5, 8, 14, or 12 when 0x605A
  * says so. */
 bool cia402_device_stopped(struct cia402_device *device);
 

@@ -108,7 +108,7 @@ struct od_hooks {
     /* A DOMAIN is to be uploaded: set *size. It must not change until the upload has ended. */
     uint32_t (*domain_size)(void *context, const struct od_entry *entry, uint32_t *size);
 
-    /* Copy `size` bytes from `offset` on to `data`; the same bytes may be asked for again. */
+    /* Copy `size` bytes from `offset` on to `data`; the same bytes may be requested again. */
     uint32_t (*domain_read)(void *context, const struct od_entry *entry, uint32_t offset,
                             uint8_t *data, uint32_t size);
 };

@@ -47,7 +47,7 @@ uint32_t od_transfer_finish_write(struct od_transfer *t);
 /* Sets `size`. Checks existence and access. */
 uint32_t od_transfer_begin_read(struct od_transfer *t, uint16_t index, uint8_t sub);
 
-/* Copies `size` bytes from `offset` on, which must lie within the object; the same bytes may be asked for again. */
+/* Copies `size` bytes from `offset` on, which must lie within the object; the same bytes may be requested again. */
 uint32_t od_transfer_get(struct od_transfer *t, uint32_t offset, uint8_t *data, uint32_t size);
 
 /* Ends a write of a DOMAIN that is not finished, by the hook domain_abort; else does nothing. */

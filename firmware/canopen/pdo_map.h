@@ -101,7 +101,7 @@ bool pdo_map_sync(struct pdo_map *map, struct can_msg *out);
  * the event timer runs out. Fields up to date. Returns true when *out is to be sent. */
 bool pdo_map_process(struct pdo_map *map, uint32_t elapsed_us, struct can_msg *out);
 
-/* Whether pdo_map_process could send: its fields are worth bringing up to date. */
+/* Whether pdo_map_process could send: its fields need to be up to date. */
 bool pdo_map_event_driven(const struct pdo_map *map);
 
 #endif

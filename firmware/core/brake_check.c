@@ -5,11 +5,12 @@
 #include "core/qmath.h"
 #include "core/stop_check.h"
 
-#define STEPS         16   /* of a brake, about */
-#define MOST_STEPS    160  /* of a brake, until what is left must be within the limits as a whole */
-#define MOST_HALVINGS 3    /* of a step */
-#define MOST_PARTS    14   /* of a piece at a time */
-#define MOST_LOOKS    3000 /* at a stretch of a brake, for a piece and kind, */
+#define STEPS 16 /* of a brake, about */
+#define MOST_STEPS                                                                                 \
+    160 /* of a brake, until the remaining states must be within the limits as a whole */
+#define MOST_HALVINGS 3     /* of a step */
+#define MOST_PARTS    14    /* of a piece at a time */
+#define MOST_LOOKS    3000  /* at a stretch of a brake, for a piece and kind, */
 #define LOOKS_PER_S   30000 /* and more for a long piece */
 #define LOW_RATES     4     /* halvings of the rate of the lowest level, each by itself */
 #define WAY_SLACK_Q40 ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */

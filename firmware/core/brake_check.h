@@ -35,7 +35,7 @@ void brake_check_begin(struct brake_check *check, const struct program *p,
                        const struct program_limits *limits);
 
 /* One piece and kind with these numbers. Pieces in any order. Returns 1 when they are proved, or there is no brake; 0 when a limit
- * is passed, or may be for all that can be told. */
+ * is passed, or may be as far as is known. */
 int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_stop_kind kind,
                       const struct program_stop *stop);
 

@@ -18,7 +18,7 @@ struct extra_axis {
     int64_t middle_q48;
     int32_t linear_q17;
     int32_t scale;
-    int32_t c[5];         /* of z ... z^5; the first is what is left of the linear one */
+    int32_t c[5];         /* of z ... z^5; the first is the remainder of the linear one */
     int32_t slope_q16[5]; /* derivative in z, coefficient k times 2^k */
 };
 

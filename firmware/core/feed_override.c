@@ -282,7 +282,7 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. What is left is
+/* Whether any brake of the stop table would rest before the end of the path, and before the program does. The remainder is
  * rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
@@ -363,7 +363,7 @@ static void enter_piece(struct feed_override *f)
     }
 }
 
-/* A stop has been asked for, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
+/* A stop has been requested, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
  * to find out before is spread over ticks. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {

@@ -7,8 +7,8 @@
  * every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
  * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
- * it ends. So a stop takes at most the bound of the piece in which it was asked for (docs/reference/protocol.md 1.4). A hold or stop
- * that is asked for while the override rises first ends the rise. If the plan is in another piece by then, the bound of that one
+ * it ends. So a stop takes at most the bound of the piece in which it was requested (docs/reference/protocol.md 1.4). A hold or stop
+ * that is requested while the override rises first ends the rise. If the plan is in another piece by then, the bound of that one
  * counts from there.
  *
  * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
@@ -44,7 +44,7 @@ struct feed_override {
     struct program_clock clock;
     struct override_plan plan;
     struct path_brake brake;
-    struct path_brake_numbers numbers; /* of the stop asked for, in this piece: */
+    struct path_brake_numbers numbers; /* of the requested stop, in this piece: */
     uint32_t numbers_piece;
     uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
     struct path_state seen;           /* near the end of the program: the state looked at, */
@@ -54,7 +54,7 @@ struct feed_override {
     uint32_t state;   /* enum feed_state: what is wanted, and whether it is reached, */
     uint32_t at_end;  /* and what it becomes at the end of the program */
     uint32_t phase;   /* where setpoints come from */
-    uint32_t kind;    /* enum program_stop_kind of the stop asked for */
+    uint32_t kind;    /* enum program_stop_kind of the requested stop */
     uint32_t replace; /* 1: a fault stop, whose numbers the brake has not got yet */
     uint32_t found;   /* 1: `place` is */
     uint32_t goes_on; /* 1: the job goes on behind the end of the program */
@@ -161,8 +161,8 @@ int feed_override_late(const struct feed_override *f);
  * until the place of rest is found. */
 uint64_t feed_override_time_q42(const struct feed_override *f);
 
-/* What a stop takes at most that is asked for now, in us: what the stop table says; but less than twice that before the end
- * of the program what is left of it, since a brake may not fit before the end. */
+/* The longest time, in us, of a stop that is requested now: what the stop table says. Where less than twice that is left to
+ * the end of the program, it is the time to that end, since a brake may not fit before it. */
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind);
 
 /* Feed along the path, 2^-32 mm/s. */

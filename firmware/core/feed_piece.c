@@ -33,7 +33,7 @@ void feed_piece_set(void *piece, const struct program_piece *from)
     set_slope(f);
 }
 
-/* tau in q64, below 1. Its upper word drives the Horner steps; what is left is below 2^-32, where
+/* tau in q64, below 1. Its upper word drives the Horner steps; the remainder is below 2^-32, where
  * the slope suffices. */
 static uint64_t scaled_time(uint64_t t_q42_s, int exponent)
 {

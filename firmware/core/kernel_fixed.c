@@ -160,7 +160,7 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
 /* Where an arc length is on its segment. */
 struct place {
     int32_t z_q31;
-    int64_t rest_q48_mm;    /* what is left of the arc length there, */
+    int64_t rest_q48_mm;    /* the remainder of the arc length there, */
     int32_t rest_q44_mm;    /* and the same in a word */
     int32_t reciprocal_q15; /* 1 / (sigma / 2) nearby, normalised */
 };

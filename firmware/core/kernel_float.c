@@ -100,7 +100,7 @@ static void kernel_float_set_component(float a[3], const int64_t a_q44[3], int e
     }
 }
 
-/* Of a segment below all resolution the preimage may be 0: what is left to move is too. */
+/* Of a segment below all resolution the preimage may be 0: the remaining motion is too. */
 static void kernel_float_keep_from_zero(float u[3], const struct ph_segment *ph)
 {
     if (ph->exponent == PH_LEAST_EXPONENT) {
@@ -177,7 +177,7 @@ static void move_along(const struct kernel_float_segment *k, float z, float rest
 struct place {
     float z;
     int32_t z_q31;    /* the same, rounded */
-    int32_t rest_q44; /* what is left of the arc length there */
+    int32_t rest_q44; /* the remainder of the arc length there */
 };
 
 KERNEL_INLINE struct place find(const struct kernel_float_arc *k, int64_t arc_length_q40_mm)

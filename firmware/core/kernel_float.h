@@ -16,7 +16,7 @@
 /* A coordinate: middle + linear z 2^-31 (q48) + (c1 z + ... + c5 z^5) times the segment's scale. */
 struct kernel_float_polynomial {
     int32_t linear_q17_mm;
-    int32_t c[5]; /* of z ... z^5; the first is what is left of the linear one */
+    int32_t c[5]; /* of z ... z^5; the first is the remainder of the linear one */
 };
 
 /* z = z0 + t (g1 + t (g2 + t g3)), t = (s - s0) scale from 0 to 1. */

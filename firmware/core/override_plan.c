@@ -187,7 +187,7 @@ static void give_up(struct override_plan *plan)
     }
 }
 
-/* Whether a ramp up to an override above guaranteed_q57 is worth it, and allowed in the window: then `target_q57` is it. */
+/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is it. */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;

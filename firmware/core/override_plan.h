@@ -53,7 +53,7 @@ struct override_plan {
     uint32_t started;   /* 0 until the first tick */
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
-    int64_t asked_q57;  /* the override asked for, */
+    int64_t asked_q57;  /* the commanded override, */
     int64_t most_q57;   /* the largest value that counts, whatever is commanded, */
     int64_t commanded_q57;
     int64_t guaranteed_q57;             /* greatest override that all pieces allow, */
@@ -83,7 +83,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p);
  * Constant time. */
 void override_plan_begin_next(struct override_plan *plan, const struct program_override *least);
 
-/* The most that counts of the override asked for. Not lowered while the override is above. */
+/* The most that counts of the commanded override. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 
 /* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a

@@ -174,7 +174,7 @@ uint32_t program_segment_size(uint32_t axis_count);
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out);
 
-/* The stop of a kind that is asked for in piece i, which must be below the count. Constant time. */
+/* The stop of a kind that is requested in piece i, which must be below the count. Constant time. */
 void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kind kind,
                       struct program_stop *out);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/qmath.h"
 
-/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and what is left. The first
+/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The first
  * estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
 static uint32_t digit(uint32_t *high, uint32_t next, uint32_t b)
 {
@@ -101,7 +101,7 @@ int64_t qmath_fifth(int64_t a)
     return mul_reciprocal(a, 0x33333333u);
 }
 
-/* Of a >= 2^30, by pairs of bits; what is left goes to rest. */
+/* Of a >= 2^30, by pairs of bits; the remainder goes to rest. */
 static uint32_t root_of_word(uint32_t a, uint32_t *rest)
 {
     uint32_t root = 0;

@@ -48,7 +48,7 @@ int port_end(void);
  * such a request. */
 bool port_stop_requested(void);
 
-/* True when it has been asked for a second time: not along the path any more, but as quickly as the drives can. */
+/* True when it has been requested a second time: not along the path any more, but as quickly as the drives can. */
 bool port_stop_insisted(void);
 
 /* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps.
@@ -158,7 +158,7 @@ uint8_t *port_cache_memory(uint32_t *size);
 /* --- Words for a human --- */
 
 enum port_level {
-    PORT_NOTE,    /* only where somebody asked for it (--verbose) */
+    PORT_NOTE,    /* only where somebody requested it (--verbose) */
     PORT_WARNING, /* always */
 };
 

@@ -37,7 +37,7 @@ struct stop_trial {
     double of_bound[2];       /* greatest time to rest over the bound, by enum program_stop_kind */
     double longest_s[2];
     uint32_t measured
-        [2]; /* stops whose time was compared: those that were asked for while the program ran */
+        [2]; /* stops whose time was compared: those that were requested while the program ran */
     uint32_t late;            /* stops past their deadline */
     uint32_t failures;        /* of the interpolator, and stops that did not end */
     struct stop_case most;    /* of the trial with the greatest share of a limit, */

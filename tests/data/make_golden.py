@@ -430,7 +430,7 @@ def _cut_front(p: Program) -> Program:
 
 
 def _piece_end(p: Program) -> Program:
-    """Everything a hair further along but the first piece's start; the end is missed by 2^-32 mm."""
+    """Everything 2^-32 mm further along but the first piece's start; the end is missed by 2^-32 mm."""
     m = p.piece_count
     return pieces(p, c_q40=add((m - 1, 0), 1 << 9))
 

@@ -14,7 +14,7 @@
 
 #include "can/can_frame.h"
 
-/* What is left of an input. Behind its end every byte is 0. */
+/* The remainder of an input. After its end every byte is 0. */
 struct fuzz_input {
     const uint8_t *data;
     size_t size;

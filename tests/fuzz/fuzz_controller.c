@@ -24,7 +24,7 @@
 #define VELOCITY_UM_S       120000u
 #define ROUNDS_MAX          2000u /* of frames that answer frames, in one instant */
 #define PERIODS_MAX         3000u
-#define BACK_PERIODS        12000u /* time that the way out of everything may take */
+#define BACK_PERIODS        12000u /* time that the recovery from everything may take */
 #define BEAT_PERIODS        50u
 #define BLOCKS_MAX          20u /* of a transfer, repeated ones included */
 #define SEGMENT_BYTES       7u

@@ -36,7 +36,7 @@ uint64_t some_quotient(uint64_t a, uint64_t b)
     return quotients[asked++];
 }
 
-/* Rests exactly. What is left at the end is linear in p and in q, and of the third degree in n: 0 for both, one by one, and
+/* Rests exactly. The remainder at the end is linear in p and in q, and of the third degree in n: 0 for both, one by one, and
  * for more than four n, it is 0 for all. */
 static void rest(uint64_t n, uint64_t p, uint64_t q)
 {

@@ -48,7 +48,7 @@ def frames_of(*bases: int, node: int) -> list[dict[str, Any]]:
 
 
 def listener(hub: LocalHub, *bases: int, node: int = 0) -> LocalBus:
-    """Hears these services of a node; with no base all frames."""
+    """Receives these services of a node; with no base all frames."""
     return LocalBus(hub.address.channel, can_filters=frames_of(*bases, node=node) or None)
 
 
@@ -106,7 +106,7 @@ def controller_process(hub: LocalHub, node: int = CONTROLLER) -> AbstractContext
 
 @contextmanager
 def client(hub: LocalHub, node: canopen.RemoteNode) -> Iterator[Network]:
-    """A network with this node; hears of it SDO, EMCY, heartbeats and its first three TPDOs."""
+    """A network with this node; receives of it SDO, EMCY, heartbeats and its first three TPDOs."""
     network = Network(listener(hub, 0x080, 0x180, 0x280, 0x380, 0x580, 0x700, node=node.id))
     network.add_node(node)
     node.sdo.RESPONSE_TIMEOUT = 3.0

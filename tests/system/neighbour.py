@@ -116,7 +116,7 @@ def settled(bench: Bench, limit_s: float = LIMIT_S) -> tuple[int, int, int]:
 
 
 def runs_again(path: str, reset: Callable[[], int] = lambda: main(["reset"])) -> None:
-    """The way out that the documentation names, and the program as if nothing had been."""
+    """The recovery that the documentation names, and the program as if nothing had been."""
     assert reset() == 0
     assert main(["goto", path]) == 0
     assert main(["start", "--follow"]) == 0

@@ -189,7 +189,7 @@ def test_nothing_is_left_running(
         assert len(started) == 2
         if number == signal.SIGKILL:
             child.kill()
-            clock.sleep(END_S)  # the system tells them, and the controller stops the axes first
+            clock.sleep(END_S)  # the system reports them, and the controller stops the axes first
         else:
             child.signal(number)
         assert child.wait(LIMIT_S) == status, child.err

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drives that slept, as the processes of a suspended computer do: the way out."""
+"""Drives that slept, as the processes of a suspended computer do: the recovery."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ QUICK_STOP = 0x07
 QUIET_S = 1.0
 """In which an answer that must not come would have come."""
 DRIVE_LOOK_MS = 10.2
-"""A drive that hears nothing looks at its clock every 10 ms; then its frame has to go over the bus."""
+"""A drive that receives nothing looks at its clock every 10 ms; then its frame has to go over the bus."""
 
 
 class Listened:
@@ -59,7 +59,7 @@ class Listened:
         return any(beat == state for _, beat in self.beats)
 
     def command(self, name: str, state: int) -> None:
-        """An NMT command, until a heartbeat tells the state."""
+        """An NMT command, until a heartbeat reports the state."""
         self.beats.clear()
         self.node.nmt.state = name
         until(self.node.network, lambda: self.reported(state))
@@ -151,12 +151,12 @@ def enabled(drive: Listened) -> canopen.RemoteNode:
 @pytest.mark.parametrize("beats", [1, 6])
 @pytest.mark.parametrize("limit_ms", [110, 400, 1000])
 def test_the_drive_watches_a_heartbeat(drive: Listened, limit_ms: int, beats: int) -> None:
-    """0x1016: when the master that it has heard falls silent, EMCY 0x8130 and quick stop."""
+    """0x1016: when the master whose heartbeats it received stops sending, EMCY 0x8130 and quick stop."""
     node = drive.node
     node.sdo[0x2101][6].raw = 60_000  # SYNC may stay away: this is about heartbeats
     node.sdo[0x1016][1].raw = (1 << 16) | limit_ms
     enabled(drive)
-    let_pass(node.network, 2.0)  # nobody is missed who was never heard
+    let_pass(node.network, 2.0)  # nobody is missed who never sent a heartbeat
     for _ in range(beats):
         last_s = node.network.clock.stamp_ns() * 1e-9
         node.network.send_message(0x701, bytes([OPERATIONAL]))

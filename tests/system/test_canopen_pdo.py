@@ -38,7 +38,7 @@ def drive(hub: LocalHub, clock: VirtualClock) -> Iterator[canopen.RemoteNode]:
 
 @pytest.fixture
 def bus(hub: LocalHub, clock: VirtualClock) -> Iterator[LocalBus]:
-    """Hears all TPDOs of the drive."""
+    """Receives all TPDOs of the drive."""
     with listener(hub, 0x180, 0x280, 0x380, 0x480, node=DRIVE) as made:
         yield made
 

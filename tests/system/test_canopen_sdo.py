@@ -412,7 +412,7 @@ def test_a_client_falls_silent_in_a_block_upload(
 def test_a_client_that_lost_the_first_answer_may_begin_again(
     controller: canopen.RemoteNode, by_hand: Hand
 ) -> None:
-    """The same object, and nothing moved yet; whoever asks for another one is a stranger."""
+    """The same object, and nothing moved yet; a client that asks for another one is a second client."""
     assert by_hand.ask(b"\x21" + PROGRAM + struct.pack("<I", 2000))[0] == 0x60
     assert abort_code(lambda: controller.sdo[0x1000].raw) == BUSY
     assert by_hand.ask(b"\xa4" + PROGRAM + b"\x7f")[0] == 0xC6

@@ -330,7 +330,7 @@ NO_NUMBER = 0xFF
 
 
 class DurandNetwork(durand.network.NetworkABC):
-    """What a node of durand sends and hears by, on a local bus.
+    """What a node of durand sends and receives by, on a local bus.
 
     conforming  a node that Fastscan has found takes part no more, as CiA 305 says; durand's go on
     """

@@ -79,7 +79,7 @@ def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
 def test_setpoints_switched_off_at_a_drive(
     moving: Moving, other: Neighbour, seconds: float
 ) -> None:
-    """0x1400 sub 1: it hears no setpoints any more, says nothing, and stands."""
+    """0x1400 sub 1: it receives no setpoints any more, reports nothing, and stands still."""
     bench, path = moving(seconds)
     other.write(DRIVE, 0x1400, 1, OFF_BIT | 0x202, 4)
     assert settled(bench) == (FAULT_STATE, AWAY, DRIVE)
@@ -226,12 +226,12 @@ def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) 
         b"\x2f" + object_bytes(0x2001, 0) + b"\x02",
         b"\xc6" + object_bytes(0x2000, 1) + b"\0\1",
     )
-    with hand(hub, 1) as stranger:
+    with hand(hub, 1) as second_client:
 
         def progress(sent: int) -> None:
             if sent % 700 < 7 and (sent // 7) % 127 + 1 not in (0x40, 0x2F, 0x46):
-                refused.extend(asked_by_hand(stranger, request) for request in requests)
-                stranger.send(b"\x80" + object_bytes(0x2002, 0) + b"\0\0\4\5")
+                refused.extend(asked_by_hand(second_client, request) for request in requests)
+                second_client.send(b"\x80" + object_bytes(0x2002, 0) + b"\0\0\4\5")
 
         bench.controller.upload(image, progress)
     assert len(refused) >= 12
@@ -247,13 +247,13 @@ def test_a_command_beside_another_computers_upload(
 ) -> None:
     """It is patient for a while, then says who is in the way; a client that is gone is forgotten."""
     bench = make_bench()
-    with hand(hub, 1) as stranger:
-        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+    with hand(hub, 1) as second_client:
+        assert second_client.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
         began_s = bench.clock.now_s()
         assert bench.controller.state() in (BOOT, OFF)
         assert 1.5 < bench.clock.now_s() - began_s < 2.5  # the server's time-out
         monkeypatch.setattr(node, "BUSY_S", 1.0)
-        assert stranger.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
+        assert second_client.ask(b"\x20" + object_bytes(0x2000, 1))[0] == 0x60
         assert main(["status"]) == 4
         assert "another SDO client" in capsys.readouterr().err
 
@@ -265,17 +265,17 @@ def test_a_command_to_stop_beside_another_computers_transfer(
     """The program is being read from elsewhere, slowly: that is no reason to wait, and the transfer goes on."""
     bench, _ = moving(1.0)
     program = object_bytes(0x2000, 1)
-    with hand(hub, 1) as stranger:
-        assert stranger.ask(b"\x40" + program)[0] == 0x41
+    with hand(hub, 1) as second_client:
+        assert second_client.ask(b"\x40" + program)[0] == 0x41
         begun_s = bench.clock.now_s()
         bench.controller.write_at_once(COMMAND, COMMANDS[command])
         assert bench.clock.now_s() - begun_s < 0.001
-        taken = stranger.answer()  # of the command: it names another object
+        taken = second_client.answer()  # of the command: it names another object
         assert taken == b"\x60" + object_bytes(COMMAND, 0) + bytes(4)
-        assert stranger.ask(b"\x60")[0] == 0x00
-        assert stranger.ask(b"\x70")[0] == 0x10
+        assert second_client.ask(b"\x60")[0] == 0x00
+        assert second_client.ask(b"\x70")[0] == 0x10
         state = {"stop": READY, "hold": HELD, "quick-stop": OFF}[command]
-        stranger.send(b"\x80" + program + b"\0\0\4\5")
+        second_client.send(b"\x80" + program + b"\0\0\4\5")
     bench.controller.wait_for((state,), 2.0)
 
 
@@ -305,14 +305,14 @@ def test_the_commands_to_stop_while_another_computer_goes_on_reading(
 ) -> None:
     """For seven seconds. Whether the axes stand cannot be asked meanwhile, but they do."""
     bench, _ = moving(1.0, 10.0)  # for nine seconds more
-    with hand(hub, 1) as stranger, running(bench.clock, command) as process:
-        assert stranger.ask(b"\x40" + object_bytes(0x2000, 1))[0] == 0x41
+    with hand(hub, 1) as second_client, running(bench.clock, command) as process:
+        assert second_client.ask(b"\x40" + object_bytes(0x2000, 1))[0] == 0x41
         for k in range(900):  # of 943 segments
-            stranger.send(b"\x70" if k % 2 else b"\x60")
+            second_client.send(b"\x70" if k % 2 else b"\x60")
             bench.clock.sleep(0.008)
             if process.child.poll() is not None:
                 break
-        stranger.send(b"\x80" + object_bytes(0x2000, 1) + b"\0\0\4\5")
+        second_client.send(b"\x80" + object_bytes(0x2000, 1) + b"\0\0\4\5")
         assert process.wait() in (0, 4), process.err
         assert "middle of a transfer" in process.err or not process.err, process.err
     assert bench.controller.state() in (READY, HELD, OFF)

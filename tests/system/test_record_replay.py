@@ -90,7 +90,7 @@ def test_run_record_replay(
 def test_a_recording_from_beside(
     hub: LocalHub, clock: VirtualClock, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """`hodograph record` hears all that happens: going to the start as well as the run."""
+    """`hodograph record` receives all that happens: going to the start as well as the run."""
     file = tmp_path / "beside.blf"
     heart = str(EXAMPLES / "heart.toml")
     with running(clock, "record", str(file), "--json", "--machine", MACHINE) as command:

@@ -135,7 +135,7 @@ def test_an_interrupt_rests_on_the_path(
 def test_the_page_has_the_contour_error_of_a_job(
     hub: LocalHub, clock: VirtualClock, tmp_path: Path
 ) -> None:
-    """In each tick that moves, though nobody tells the page the path but the chunks on the bus."""
+    """In each tick that moves, though the page gets the path only from the chunks on the bus."""
     machine, published = load_machine(MILL), list[dict[str, Any]]()
     file = tmp_path / "part.ngc"
     file.write_text("G64 P0.05\nF3000\nG1 X10\nG3 X20 Y10 Z-2 I0 J10\nG1 Y20\nG61\nG1 X15\nM2\n")

@@ -96,7 +96,7 @@ def test_transfers(nodes: canopen.Network) -> None:
 
 
 def test_a_moved_pdo_passes_the_filters(nodes: canopen.Network) -> None:
-    """The filters of the drive's socket follow the COB-ID; what is moved away is not heard."""
+    """The filters of the drive's socket follow the COB-ID; what is moved away is not received."""
     sdo = nodes[DRIVE].sdo
     nodes.nmt.send_command(1)
     sdo[0x1400][1].raw = 0x80000000 | 0x200 + DRIVE
@@ -109,7 +109,7 @@ def test_a_moved_pdo_passes_the_filters(nodes: canopen.Network) -> None:
 
 
 def test_extended_and_remote_frames_do_not_pass(nodes: canopen.Network) -> None:
-    """They carry the identifiers and data of commands that the drive would obey."""
+    """They carry the identifiers and data of commands that the drive would follow."""
     node = nodes[DRIVE]
     for identifier in (0x000, 0x080, 0x200 + DRIVE, 0x600 + DRIVE):
         for extended, remote in ((True, False), (False, True)):

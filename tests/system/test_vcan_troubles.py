@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A SocketCAN interface that takes no frames, as an adapter that is bus-off has it: the way out."""
+"""A SocketCAN interface that takes no frames, as an adapter that is bus-off has it: the recovery."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ STOP_S = 1.0
 
 
 def bus_log(scenario: str) -> bytes:
-    """The bus of a machine in which a fault is injected: its run, the fault, the way out, the run again."""
+    """The bus of a machine in which a fault is injected: its run, the fault, the recovery, the run again."""
     (found,) = find_scenarios(EXAMPLES / "faults", [scenario])
     record = run_case(draw(found, 0), None)
     assert record.troubles == []

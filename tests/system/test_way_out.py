@@ -45,7 +45,7 @@ LATE_US = 7000
 class Heard:
     """The commands to one axis and the answers of its drive, in time order; times in us."""
 
-    told_us: NDArray[np.int64]
+    reported_us: NDArray[np.int64]
     word: NDArray[np.int64]
     target: NDArray[np.int64]
     answered_us: NDArray[np.int64]
@@ -61,14 +61,14 @@ class Heard:
 
     def first_us(self, value: int, after_us: int) -> int | None:
         """When this controlword was sent for the first time after an instant."""
-        found = np.flatnonzero((self.word == value) & (self.told_us >= after_us))
-        return int(self.told_us[found[0]]) if found.size else None
+        found = np.flatnonzero((self.word == value) & (self.reported_us >= after_us))
+        return int(self.reported_us[found[0]]) if found.size else None
 
     def last_step_us(self, after_us: int) -> int:
         """When its target changed last while its controlword was that of operation."""
         follows = (self.word[1:] & 0x0F) == 0x0F
         steps = np.flatnonzero((np.diff(self.target) != 0) & follows)
-        return max(int(self.told_us[steps[-1] + 1]), after_us) if steps.size else after_us
+        return max(int(self.reported_us[steps[-1] + 1]), after_us) if steps.size else after_us
 
 
 def heard(frames: Frames, node: int) -> Heard:
@@ -81,8 +81,8 @@ def heard(frames: Frames, node: int) -> Heard:
         values = np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.int64)
         return frames["time_us"][at].astype(np.int64), words, values
 
-    told_us, word, target = of(0x200)
-    return Heard(told_us, word, target, *of(0x180))
+    reported_us, word, target = of(0x200)
+    return Heard(reported_us, word, target, *of(0x180))
 
 
 def never_coasts(frames: Frames) -> None:
@@ -93,7 +93,7 @@ def never_coasts(frames: Frames) -> None:
             (axis.word[1:] & ENABLE_VOLTAGE == 0) & (axis.word[:-1] & ENABLE_VOLTAGE != 0)
         )
         for at in falls:
-            time_us = int(axis.told_us[at + 1])
+            time_us = int(axis.reported_us[at + 1])
             assert not axis.would_coast_at(time_us), f"node {node} is switched off while it moves"
 
 
@@ -180,9 +180,9 @@ def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s
     never_coasts(frames)
     assert switched_off(frames, at_us)
     for node in NODES:
-        told_us = heard(frames, node).first_us(QUICK_STOP, at_us)
-        assert told_us is not None
-        assert told_us - at_us <= again_s * 1e6 + LATE_US
+        reported_us = heard(frames, node).first_us(QUICK_STOP, at_us)
+        assert reported_us is not None
+        assert reported_us - at_us <= again_s * 1e6 + LATE_US
 
 
 HOST_NODE, BEAT_S, SILENT_MS = 127, 0.02, 100
@@ -192,7 +192,7 @@ HOST_NODE, BEAT_S, SILENT_MS = 127, 0.02, 100
 def test_a_lost_host_stops_the_axes_on_the_path(
     make_bench: MakeBench, heart: Program, after_s: float
 ) -> None:
-    """0x1016 names it, and it has spoken: its silence is a fault, in which every drive obeys."""
+    """0x1016 names it, and it has spoken: its silence is a fault, in which every drive follows."""
     bench = make_bench(file=PAPER_HEART)
     assert main(["goto", HEART]) == 0
     bench.controller.write(0x1016, 1, HOST_NODE << 16 | SILENT_MS)
@@ -213,6 +213,6 @@ def test_a_lost_host_stops_the_axes_on_the_path(
     assert switched_off(frames, silent_us)
     for node in NODES:
         axis = heard(frames, node)
-        told_us = axis.last_step_us(silent_us) - silent_us - SILENT_MS * 1000
-        assert told_us <= heart.stops.worst_us[1] + 20_000 + LATE_US
+        reported_us = axis.last_step_us(silent_us) - silent_us - SILENT_MS * 1000
+        assert reported_us <= heart.stops.worst_us[1] + 20_000 + LATE_US
         assert axis.first_us(QUICK_STOP, silent_us) is None

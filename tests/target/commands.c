@@ -22,7 +22,7 @@ int commands_open(struct commands *commands, const char *path)
     return 0;
 }
 
-static void obey(uint32_t what, struct motion *motion)
+static void carry_out(uint32_t what, struct motion *motion)
 {
     switch (what) {
     case COMMAND_HOLD:
@@ -43,7 +43,7 @@ static void obey(uint32_t what, struct motion *motion)
 void commands_give(struct commands *commands, uint32_t k, struct motion *motion)
 {
     while (commands->more && commands->next[0] <= k) {
-        obey(commands->next[1], motion);
+        carry_out(commands->next[1], motion);
         read_next(commands);
     }
 }

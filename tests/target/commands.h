@@ -23,10 +23,10 @@ struct commands {
 /* Begins with the first of them. 0, or -1 when the file cannot be opened. */
 int commands_open(struct commands *commands, const char *path);
 
-/* Obeys what is due before tick k. Closes the file when nothing is left: `more` is false then. */
+/* Carries out what is due before tick k. Closes the file when nothing is left: `more` is false then. */
 void commands_give(struct commands *commands, uint32_t k, struct motion *motion);
 
-/* Leaves out what is left. */
+/* Leaves out the remaining commands. */
 void commands_close(struct commands *commands);
 
 #endif

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * An image that runs the whole tick of the controller, with two drives that obey unless trouble.h says otherwise, on a
+ * An image that runs the whole tick of the controller, with two drives that follow unless trouble.h says otherwise, on a
  * port that is only memory: to count what the timer interrupt costs on every core, also where no emulated board has a CAN bus. The words are those
  * of setpoints.c, KERNEL FILE COMMANDS; FILE gets a u32 for each counted tick: what it took by the core's own clock
  * (clock.h). The store holds one program image or several. A FILE of a name that trouble.h has is not written: it makes
@@ -129,7 +129,7 @@ __attribute__((noinline)) static void receive(const struct can_msg *answer, uint
     }
 }
 
-static uint16_t obey(uint16_t controlword)
+static uint16_t carry_out(uint16_t controlword)
 {
     switch (controlword & 0xFu) {
     case 0x6u:
@@ -162,7 +162,7 @@ static void drives_answer(uint32_t now_us)
         for (uint32_t k = 0; k < 4; k++) {
             answer.data[2 + k] = (uint8_t)((uint32_t)drives[i].position_counts >> (8 * k));
         }
-        drives[i].statusword = obey(axis->controlword);
+        drives[i].statusword = carry_out(axis->controlword);
         if (path_ticks >= trouble.error_from) {
             drives[i].statusword |= FOLLOWING_ERROR;
         }

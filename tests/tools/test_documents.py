@@ -40,7 +40,7 @@ def code(page: Path) -> str:
 
 
 def test_commands_of_the_pages_have_their_options() -> None:
-    """Each command that a page tells to type is there, and knows the options that the page gives it."""
+    """Each command that a page says to type is there, and knows the options that the page gives it."""
     parser = make_parser()
     (commands,) = (a.choices for a in parser._actions if isinstance(a, _SubParsersAction))
     found = [(page.name, *match) for page in PAGES for match in COMMAND.findall(code(page))]

@@ -158,7 +158,7 @@ static int answers(struct fake_drive *drive, const struct pdo_actual *actual, st
     return count;
 }
 
-/* Homing mode: begins with the edge of bit 4, tells of its end in bits 10, 12, 13. */
+/* Homing mode: begins with the edge of bit 4, reports its end in bits 10, 12, 13. */
 static void seek_home(struct fake_drive *drive)
 {
     const uint16_t acknowledged =

@@ -69,7 +69,7 @@ struct fake_drive {
     uint32_t cut_moving;       /* power was taken from it (0x0000) while it moved */
     struct pdo_actual actual;  /* the answer that waits */
     bool silent_heart;         /* sends no heartbeats (the bench sends them) */
-    bool dead;                 /* neither hears nor speaks */
+    bool dead;                 /* neither receives nor sends */
 };
 
 void fake_drive_init(struct fake_drive *drive, uint8_t node, int32_t position_counts);

@@ -13,7 +13,7 @@
 
 #define FLASH_MODEL_BYTES 0x40000u /* of bank 2 */
 
-/* What is left of an operation during which the power fails. */
+/* The effect of an operation during which the power fails. */
 enum flash_model_remains {
     FLASH_MODEL_BEFORE, /* it has not begun */
     FLASH_MODEL_HALF, /* some of its bits have changed, anywhere; error correction fails for these words */
@@ -60,7 +60,7 @@ bool flash_model_cache_is_stale(void);
 /* The next operation fails with an error flag. */
 void flash_model_refuse_next(void);
 
-/* Error correction fails for a word of that bank (1 or 2): as the register tells the NMI. */
+/* Error correction fails for a word of that bank (1 or 2): as the register reports to the NMI. */
 void flash_model_fail_word(unsigned bank);
 
 #endif

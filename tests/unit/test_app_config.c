@@ -50,7 +50,7 @@ static void test_whole_millimetres_are_exact(void)
     TEST_ASSERT_EQUAL_UINT32(6, positive.axis_jerk_mm_s3[1]);
 }
 
-/* 2^40 / 3 = 366503875925.33...: limits never let more through than was asked for. */
+/* 2^40 / 3 = 366503875925.33...: limits never let more through than was requested. */
 static void test_fractions_are_rounded_inwards(void)
 {
     const struct program_limits limits = limits_of(1, 2, 3);

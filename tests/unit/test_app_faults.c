@@ -231,7 +231,7 @@ static void test_off_has_more_patience(void)
 
 /* --- Drives that go their own way --- */
 
-/* A heartbeat that stops while the drive obeys: the stop is on the path, then all are off. */
+/* A heartbeat that stops while the drive follows: the stop is on the path, then all are off. */
 static void test_a_fault_with_all_drives_obeying_stops_on_the_path(void)
 {
     run_some(250);
@@ -266,7 +266,7 @@ static void test_a_drive_lost_while_braking_makes_it_a_quick_stop(void)
     until_phase(MACHINE_FAULT_OFF, 10);
 }
 
-/* It hears, it brakes, only its answers are lost: power is not taken from it while it moves. */
+/* It receives, it brakes, only its answers are lost: power is not taken from it while it moves. */
 static void test_a_drive_that_is_not_heard_may_finish_its_quick_stop(void)
 {
     run_some(250);
@@ -771,7 +771,7 @@ static void test_a_drive_that_does_not_follow_without_a_word(void)
     TEST_ASSERT_TRUE(app_bench_read(&bench, 0x2003, 3) > 30000);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
     drive(0)->deaf = 0;
-    drive(0)->following = false; /* what it hears then is no step of the path */
+    drive(0)->following = false; /* what it receives then is no step of the path */
     until_phase(MACHINE_FAULT_OFF, 1000);
     recover();
 }

@@ -219,7 +219,7 @@ static void test_a_drive_that_restarts_while_it_is_configured_loses_it(void)
     }
 }
 
-/* The cable is out, the drive restarts meanwhile, and stands where it stood: nobody heard its boot-up message. */
+/* The cable is out, the drive restarts meanwhile, and stands where it stood: nobody received its boot-up message. */
 static void away(uint32_t periods)
 {
     bench.drives[0].dead = true;
@@ -242,7 +242,7 @@ static void test_a_drive_that_was_away_in_boot_loses_it(void)
     bench.drives[1].dead = true;
     (void)app_bench_until(&bench, MACHINE_BOOT, 3000);
     app_bench_periods(&bench, 3000);
-    TEST_ASSERT_TRUE_MESSAGE(homed(1), "it has been heard all the time");
+    TEST_ASSERT_TRUE_MESSAGE(homed(1), "its frames came all the time");
     away(DRIVE_MONITOR_ZERO_MS + 150u);
     bench.drives[1].dead = false;
     boot();

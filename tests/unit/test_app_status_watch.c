@@ -22,7 +22,7 @@ void tearDown(void)
 }
 
 /* The trouble after so many answers with this statusword, one by one. */
-static void expect_trouble(unsigned statusword, uint16_t code, bool obeys)
+static void expect_trouble(unsigned statusword, uint16_t code, bool follows)
 {
     for (unsigned i = 0; i < STATUSWORD_MONITOR_TOLERATED; ++i) {
         statusword_monitor_take(&watch, (uint16_t)statusword, true);
@@ -31,7 +31,7 @@ static void expect_trouble(unsigned statusword, uint16_t code, bool obeys)
     }
     statusword_monitor_take(&watch, (uint16_t)statusword, true);
     TEST_ASSERT_EQUAL_HEX16(code, statusword_monitor_trouble(&watch));
-    TEST_ASSERT_EQUAL_INT(obeys, statusword_monitor_follows(&watch));
+    TEST_ASSERT_EQUAL_INT(follows, statusword_monitor_follows(&watch));
 }
 
 static void test_each_bit_that_goes(void)

@@ -341,7 +341,7 @@ static void test_speed_by_differences_and_delay(void)
     }
 }
 
-/* The paper's loop is slow beside a sample: it hardly notices; but other bits they are. */
+/* The paper's loop is slow beside a sample: the motion is nearly the same, but its bits differ. */
 static void test_sensing_changes_little(void)
 {
     struct drive plain = made();

@@ -90,7 +90,7 @@ static void test_rows_of_a_line(void)
         TEST_ASSERT_EQUAL_INT32(-1000000, rows[k].set_counts[1]);
         TEST_ASSERT_EQUAL_INT32(counts_from_q40_mm(rows[k].cmd_q40_mm[0], 1000000),
                                 rows[k].set_counts[0]);
-        /* y stays parked: what is left is the rounding of its encoder and, at the ends, x */
+        /* y stays parked: the remainder is the rounding of its encoder and, at the ends, x */
         TEST_ASSERT_EQUAL_INT16(0, rows[k].volts_mv[1]);
         TEST_ASSERT_INT32_WITHIN(5, -1000000, rows[k].act_counts[1]);
         TEST_ASSERT_TRUE(rows[k].contour_error_um >= 0.0 && rows[k].contour_error_um < 0.6);

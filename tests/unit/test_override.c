@@ -53,7 +53,7 @@ static struct {
     struct interpolator_point point;
     double h;
     enum wanted wanted;
-    int fault;         /* a fault stop was asked for */
+    int fault;         /* a fault stop was requested */
     unsigned asked;    /* tick of the last hold, stop or fault stop, */
     uint32_t bound_us; /* and its bound */
     uint32_t percent;

@@ -302,7 +302,7 @@ static void test_a_refused_frame_is_not_waited_for(void)
     TEST_ASSERT_TRUE(linux_can_delivered());
 }
 
-/* Bus-off: the driver drops them, and nothing tells. */
+/* Bus-off: the driver drops them, and nothing reports it. */
 static void test_frames_that_are_lost_are_given_up_after_a_tenth_of_a_second(void)
 {
     TEST_ASSERT_EQUAL_INT(0, send_frame(0x080, true));

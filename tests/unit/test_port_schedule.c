@@ -183,7 +183,7 @@ static void starve(void)
     TEST_ASSERT_FALSE(put_off(schedule.due_ns, 1, 0));
     while (!put_off(schedule.due_ns, 1, 0)) {
         (void)tick(0);
-        TEST_ASSERT_TRUE_MESSAGE(++ticks < 30u, "nobody gives way");
+        TEST_ASSERT_TRUE_MESSAGE(++ticks < 30u, "nobody yields");
     }
     TEST_ASSERT_TRUE(ticks > SCHEDULE_TURN_NS / MS);
 }

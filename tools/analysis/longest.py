@@ -53,7 +53,7 @@ class Longest:
 
     image: Image
     bounds: Bounds
-    known: dict[Function, int] = field(default_factory=dict)  # all that were asked for
+    known: dict[Function, int] = field(default_factory=dict)  # all that were requested
     _open: set[Function] = field(default_factory=set)
 
     def of(self, name: str) -> int:

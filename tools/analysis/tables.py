@@ -170,7 +170,7 @@ def spread_text(figures: Figures) -> str:
     return (
         f"Greatest ratios to the median of the examples: of a motion part {motion}; of an interrupt\n"
         f"while a program runs, drives silent or not, {running}; of one that finds a fault {fault};\n"
-        f"and where axes settle, whose median is a tick that does next to nothing, {settling}.\n"
+        f"and where axes settle, whose median is a tick without motion, {settling}.\n"
     )
 
 

@@ -18,7 +18,7 @@ _OF_LIBFUZZER = (
 _RUNS_LONG = ("controller", "program")
 """Their time is in runs, not in reading: comparisons of values are not looked at, which doubles their speed."""
 EXTRA_S = 180
-"""A run that takes so much longer than asked for hangs."""
+"""A run that takes so much longer than requested hangs."""
 _EXECUTIONS = re.compile(r"stat::number_of_executed_units:\s*(\d+)")
 _COVERAGE = re.compile(r"\bcov: (\d+)")
 _WHAT = re.compile(r"broken: .*|runtime error: .*|ERROR: .*|:FAIL: .*")

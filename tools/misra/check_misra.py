@@ -3,7 +3,7 @@
 """check_misra.py --build DIR --include DIR... FILE...: cppcheck's MISRA C:2012 add-on, less the deviations.
 
 tools/misra/deviations.txt has a line `RULE PLACE reason` for each: PLACE is a glob of paths, `*` for all. Prints
-FILE:LINE: RULE for what is left, and deviations that nothing needs any more. Exit status 1 then. The rules' texts are
+FILE:LINE: RULE for what remains, and deviations that nothing needs any more. Exit status 1 then. The rules' texts are
 not free, so only their numbers are given. Files whose objects have not changed are not looked at again.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A TCP connection to a port inside user-mode Linux, which a forwarder outside has asked for."""
+"""A TCP connection to a port inside user-mode Linux, which a forwarder outside has requested."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Connection(Channel):
         super().__init__(number, os.dup(self._socket.fileno()), {reader: frames.STDOUT})
 
     def close_stdin(self) -> None:
-        """Tells the other side that nothing more comes."""
+        """Informs the other side that nothing more comes."""
         if self.stdin >= 0:
             with contextlib.suppress(OSError):
                 self._socket.shutdown(socket.SHUT_WR)

@@ -75,7 +75,7 @@ static bool as_wanted(const struct drive_op *op, uint32_t value)
     return ((value ^ op->value) & op->mask) == 0u;
 }
 
-/* What a write should have made so, or what only the drive knows. */
+/* What a write should have set, or what only the drive knows. */
 static void judge_read(struct drive_boot *boot)
 {
     const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);

@@ -24,7 +24,7 @@ enum drive_when {
     WHEN_NO_TORQUE,   /* it is not, or the drive does not map it */
     WHEN_VELOCITY,    /* velocity feedforward is on */
     WHEN_NO_VELOCITY, /* as WHEN_NO_TORQUE */
-    WHEN_HOMING,      /* homing is asked for, and the drive has the mode */
+    WHEN_HOMING,      /* homing is requested, and the drive has the mode */
     WHEN_WINDOW,      /* a following error window is set */
     WHEN_VENDOR, /* the drive's identity is known from the machine file: vendor, product, revision */
     WHEN_PRODUCT,

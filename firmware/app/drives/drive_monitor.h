@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * drive_monitor: heartbeats and emergency messages of the drives and of the I/O module, and what they mean for the zero of a homed axis: a drive that
- * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody heard its boot-up
+ * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody received its boot-up
  * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
  */
 #ifndef APP_DRIVES_DRIVE_MONITOR_H

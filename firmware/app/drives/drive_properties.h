@@ -14,7 +14,7 @@ enum drive_fact {
     DRIVE_REVISION,
     DRIVE_SERIAL,
     DRIVE_MODES,           /* 0x6502 */
-    DRIVE_POSITION,        /* 0x6064 before anything was written; known where homing is asked for */
+    DRIVE_POSITION,        /* 0x6064 before anything was written; known where homing is requested */
     DRIVE_INPUTS,          /* 0x60FD exists; its value then */
     DRIVE_INPUTS_MAPPED,   /* and TPDO3 reports its changes */
     DRIVE_TORQUE_MAPPED,   /* RPDO1 takes 0x60B2 */

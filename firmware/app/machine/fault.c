@@ -18,7 +18,7 @@ const char *fault_text(uint16_t code)
     case FAULT_HOMING_LATE:
         return "drive did not find its home in time, statusword";
     case FAULT_NOT_REMOTE:
-        return "drive does not obey its controlword (remote off), statusword";
+        return "drive does not follow its controlword (remote off), statusword";
     case FAULT_NOT_FOLLOWING:
         return "drive is enabled but does not follow its target, statusword";
     case FAULT_NOT_STOPPED:

@@ -124,7 +124,7 @@ static bool stays_in_fault(const struct axis *axis)
 }
 
 /* A drive that does not answer at all, or not what it was asked, is left to BOOT, which looks for it, configures it anew and
- * tells what is wrong. */
+ * reports what is wrong. */
 static void step_resetting(struct machine *machine)
 {
     const struct axis *late = machine_late_drive(machine);

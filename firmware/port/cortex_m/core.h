@@ -46,7 +46,7 @@ static inline void core_enable(uint32_t number, uint8_t priority)
     CORE_ISER[number / 32u] = 1u << (number % 32u);
 }
 
-/* As if the board had asked for it. */
+/* As if the board had requested it. */
 static inline void core_pend(uint32_t number)
 {
     CORE_ISPR[number / 32u] = 1u << (number % 32u);

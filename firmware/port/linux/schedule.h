@@ -10,7 +10,7 @@
  * then late rather than on time. At lock step it may also request it as soon as that. The guard time is counted in
  * slices: the thread wakes at least every SCHEDULE_SLICE_NS while it waits and says so (schedule_wait); a slice that
  * took longer than SCHEDULE_SLICE_MAX_NS counts as that. So a stall of the whole machine, in which nobody could have
- * become ready, hardly counts.
+ * become ready, counts little.
  *
  * Real-time threads take all they ask for. So that the main loop still gets its turn on a machine too slow for the
  * period, what a tick took, up to the moment when everybody was ready, is followed by a rest of half of that (10 ms at
@@ -56,7 +56,7 @@ struct schedule {
     uint64_t nominal_ns;  /* of the next tick, on the clock of the ticks */
     uint64_t earliest_ns; /* when it may start: later than nominal_ns where ticks would bunch */
     uint64_t due_ns;      /* when it has to start: later than that while somebody is waited for */
-    uint64_t guard_ns;    /* what is left of the requested waiting */
+    uint64_t guard_ns;    /* the remainder of the requested waiting */
     uint64_t counted_ns;  /* up to when it was counted */
     bool awaiting;        /* somebody is waited for, since the present tick */
     bool hurry;           /* its other request */

@@ -28,7 +28,7 @@ uint32_t faults_from_now_on(void)
 }
 
 /* Before the start the store is looked through for a whole program: a word that lost its power half written is found
- * then, and its CRC tells. Later nobody reads what was not checked: the memory itself has failed. */
+ * then, and its CRC shows it. Later nobody reads what was not checked: the memory itself has failed. */
 void startup_nmi(void)
 {
     if (flash_take_ecc_error() && !self.running) {

@@ -24,13 +24,13 @@
 #endif
 typedef char node_is_a_can_open_one[BOARD_NODE >= 1 && BOARD_NODE <= 127 ? 1 : -1];
 
-#define TELL_US 1000000u
+#define REPORT_US 1000000u
 
 static struct {
     struct fdcan can;
     volatile bool started;
     volatile bool awake;
-    uint32_t told_us;
+    uint32_t reported_us;
 } self;
 
 static int fail(const char *text)
@@ -189,10 +189,10 @@ static void tell_errors(void)
 /* Once a second at most: a line takes some milliseconds. */
 static void tell_events(uint32_t now_us)
 {
-    if (now_us - self.told_us < TELL_US) {
+    if (now_us - self.reported_us < REPORT_US) {
         return;
     }
-    self.told_us = now_us;
+    self.reported_us = now_us;
     const struct fdcan_events events = fdcan_take_events(&self.can);
     tell("left the CAN bus after too many errors, times", events.bus_offs);
     tell("error passive on the CAN bus began or ended, times", events.error_passives);

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine file for the drives that were found, with comments: what they said, and what is left to set."""
+"""A machine file for the drives that were found, with comments: what they said, and what remains to be set."""
 
 from __future__ import annotations
 

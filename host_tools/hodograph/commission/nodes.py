@@ -52,7 +52,7 @@ def found_nodes(network: Network, wait_s: float, nodes: Collection[int] = NODES)
 
 
 def pass_time(network: Network, seconds: float) -> None:
-    """Hears the bus for a time."""
+    """Receives from the bus for a time."""
     if network.clock.is_virtual:
         network.wait_until(lambda: False, seconds)
     else:

@@ -130,7 +130,7 @@ def identify_axis(
 ) -> Plant:
     """The plant of the axis that made these motions with the loop of `drive`.
 
-    Raises RunError: it hardly moves, or no plant fits.
+    Raises RunError: it moves too little, or no plant fits.
     """
     guess = _first_guess(motions, drive, counts_per_mm, period_us)
     model = _Model(motions, guess, counts_per_mm, period_us)

@@ -118,7 +118,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
 
 
 def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
-    """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was asked for, 0 where none may, and
+    """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was requested, 0 where none may, and
     the share of the piece, up to its end, from which it may go on into the next.
     """
     pieces, codes = program.pieces, program.stops.codes[:, kind]

@@ -60,7 +60,7 @@ class Stops:
     """What the image says of stops, for M pieces; the second axis is the kind, HOLD or FAULT.
 
     codes      (M, 2, 3) of jerk, deceleration, jerk
-    bound_us   (M, 2) from the command to rest, for a stop that is asked for in this piece
+    bound_us   (M, 2) from the command to rest, for a stop that is requested in this piece
     worst_us   (2,) the greatest of them; worst_um (2,) the longest distance
     """
 

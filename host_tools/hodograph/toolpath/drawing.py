@@ -242,7 +242,7 @@ class Drawing:
         )
 
     def _stages(self, chains: Sequence[Chain]) -> list[list[Chain]]:
-        """Chains that are machined before others: by layer as asked for, and by how deep they lie."""
+        """Chains that are machined before others: by layer as requested, and by how deep they lie."""
         layers = {name: k for k, name in enumerate(self.options.layers)}
         names = [group.layer for group in self._groups]
         layer_of = [names[self.contours.group_of(chain.pieces[0][0])] for chain in chains]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Toolpath files of every kind, told apart by the ends of their names.
+"""Toolpath files of every kind, distinguished by the ends of their names.
 
 for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
     ...

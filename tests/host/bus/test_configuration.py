@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a machine file makes of the controller's objects: in the dictionary, in range, and the values asked for."""
+"""What a machine file makes of the controller's objects: in the dictionary, in range, and the requested values."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ def test_a_listener_measures_from_one_question_to_the_next() -> None:
     assert found.seconds <= LONGEST_S + 0.1
     assert found.frames_per_s == pytest.approx(1000)
     capture.feed(frames, 21.0)
-    capture.feed(frames, 3.0)  # a recording begins anew: what was heard before does not count
+    capture.feed(frames, 3.0)  # a recording begins anew: what was received before does not count
     assert capture.measure() is None
     capture.feed(frames, 3.1)
     found = capture.measure()

@@ -166,7 +166,7 @@ def on_terminal(*words: str) -> tuple[int, str, str]:
     try:
         while part := os.read(leader, 4096):
             reported += part
-    except OSError:  # how Linux tells the end of a terminal
+    except OSError:  # how Linux reports the end of a terminal
         pass
     finally:
         os.close(leader)

@@ -23,7 +23,7 @@ class Away:
 
 
 class Meter:
-    """Counts how often what was heard is taken away; the bus may be down as well."""
+    """Counts how often what was received is taken away; the bus may be down as well."""
 
     def __init__(self, down: bool) -> None:
         self.down = down

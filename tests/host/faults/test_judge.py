@@ -143,7 +143,7 @@ def test_a_fault_beside_the_expected_one() -> None:
     for code, reported in (
         (0x4210, True),
         (0x1000, False),
-    ):  # the second only until a drive tells its own
+    ):  # the second only until a drive reports its own
         both[-1]["data"] = list(struct.pack("<H6x", code))
         words = f"fault 0x{code:04X} was raised, which is none of those expected"
         assert (words in violations(record(both))) is reported

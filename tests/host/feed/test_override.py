@@ -72,7 +72,7 @@ def test_constant_feed_has_generous_bounds() -> None:
 
 
 def test_lower_levels_leave_a_changing_rate_more() -> None:
-    """A plan at its limits: at rate 1 next to nothing, at a half most of acceleration and jerk."""
+    """A plan at its limits: at rate 1 almost nothing, at a half most of acceleration and jerk."""
     controller = ControllerLimits(500.0, 2000.0, 50000.0, 0.0)
     plan = plan_feed(300.0, FeedRequest("minimax", 400.0, 0.1), None, controller)
     pieces = plan.pieces

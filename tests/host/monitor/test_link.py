@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fetching the program to draw: it gives way to commands, and a failure is not the last word."""
+"""Fetching the program to draw: it yields to commands, and a failure is not the last word."""
 
 from __future__ import annotations
 

@@ -89,11 +89,11 @@ def test_rapid_moves_of_a_drawing_are_lifted() -> None:
 
 def test_standard_input_is_gcode() -> None:
     words = [sys.executable, "-m", "hodograph", "import", "-", "--machine", MILL, "--json"]
-    told = subprocess.run(words, input=TEXTS["G.NGC"], capture_output=True, text=True, check=True)
-    assert json.loads(told.stdout)["length_mm"] == pytest.approx(10.0)
-    told = subprocess.run(words, input="G1 X1 Q\n", capture_output=True, text=True, check=False)
-    assert told.returncode == 2
-    assert "hodograph: -:1:" in told.stderr
+    run = subprocess.run(words, input=TEXTS["G.NGC"], capture_output=True, text=True, check=True)
+    assert json.loads(run.stdout)["length_mm"] == pytest.approx(10.0)
+    run = subprocess.run(words, input="G1 X1 Q\n", capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert "hodograph: -:1:" in run.stderr
 
 
 @pytest.mark.parametrize(

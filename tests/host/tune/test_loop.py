@@ -47,7 +47,7 @@ def test_closed_loop_is_that_of_the_simulated_drive(
 
 
 def test_offsets_that_invert_the_plant_make_the_loop_follow(drives: Drives) -> None:
-    """Speed and acceleration of the command as volts: what is left is what the loop itself does too late."""
+    """Speed and acceleration of the command as volts: the remainder is what the loop itself does too late."""
     for drive in drives:
         tuned, forward = feedforward_of(drive)
         volts_m = drive.rated_torque_nm * drive.torque_to_volts / 1000

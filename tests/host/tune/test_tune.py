@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph tune`: goals met, what is asked for, files that lose nothing, refusals."""
+"""`hodograph tune`: goals met, what is requested, files that lose nothing, refusals."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
 def test_the_example_machine_has_a_contour_error_of_its_encoder(
     name: str, paper_um: float, within: float
 ) -> None:
-    """Asked for: 1 um at the paper's feed, 2 um at the optimal one."""
+    """Requested: 1 um at the paper's feed, 2 um at the optimal one."""
     plain = load_pipeline(EXAMPLES / f"{name}.toml")
     tuned = load_pipeline(EXAMPLES / f"{name}.toml", MACHINES / "tuned.toml")
     assert plain.image == tuned.image

@@ -62,7 +62,7 @@ def smoothed(
 
 @dataclass(frozen=True, eq=False)
 class _Shifted:
-    """Shifts (n, m), and what follows from them: what is left of the squares of the bounds (n,), the third differences
+    """Shifts (n, m), and what follows from them: the remainder of the squares of the bounds (n,), the third differences
     (n - 3, 3), and the cost with the barrier at a level.
     """
 
