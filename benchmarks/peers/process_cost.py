@@ -4,9 +4,9 @@
     process_cost.py OUT COMMAND ...
 
 As a script it runs a command and writes its processor time in seconds to OUT, and the peak resident size of its largest
-process in KiB. `run_measured` starts it so: what Linux reports of a child begins at the size of the process that started
-it, and this one is small. Processor time, unlike wall time, depends little on what else the computer does. Standard
-library only.
+process in KiB. `run_measured` starts it so: what Linux reports of a child begins at the size of the process that
+started it, and this one is small. Processor time, unlike wall time, depends little on what else the
+computer does. Standard library only.
 """
 
 from __future__ import annotations

@@ -371,8 +371,8 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
         axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
         axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
         if (facts->known[DRIVE_POSITION]) {
-            axis_found(axis, (int32_t)facts->value[DRIVE_POSITION],
-                       MACHINE_KEPT_UNITS * config_counts_per_unit(&controller->config, i));
+            axis_reconnected(axis, (int32_t)facts->value[DRIVE_POSITION],
+                             MACHINE_KEPT_UNITS * config_counts_per_unit(&controller->config, i));
         } else {
             axis->homed = false;
         }
@@ -485,7 +485,7 @@ static bool switched_off(const struct machine *machine)
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (!axis_left(axis)) {
+        if (!axis_has_stopped(axis)) {
             return false;
         }
     }

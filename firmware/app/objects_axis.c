@@ -63,13 +63,13 @@ uint64_t object_read_following_error(struct controller *controller, const struct
 
 uint64_t object_read_missed(struct controller *controller, const struct od_entry *entry)
 {
-    return axis_of(controller, entry)->answers.missed;
+    return axis_of(controller, entry)->tpdo1.missed;
 }
 
 uint64_t object_read_drive_state(struct controller *controller, const struct od_entry *entry)
 {
     const struct axis *axis = axis_of(controller, entry);
-    return axis->answers.present ? (uint64_t)axis->state + 1u : 0u;
+    return axis->tpdo1.present ? (uint64_t)axis->state + 1u : 0u;
 }
 
 uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry)

@@ -2,7 +2,7 @@
 """A job on the bus: its sections one after the other, and what happens at rest between them.
 
 Each section is a program: it is uploaded where the axes stand, started, recorded and analysed. Dwells are waited for,
-program stops and tool changes are left to the operator, messages are said.
+program stops and tool changes are left to the operator, messages are printed.
 """
 
 from __future__ import annotations

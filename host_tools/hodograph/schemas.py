@@ -459,6 +459,9 @@ def _axis() -> Schema:
             _in_units(
                 {
                     "method": _choice("Of CiA 402; 0: no homing", HOMING_METHODS),
+                    "sequence": _integer(
+                        "Axes home from the lowest number on; 0 for z, else 1", 0, 15
+                    ),
                     "offset_mm": _number("Home position (0x607C), mm", -2147484, 2147484, 0),
                     "speed_mm_s": _number("Towards the switch, mm/s", *counted, 10),
                     "slow_mm_s": _number("Away from it, mm/s", *counted, 1),

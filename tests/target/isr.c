@@ -229,8 +229,8 @@ static int run_image(const uint8_t *image, uint32_t size, uint8_t kernel)
     config.node[1] = 3;
     config.missed_max = 1;
     for (unsigned i = 0; i < DRIVES; ++i) { /* compared, and never outside */
-        config.apart_counts[i] = UINT32_MAX;
-        config.apart_syncs[i] = CONFIG_APART_SYNCS;
+        config.deviation_counts[i] = UINT32_MAX;
+        config.deviation_syncs[i] = CONFIG_DEVIATION_SYNCS;
     }
     if (motion_begin(&prepared, &program, &config) < 0) {
         return STATUS_PROGRAM;

@@ -72,7 +72,7 @@ static void test_a_statusword_that_lies_once_does_not_move_the_target(void)
     axis.target_counts = 60;
     (void)sent();
     answer(CIA402_SWITCHED_ON, 9999, 0);
-    TEST_ASSERT_TRUE(axis_dropped_out(&axis));
+    TEST_ASSERT_TRUE(axis_left_operation_enabled(&axis));
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
     axis_command(&axis, CIA402_GOAL_QUICK_STOP);
     const struct pdo_setpoint stop = sent();
@@ -90,10 +90,10 @@ static void test_a_quick_stop_leaves_the_target_until_the_drive_is_off(void)
     axis_command(&axis, CIA402_GOAL_QUICK_STOP);
     answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
-    TEST_ASSERT_FALSE(axis_left(&axis));
+    TEST_ASSERT_FALSE(axis_has_stopped(&axis));
     answer(CIA402_SWITCH_ON_DISABLED, 80, 0);
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
-    TEST_ASSERT_TRUE(axis_left(&axis));
+    TEST_ASSERT_TRUE(axis_has_stopped(&axis));
     axis_command(&axis, CIA402_GOAL_OFF);
     TEST_ASSERT_EQUAL_INT32(80, sent().target_counts);
 }
@@ -103,18 +103,18 @@ static void test_a_garbled_statusword_has_to_come_twice_to_mean_stopped(void)
     const struct pdo_actual garbled = {.statusword = 0x0002, .position_counts = 70};
     answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
     axis_receive(&axis, &garbled, 0);
-    TEST_ASSERT_FALSE(axis_left(&axis));
+    TEST_ASSERT_FALSE(axis_has_stopped(&axis));
     axis_receive(&axis, &garbled, 0);
-    TEST_ASSERT_TRUE(axis_left(&axis));
+    TEST_ASSERT_TRUE(axis_has_stopped(&axis));
     answer(CIA402_QUICK_STOP_ACTIVE, 70, 0);
-    TEST_ASSERT_FALSE(axis_left(&axis));
+    TEST_ASSERT_FALSE(axis_has_stopped(&axis));
     answer(CIA402_FAULT, 70, 0);
-    TEST_ASSERT_TRUE(axis_left(&axis));
+    TEST_ASSERT_TRUE(axis_has_stopped(&axis));
 }
 
 static void test_homing_adds_its_bits_and_follows_the_position(void)
 {
-    axis.by_itself = true;
+    axis.moves_by_drive = true;
     axis.control_extra = 0x10;
     axis.goal = CIA402_GOAL_ENABLED;
     answer(CIA402_SWITCH_ON_DISABLED, 1, 0);
@@ -214,23 +214,23 @@ static void test_well_ends_with_a_restart_with_a_loss_and_with_trouble_that_stay
     const struct pdo_actual good = {.statusword = 0x1237};
     const struct pdo_actual unfed = {.statusword = 0x1227};
     axis_receive(&axis, &good, 0);
-    TEST_ASSERT_TRUE(axis_well(&axis));
-    axis.answers.lost = true;
-    TEST_ASSERT_FALSE(axis_well(&axis));
+    TEST_ASSERT_TRUE(axis_healthy(&axis));
+    axis.tpdo1.lost = true;
+    TEST_ASSERT_FALSE(axis_healthy(&axis));
     for (uint32_t k = 0; k < STATUSWORD_MONITOR_TOLERATED; ++k) {
         axis_receive(&axis, &unfed, 0);
-        TEST_ASSERT_TRUE(axis_well(&axis));
+        TEST_ASSERT_TRUE(axis_healthy(&axis));
     }
     axis_receive(&axis, &unfed, 0);
-    TEST_ASSERT_FALSE(axis_well(&axis));
+    TEST_ASSERT_FALSE(axis_healthy(&axis));
     axis_receive(&axis, &good, 0);
-    TEST_ASSERT_TRUE(axis_well(&axis));
-    axis.engaged = true;
-    TEST_ASSERT_FALSE(axis_dropped_out(&axis));
+    TEST_ASSERT_TRUE(axis_healthy(&axis));
+    axis.was_enabled = true;
+    TEST_ASSERT_FALSE(axis_left_operation_enabled(&axis));
     axis_restarted(&axis);
-    TEST_ASSERT_FALSE(axis_well(&axis));
+    TEST_ASSERT_FALSE(axis_healthy(&axis));
     TEST_ASSERT_FALSE(axis_enabled(&axis));
-    TEST_ASSERT_TRUE(axis_dropped_out(&axis));
+    TEST_ASSERT_TRUE(axis_left_operation_enabled(&axis));
 }
 
 /* The clock wraps in between. */
@@ -238,12 +238,12 @@ static void test_gone_is_lost_for_long(void)
 {
     const uint32_t last_us = UINT32_MAX - 10u;
     answer(CIA402_SWITCHED_ON, 0, last_us);
-    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + 5u * AXIS_GONE_US));
-    axis.answers.lost = true;
-    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + AXIS_GONE_US));
-    TEST_ASSERT_TRUE(axis_gone(&axis, last_us + AXIS_GONE_US + 1u));
-    answer(CIA402_SWITCHED_ON, 0, last_us + 2u * AXIS_GONE_US);
-    TEST_ASSERT_FALSE(axis_gone(&axis, last_us + 2u * AXIS_GONE_US));
+    TEST_ASSERT_FALSE(axis_lost_for_long(&axis, last_us + 5u * AXIS_LOST_FOR_LONG_US));
+    axis.tpdo1.lost = true;
+    TEST_ASSERT_FALSE(axis_lost_for_long(&axis, last_us + AXIS_LOST_FOR_LONG_US));
+    TEST_ASSERT_TRUE(axis_lost_for_long(&axis, last_us + AXIS_LOST_FOR_LONG_US + 1u));
+    answer(CIA402_SWITCHED_ON, 0, last_us + 2u * AXIS_LOST_FOR_LONG_US);
+    TEST_ASSERT_FALSE(axis_lost_for_long(&axis, last_us + 2u * AXIS_LOST_FOR_LONG_US));
 }
 
 static void test_distance_is_that_of_the_farther_one_without_overflow(void)

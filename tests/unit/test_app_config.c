@@ -160,8 +160,8 @@ static void test_an_axis_that_turns(void)
     TEST_ASSERT_EQUAL_UINT32(100000, config_counts_per_unit(&config, 4));
     TEST_ASSERT_EQUAL_UINT32(5000, config_tolerance_counts(&config, 3));
     TEST_ASSERT_EQUAL_UINT32(500, config_tolerance_counts(&config, 4));
-    TEST_ASSERT_EQUAL_UINT32(8000000, config.apart_counts[3]); /* 20 ms at 400 mm/s */
-    TEST_ASSERT_EQUAL_UINT32(720000, config.apart_counts[4]);  /* and at 360 deg/s */
+    TEST_ASSERT_EQUAL_UINT32(8000000, config.deviation_counts[3]); /* 20 ms at 400 mm/s */
+    TEST_ASSERT_EQUAL_UINT32(720000, config.deviation_counts[4]);  /* and at 360 deg/s */
     config_limits(&config, 0, &limits);
     TEST_ASSERT_EQUAL_INT64(36 * Q40, limits.max_q40_mm[3]);
     TEST_ASSERT_EQUAL_INT64(-12 * Q40, limits.min_q40_mm[4]);

@@ -764,10 +764,10 @@ static void test_a_drive_that_does_not_follow_without_a_word(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x201E, 1, 10, 2));
     run_some(250);
     drive(0)->deaf = 1000; /* 15000 counts a tick: out of the window with the third */
-    app_bench_periods(&bench, 3u + 10u + CONFIG_APART_SYNCS);
+    app_bench_periods(&bench, 3u + 10u + CONFIG_DEVIATION_SYNCS);
     TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
     app_bench_periods(&bench, 4);
-    expect_fault(FAULT_AWAY, 2);
+    expect_fault(FAULT_POSITION_DEVIATION, 2);
     TEST_ASSERT_TRUE(app_bench_read(&bench, 0x2003, 3) > 30000);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
     drive(0)->deaf = 0;
@@ -785,7 +785,7 @@ static void test_ready_means_at_the_target(void)
     drive(1)->target_counts += 12000;
     drive(1)->deaf = 10000;
     (void)app_bench_until(&bench, MACHINE_FAULT, 60 + MACHINE_SETTLE_TICKS + MACHINE_ARRIVE_TICKS);
-    expect_fault(FAULT_AWAY, 3);
+    expect_fault(FAULT_POSITION_DEVIATION, 3);
     TEST_ASSERT_EQUAL_INT(12000, app_bench_read(&bench, 0x2003, 3));
 }
 

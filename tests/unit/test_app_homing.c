@@ -77,6 +77,31 @@ static void test_axes_one_after_the_other_from_off_to_off(void)
     TEST_ASSERT_EQUAL_INT32(1000, bench.drives[0].position_counts);
 }
 
+static void test_axes_in_their_sequence(void)
+{
+    want(1, 37, 1000);
+    want(2, 17, -2000);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2034, 1, 3, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2034, 2, 2, 1));
+    boot();
+    home();
+    app_bench_periods(&bench, 20);
+    TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, bench.drives[1].state.state);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, bench.drives[0].state.state);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2034, 2, 4, 1));
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT32(1000, bench.drives[0].position_counts);
+    TEST_ASSERT_EQUAL_INT32(-2000, bench.drives[1].position_counts);
+}
+
+static void test_the_sequence_has_a_limit_and_leaves_drives_alone(void)
+{
+    boot();
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TOO_HIGH, app_bench_write(&bench, 0x2034, 1, 16, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2034, 1, 15, 1));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+}
+
 static void test_only_axes_with_a_method(void)
 {
     want(2, 35, 7);
@@ -248,6 +273,8 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_axes_one_after_the_other_from_off_to_off);
+    RUN_TEST(test_axes_in_their_sequence);
+    RUN_TEST(test_the_sequence_has_a_limit_and_leaves_drives_alone);
     RUN_TEST(test_only_axes_with_a_method);
     RUN_TEST(test_refusals);
     RUN_TEST(test_nothing_else_while_homing);

@@ -6,8 +6,8 @@ inside, or one TCP connection to a port inside. Data flows against credit, so th
 itself: each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
 
 The line itself needs the same once more: a serial line of user-mode Linux whose 4096-byte input buffer
-has once been full may stay deaf (6.1). So the broker keeps at most LINE_IN bytes unacknowledged, of whatever
-kind, and the agent LINE_OUT bytes of DATA.
+has once been full may receive nothing any more (seen with Linux 6.1). So the broker keeps at most LINE_IN bytes
+unacknowledged, of whatever kind, and the agent LINE_OUT bytes of DATA.
 """
 
 from __future__ import annotations

@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_monitor: heartbeats and emergency messages of the drives and of the I/O module, and what they mean for the zero of a homed axis: a drive that
- * has been silent for a while, also while it was looked for, may have been switched off and on, and nobody received its boot-up
- * message. Also heartbeats of the host, where 0x1016 names its node. Mainline; takes the port's lock where it touches the machine.
+ * drive_monitor: heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of the host where
+ * 0x1016 names its node.
+ *
+ * A drive that has sent no heartbeat for a while may have been switched off and on, and its boot-up message may be lost. Its
+ * axis then is no longer homed, also while the drive is looked for.
+ *
+ * Main loop; takes the port's lock where it touches the machine.
  */
 #ifndef APP_DRIVES_DRIVE_MONITOR_H
 #define APP_DRIVES_DRIVE_MONITOR_H

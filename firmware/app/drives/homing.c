@@ -110,12 +110,26 @@ static bool wanted(const struct machine *machine, uint8_t axis)
     return machine->config.axis[axis].homing_method != 0;
 }
 
-static uint8_t next_axis(const struct machine *machine, uint8_t axis)
+/* Whether axis a is homed before axis b. */
+static bool precedes(const struct machine *machine, uint8_t a, uint8_t b)
 {
-    while (axis < machine->config.axis_count && !wanted(machine, axis)) {
-        axis++;
+    const uint32_t own = machine->config.axis[a].homing_sequence;
+    const uint32_t other = machine->config.axis[b].homing_sequence;
+    return own < other || (own == other && a < b);
+}
+
+/* The axis that is homed after this one, the first one after AXES_MAX; axis_count when there is none. */
+static uint8_t next_axis(const struct machine *machine, uint8_t after)
+{
+    const uint8_t count = machine->config.axis_count;
+    uint8_t next = count;
+    for (uint8_t i = 0; i < count; ++i) {
+        if (wanted(machine, i) && (after >= count || precedes(machine, after, i)) &&
+            (next == count || precedes(machine, i, next))) {
+            next = i;
+        }
     }
-    return axis;
+    return next;
 }
 
 static enum machine_refusal drives_refusal(const struct machine *machine,
@@ -126,8 +140,8 @@ static enum machine_refusal drives_refusal(const struct machine *machine,
             return MACHINE_NO_HOMING_MODE;
         }
     }
-    return next_axis(machine, 0) < machine->config.axis_count ? MACHINE_ACCEPTED
-                                                              : MACHINE_NOTHING_TO_HOME;
+    return next_axis(machine, AXES_MAX) < machine->config.axis_count ? MACHINE_ACCEPTED
+                                                                     : MACHINE_NOTHING_TO_HOME;
 }
 
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
@@ -143,7 +157,7 @@ enum machine_refusal homing_begin(struct homing *homing, struct machine *machine
     }
     if (refusal == MACHINE_ACCEPTED) {
         homing_init(homing);
-        homing->axis = next_axis(machine, 0);
+        homing->axis = next_axis(machine, AXES_MAX);
         enter(homing, machine, HOMING_OFF);
     }
     port_unlock();
@@ -176,7 +190,7 @@ static void mode_done(struct homing *homing, struct machine *machine)
     if (homing->phase == HOMING_MODE) {
         enter(homing, machine, HOMING_ENABLE);
     } else {
-        homing->axis = next_axis(machine, (uint8_t)(homing->axis + 1u));
+        homing->axis = next_axis(machine, homing->axis);
         if (homing->axis < machine->config.axis_count) {
             enter(homing, machine, HOMING_OFF);
         } else {

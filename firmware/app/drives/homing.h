@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * homing: command 10: each axis with a homing method (0x2012) is homed by its drive, one after the other, from OFF to
- * OFF:
+ * homing: command 10: each axis with a homing method (0x2012) is homed by its drive, one after the other by their
+ * sequence (0x2034), from OFF to OFF:
  *
  *     off -> mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
  *

@@ -21,25 +21,27 @@ void axis_init(struct axis *axis, uint8_t node)
 void axis_forget(struct axis *axis, uint8_t node)
 {
     const bool homed = axis->homed && axis->node == node;
-    const int32_t kept_counts = axis->answers.present ? axis->position_counts : axis->kept_counts;
+    const int32_t last_counts =
+        axis->tpdo1.present ? axis->position_counts : axis->last_seen_counts;
     axis_init(axis, node);
     axis->homed = homed;
-    axis->kept_counts = kept_counts;
+    axis->last_seen_counts = last_counts;
 }
 
-void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts)
+void axis_reconnected(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts)
 {
-    axis->homed = axis->homed && distance(axis->kept_counts, position_counts) <= tolerance_counts;
-    axis->kept_counts = position_counts;
+    axis->homed =
+        axis->homed && distance(axis->last_seen_counts, position_counts) <= tolerance_counts;
+    axis->last_seen_counts = position_counts;
 }
 
 void axis_command(struct axis *axis, enum cia402_goal goal)
 {
     axis->goal = goal;
     axis->control_extra = 0;
-    axis->by_itself = false;
-    axis->away_syncs = 0;
-    axis->away = false;
+    axis->moves_by_drive = false;
+    axis->deviation_syncs = 0;
+    axis->deviates = false;
 }
 
 static void take_status(struct axis *axis, uint16_t statusword)
@@ -53,18 +55,19 @@ void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t n
 {
     take_status(axis, actual->statusword);
     axis->position_counts = actual->position_counts;
-    tpdo_monitor_take(&axis->answers, now_us);
+    tpdo_monitor_take(&axis->tpdo1, now_us);
     if (axis_enabled(axis) && axis->goal == CIA402_GOAL_ENABLED) {
-        statusword_monitor_take(&axis->watch, axis->statusword, !axis->by_itself);
+        statusword_monitor_take(&axis->statusword_bits, axis->statusword, !axis->moves_by_drive);
     }
-    axis->fit = axis_enabled(axis) && axis->watch.in_row <= STATUSWORD_MONITOR_TOLERATED;
+    axis->statusword_ok =
+        axis_enabled(axis) && axis->statusword_bits.in_row <= STATUSWORD_MONITOR_TOLERATED;
 }
 
 void axis_restarted(struct axis *axis)
 {
     axis->statusword = cia402_status_bits(CIA402_NOT_READY);
     axis->state = CIA402_NOT_READY;
-    axis->fit = false;
+    axis->statusword_ok = false;
 }
 
 static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
@@ -72,9 +75,9 @@ static void count_standstill(struct axis *axis, uint32_t tolerance_counts)
     const bool still = axis->target_counts == axis->target_sent_counts && axis_enabled(axis) &&
                        distance(axis->target_counts, axis->position_counts) <= tolerance_counts;
     if (!still) {
-        axis->still_syncs = 0;
-    } else if (axis->still_syncs < AXIS_STANDSTILL_SYNCS) {
-        axis->still_syncs++;
+        axis->standstill_syncs = 0;
+    } else if (axis->standstill_syncs < AXIS_STANDSTILL_SYNCS) {
+        axis->standstill_syncs++;
     }
 }
 
@@ -102,27 +105,28 @@ static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max)
 {
-    const bool follows = axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis->by_itself;
-    if (!follows || axis_apart(axis) <= window_counts) {
-        axis->away_syncs = 0;
-        axis->away = false;
-    } else if (axis->away_syncs < syncs_max) {
-        axis->away_syncs++;
+    const bool follows =
+        axis->was_enabled && axis->goal == CIA402_GOAL_ENABLED && !axis->moves_by_drive;
+    if (!follows || axis_deviation_counts(axis) <= window_counts) {
+        axis->deviation_syncs = 0;
+        axis->deviates = false;
+    } else if (axis->deviation_syncs < syncs_max) {
+        axis->deviation_syncs++;
     } else {
-        axis->away = true;
+        axis->deviates = true;
     }
 }
 
 /* A statusword that once says "not enabled" must not move the target of a drive that may follow it still. */
-static void note_engaged(struct axis *axis)
+static void note_enabled(struct axis *axis)
 {
     if (axis->goal == CIA402_GOAL_ENABLED) {
         if (axis_enabled(axis)) {
-            axis->engaged = true;
+            axis->was_enabled = true;
         }
     } else if (axis->goal != CIA402_GOAL_QUICK_STOP && !axis_enabled(axis)) {
-        axis->engaged = false;
-        statusword_monitor_init(&axis->watch);
+        axis->was_enabled = false;
+        statusword_monitor_init(&axis->statusword_bits);
     }
 }
 
@@ -130,7 +134,7 @@ static void follow_position(struct axis *axis)
 {
     if (axis->goal == CIA402_GOAL_QUICK_STOP) {
         axis->target_counts = axis->target_sent_counts;
-    } else if (axis->by_itself || !axis->engaged) {
+    } else if (axis->moves_by_drive || !axis->was_enabled) {
         axis->target_counts = axis->position_counts;
     }
 }
@@ -150,16 +154,16 @@ static void set_controlword(struct axis *axis)
 void axis_setpoint(struct axis *axis, uint32_t tolerance_counts)
 {
     set_controlword(axis);
-    note_engaged(axis);
+    note_enabled(axis);
     follow_position(axis);
     pdo_put_target(&axis->setpoint, axis->target_counts);
     count_standstill(axis, tolerance_counts);
     count_rest(axis, tolerance_counts);
 }
 
-bool axis_gone(const struct axis *axis, uint32_t now_us)
+bool axis_lost_for_long(const struct axis *axis, uint32_t now_us)
 {
-    return axis->answers.lost && now_us - axis->answers.last_us > AXIS_GONE_US;
+    return axis->tpdo1.lost && now_us - axis->tpdo1.last_us > AXIS_LOST_FOR_LONG_US;
 }
 
 bool axis_in_fault(const struct axis *axis)
@@ -167,14 +171,15 @@ bool axis_in_fault(const struct axis *axis)
     return axis->state == CIA402_FAULT || axis->state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
-bool axis_dropped_out(const struct axis *axis)
+bool axis_left_operation_enabled(const struct axis *axis)
 {
-    return axis->engaged && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
+    return axis->was_enabled && axis->goal == CIA402_GOAL_ENABLED && !axis_enabled(axis);
 }
 
 bool axis_follows(const struct axis *axis)
 {
-    return axis_enabled(axis) && !axis->answers.lost && statusword_monitor_follows(&axis->watch);
+    return axis_enabled(axis) && !axis->tpdo1.lost &&
+           statusword_monitor_follows(&axis->statusword_bits);
 }
 
 bool axis_moves(const struct axis *axis)
@@ -183,29 +188,29 @@ bool axis_moves(const struct axis *axis)
 }
 
 /* A statusword that means nothing, once, does not make a moving drive a stopped one. */
-bool axis_left(const struct axis *axis)
+bool axis_has_stopped(const struct axis *axis)
 {
     if (axis->state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
-        return axis->answers.lost;
+        return axis->tpdo1.lost;
     }
-    return axis->answers.lost || !moves_in(axis->state) ||
+    return axis->tpdo1.lost || !moves_in(axis->state) ||
            (axis->state == CIA402_QUICK_STOP_ACTIVE && axis->rest_state == axis->state &&
             axis->rest_syncs >= AXIS_STANDSTILL_SYNCS);
 }
 
 bool axis_reached(const struct axis *axis)
 {
-    const bool follows = axis->goal != CIA402_GOAL_ENABLED || axis->by_itself ||
+    const bool follows = axis->goal != CIA402_GOAL_ENABLED || axis->moves_by_drive ||
                          (axis->statusword & CIA402_STATUS_FOLLOWS) != 0u;
     return follows && cia402_master_reached(axis->goal, axis->statusword);
 }
 
 bool axis_still(const struct axis *axis)
 {
-    return axis->still_syncs >= AXIS_STANDSTILL_SYNCS;
+    return axis->standstill_syncs >= AXIS_STANDSTILL_SYNCS;
 }
 
-uint32_t axis_apart(const struct axis *axis)
+uint32_t axis_deviation_counts(const struct axis *axis)
 {
     return distance(axis->position_counts, axis->expected_counts);
 }

@@ -23,14 +23,15 @@
 #define AXIS_REST_SYNCS 50u
 
 /* With power off a drive that is lost may still come back by itself within this time. */
-#define AXIS_GONE_US 1000000u
+#define AXIS_LOST_FOR_LONG_US 1000000u
 
 struct axis {
     uint8_t node;
     enum cia402_state state; /* as the statusword has it */
-    bool fit; /* as of the last answer: Operation enabled, and no wrong bit in the statusword */
-    struct tpdo_monitor answers;
-    struct statusword_monitor watch;
+    bool
+        statusword_ok; /* as of the last answer: Operation enabled, and no wrong bit in the statusword */
+    struct tpdo_monitor tpdo1;
+    struct statusword_monitor statusword_bits;
     uint16_t statusword;
     uint16_t statusword_before; /* the one before it */
     uint16_t controlword;       /* sent last */
@@ -41,14 +42,14 @@ struct axis {
     int32_t target_sent_counts; /* sent in the last one */
     int32_t latched_counts;     /* target that the last SYNC made the drive take over */
     int32_t expected_counts;    /* where the drive should have been at the last SYNC */
-    uint32_t away_syncs; /* answers in a row with a position outside the window around that */
-    bool away;           /* for longer than the configuration permits */
+    uint32_t deviation_syncs; /* answers in a row with a position outside the window around that */
+    bool deviates;            /* for longer than the configuration permits */
     struct can_msg
         setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
     enum cia402_goal goal;
     bool
-        engaged; /* seen in Operation enabled since that became the goal: its target no longer follows the position */
-    bool by_itself; /* it homes: moves by its own motion, its target follows its position */
+        was_enabled; /* seen in Operation enabled since that became the goal: its target no longer follows the position */
+    bool moves_by_drive; /* it homes: moves by its own motion, its target follows its position */
     int32_t velocity_offset_counts_s; /* put into its RPDO2 last */
     int16_t torque_offset_permille;   /* put into its RPDO1 last */
     bool torque_mapped;               /* its RPDO1 takes a torque offset */
@@ -56,24 +57,26 @@ struct axis {
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, read a few times a second */
     bool homed;                       /* its drive has the zero that homing gave it */
-    int32_t kept_counts; /* where it was when it was seen last before it was to be found again */
-    uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
+    int32_t
+        last_seen_counts; /* where it was when it was seen last before it was to be found again */
+    uint32_t rest_syncs;  /* with power on: for how long it has been, in this state, at */
     int32_t rest_counts;
     enum cia402_state rest_state;
-    uint32_t still_syncs; /* for how long it has stood still, enabled, at an unchanged target */
+    uint32_t
+        standstill_syncs; /* for how long it has stood still, enabled, at an unchanged target */
 };
 
 void axis_init(struct axis *axis, uint8_t node);
 
 /* Forgets the drive, which is to be found and configured anew. Whether it is homed stays, when the node is the same:
- * that ends only by axis_found, a boot-up message, or missing heartbeats. Under the lock. */
+ * that ends only by axis_reconnected, a boot-up message, or missing heartbeats. Under the lock. */
 void axis_forget(struct axis *axis, uint8_t node);
 
 /* The drive has been found again and says where it is: one that is more than `tolerance_counts` from where it was seen
  * last does not have its zero any more. Under the lock. */
-void axis_found(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
+void axis_reconnected(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
 
-/* A new goal, which ends homing: by_itself and control_extra are cleared. Under the lock. */
+/* A new goal, which ends homing: moves_by_drive and control_extra are cleared. Under the lock. */
 void axis_command(struct axis *axis, enum cia402_goal goal);
 
 /* Takes the drive's TPDO1. Receive. */
@@ -100,34 +103,35 @@ static inline void axis_synced(struct axis *axis)
     axis->latched_counts = axis->target_sent_counts;
 }
 
-/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. Away:
- * more than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
+/* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. It
+ * deviates where they are more than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
 
 /* All pure, under the lock. */
-bool axis_gone(const struct axis *axis, uint32_t now_us); /* lost for long */
-bool axis_in_fault(const struct axis *axis);              /* Fault, or on the way there */
-bool axis_dropped_out(const struct axis *axis); /* was enabled, shall be, and is not any more */
+bool axis_lost_for_long(const struct axis *axis, uint32_t now_us); /* lost for long */
+bool axis_in_fault(const struct axis *axis);                       /* Fault, or on the way there */
+bool axis_left_operation_enabled(
+    const struct axis *axis); /* was enabled, shall be, and is not any more */
 static inline bool axis_enabled(const struct axis *axis) /* Operation enabled */
 {
     return axis->state == CIA402_OPERATION_ENABLED;
 }
 /* Enabled, answers, is where it should be, no wrong bit in its statusword. */
-static inline bool axis_well(const struct axis *axis)
+static inline bool axis_healthy(const struct axis *axis)
 {
-    return axis->fit && !axis->answers.lost && !axis->away;
+    return axis->statusword_ok && !axis->tpdo1.lost && !axis->deviates;
 }
 bool axis_follows(const struct axis *axis); /* enabled, answers, follows its target */
 
 /* Moves no more by its own power: off, in Fault, or it stays in Quick stop active (as a drive without 0x605A may) and
  * has been in one place for AXIS_STANDSTILL_SYNCS. */
-bool axis_left(const struct axis *axis);
+bool axis_has_stopped(const struct axis *axis);
 bool axis_moves(const struct axis *axis);   /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
 bool axis_still(const struct axis *axis);
 
 /* Distance between the position and where it should have been at the same SYNC. */
-uint32_t axis_apart(const struct axis *axis);
+uint32_t axis_deviation_counts(const struct axis *axis);
 
 /* Distance of both target and position from a place, whichever is larger. */
 uint32_t axis_distance(const struct axis *axis, int32_t place_counts);

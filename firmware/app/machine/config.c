@@ -18,6 +18,7 @@ enum {
     TRAVEL_MIN = 0x2006,
     TRAVEL_MAX = 0x2007,
     COUNTS_PER_UNIT = 0x2033,
+    HOMING_SEQUENCE = 0x2034,
     OUTPUTS = 0x2035,
 };
 
@@ -75,6 +76,7 @@ static const struct axis_field axis_fields[] = {
     AXIS_FIELD(0x2031, acceleration_limit_um_s2),
     AXIS_FIELD(0x2032, jerk_limit_mm_s3),
     AXIS_FIELD(COUNTS_PER_UNIT, counts_per_unit),
+    AXIS_FIELD(HOMING_SEQUENCE, homing_sequence),
     AXIS_FIELD(0x2051, expected_vendor),
     AXIS_FIELD(0x2052, expected_product),
     AXIS_FIELD(0x2053, expected_revision),
@@ -146,12 +148,12 @@ static uint32_t at_most_u32(uint64_t value)
 }
 
 /* speed * time * scale, in 32-bit steps that hold the largest result at UINT32_MAX. */
-static uint32_t lag_counts(const struct config *config, uint8_t axis)
+static uint32_t window_counts(const struct config *config, uint8_t axis)
 {
     const struct config_axis *own = &config->axis[axis];
     const bool turns = own->counts_per_unit != 0u;
     const uint64_t lag_nm = (uint64_t)(turns ? own->velocity_limit_um_s : config->feed_limit_um_s) *
-                            CONFIG_LAG_MS; /* um/s * ms */
+                            CONFIG_WINDOW_MS; /* um/s * ms */
     if (lag_nm == 0u || lag_nm > UINT32_MAX) {
         return UINT32_MAX;
     }
@@ -170,8 +172,10 @@ static void read_window(struct config *config, uint8_t axis)
     const struct config_axis *own = &config->axis[axis];
     const bool set = own->following_window_counts != UINT32_MAX;
     const uint32_t timeout_us = own->following_timeout_ms * 1000u;
-    config->apart_counts[axis] = set ? own->following_window_counts : lag_counts(config, axis);
-    config->apart_syncs[axis] = (set ? timeout_us / config->period_us : 0u) + CONFIG_APART_SYNCS;
+    config->deviation_counts[axis] =
+        set ? own->following_window_counts : window_counts(config, axis);
+    config->deviation_syncs[axis] =
+        (set ? timeout_us / config->period_us : 0u) + CONFIG_DEVIATION_SYNCS;
 }
 
 static void read_outputs(struct config_outputs *outputs, const struct od *od)
@@ -244,7 +248,7 @@ bool config_concerns_drives(uint16_t index, uint8_t sub)
     }
     const bool is_feedforward = index >= 0x2018 && index <= 0x201A;
     const bool is_limit = index >= 0x2030 && index <= 0x2032;
-    return !is_feedforward && !is_limit;
+    return !is_feedforward && !is_limit && index != HOMING_SEQUENCE;
 }
 
 bool config_contains(uint16_t index)

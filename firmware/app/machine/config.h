@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* config: what the host has configured (objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2023, 0x2035, 0x2051 ... 0x2053), as
- * one value. */
+/*
+ * config: what the host has configured, as one value: objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2016, 0x2018 ...
+ * 0x201A, 0x201D ... 0x2023, 0x2030 ... 0x2035, 0x2051 ... 0x2053.
+ *
+ * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy (machine.config),
+ * which the main loop replaces under the port's lock at standstill.
+ */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
 
@@ -21,15 +26,16 @@
 #define CONFIG_VELOCITY_FEEDFORWARD 2u
 
 /* The largest lag of a position loop without feedforward, as a time (a gain of 50 / s). */
-#define CONFIG_LAG_MS 20u
+#define CONFIG_WINDOW_MS 20u
 
 /* SYNCs beyond the drive's own time, so that a drive that detects the deviation reports it first. */
-#define CONFIG_APART_SYNCS 5u
+#define CONFIG_DEVIATION_SYNCS 5u
 
 /* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
  * one by its offset. */
 struct config_axis {
     int32_t homing_method;                  /* 0x6098; 0: not homed by the command */
+    uint32_t homing_sequence;               /* axes home in this order; of equal numbers by axis */
     int32_t home_offset_counts;             /* 0x607C */
     uint32_t homing_speed_towards_counts_s; /* 0x6099 sub 1 */
     uint32_t homing_speed_away_counts_s;    /* 0x6099 sub 2 */
@@ -97,10 +103,10 @@ struct config {
     uint32_t turn_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
-     * window and its time where they are set, else the way of CONFIG_LAG_MS at the feed limit, of an axis in degrees at
+     * window and its time where they are set, else the way of CONFIG_WINDOW_MS at the feed limit, of an axis in degrees at
      * its own velocity limit (without one: UINT32_MAX). */
-    uint32_t apart_counts[AXES_MAX];
-    uint32_t apart_syncs[AXES_MAX];
+    uint32_t deviation_counts[AXES_MAX];
+    uint32_t deviation_syncs[AXES_MAX];
 };
 
 /* Copies the present values out of the dictionary. Main loop. */

@@ -25,7 +25,7 @@ const char *fault_text(uint16_t code)
         return "drive did not end its quick stop in time, statusword";
     case FAULT_NOT_SENT:
         return "the bus takes no frames of the controller, ticks in a row";
-    case FAULT_AWAY:
+    case FAULT_POSITION_DEVIATION:
         return "axis is not where its setpoints are, counts";
     case FAULT_SYNC_GAP:
         return "no SYNC for too long with real drives, microseconds";

@@ -17,7 +17,8 @@
 #define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
-#define FAULT_AWAY     (EMCY_MANUFACTURER | 0x08u) /* position and setpoint apart; counts */
+#define FAULT_POSITION_DEVIATION                                                                   \
+    (EMCY_MANUFACTURER | 0x08u)                    /* position and setpoint apart; counts */
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
 #define FAULT_STOP_LATE                                                                            \
     (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */

@@ -78,7 +78,7 @@ void machine_drives_configured(struct machine *machine, bool simulated)
 bool machine_drives_answer(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!machine->axes[i].answers.present) {
+        if (!machine->axes[i].tpdo1.present) {
             return false;
         }
     }
@@ -128,7 +128,7 @@ uint32_t machine_answer_wait_us(const struct machine *machine)
 static bool all_answered(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        const struct tpdo_monitor *answers = &machine->axes[i].answers;
+        const struct tpdo_monitor *answers = &machine->axes[i].tpdo1;
         if (answers->count == 0u && !answers->lost) {
             return false;
         }
@@ -143,7 +143,7 @@ bool machine_awaits_drives(const struct machine *machine)
         return false;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!machine->axes[i].answers.lost) {
+        if (!machine->axes[i].tpdo1.lost) {
             return true;
         }
     }

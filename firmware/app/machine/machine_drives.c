@@ -23,7 +23,7 @@ bool machine_any_moves(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (!axis->answers.lost && axis_moves(axis)) {
+        if (!axis->tpdo1.lost && axis_moves(axis)) {
             return true;
         }
     }
@@ -33,7 +33,7 @@ bool machine_any_moves(const struct machine *machine)
 const struct axis *machine_not_stopped(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_left(&machine->axes[i])) {
+        if (!axis_has_stopped(&machine->axes[i])) {
             return &machine->axes[i];
         }
     }
@@ -44,7 +44,7 @@ const struct axis *machine_not_arrived(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (axis_apart(axis) > config_tolerance_counts(&machine->config, i)) {
+        if (axis_deviation_counts(axis) > config_tolerance_counts(&machine->config, i)) {
             return axis;
         }
     }
@@ -55,7 +55,7 @@ const struct axis *machine_late_drive(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (axis->answers.present && !axis->answers.lost && !axis_reached(axis)) {
+        if (axis->tpdo1.present && !axis->tpdo1.lost && !axis_reached(axis)) {
             return axis;
         }
     }

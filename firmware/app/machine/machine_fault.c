@@ -85,7 +85,7 @@ void machine_switch_off(struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        const bool brakes = axis->answers.lost || axis_moves(axis);
+        const bool brakes = axis->tpdo1.lost || axis_moves(axis);
         axis_command(axis, brakes ? CIA402_GOAL_QUICK_STOP : CIA402_GOAL_OFF);
     }
     machine->fault_phase = MACHINE_FAULT_OFF;

@@ -124,7 +124,7 @@ enum machine_refusal machine_begin_homing(struct machine *machine)
         return MACHINE_DRIVES_ON;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        machine->axes[i].by_itself = true;
+        machine->axes[i].moves_by_drive = true;
     }
     machine->state = MACHINE_HOMING;
     return MACHINE_ACCEPTED;

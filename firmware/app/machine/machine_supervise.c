@@ -10,24 +10,25 @@ static uint16_t trouble_of(const struct axis *axis)
     if (axis_in_fault(axis)) {
         return EMCY_GENERIC;
     }
-    if (axis_dropped_out(axis)) {
+    if (axis_left_operation_enabled(axis)) {
         return FAULT_DROPPED_OUT;
     }
-    const uint16_t trouble = statusword_monitor_trouble(&axis->watch);
-    return trouble == EMCY_NO_ERROR && axis->away ? FAULT_AWAY : trouble;
+    const uint16_t trouble = statusword_monitor_trouble(&axis->statusword_bits);
+    return trouble == EMCY_NO_ERROR && axis->deviates ? FAULT_POSITION_DEVIATION : trouble;
 }
 
 /* With power off drives may come and go: they are found again. */
 static void supervise_axis(struct machine *machine, const struct axis *axis, uint32_t now_us)
 {
     const uint16_t trouble = trouble_of(axis);
-    const uint32_t detail = trouble == FAULT_AWAY ? axis_apart(axis) : axis->statusword;
-    if (machine->state == MACHINE_OFF && axis->answers.lost) {
-        if (axis_gone(axis, now_us)) {
+    const uint32_t detail =
+        trouble == FAULT_POSITION_DEVIATION ? axis_deviation_counts(axis) : axis->statusword;
+    if (machine->state == MACHINE_OFF && axis->tpdo1.lost) {
+        if (axis_lost_for_long(axis, now_us)) {
             machine_enter_boot(machine);
         }
-    } else if (axis->answers.lost) {
-        machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->answers.absent_in_row);
+    } else if (axis->tpdo1.lost) {
+        machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->tpdo1.absent_in_row);
     } else if (trouble != EMCY_NO_ERROR) {
         machine_raise(machine, machine_code_of(axis, trouble), axis->node, detail);
     }
@@ -53,7 +54,7 @@ static bool drives_well(const struct machine *machine)
 {
     bool well = true;
     for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
-        well = well && axis_well(&machine->axes[i]);
+        well = well && axis_healthy(&machine->axes[i]);
     }
     return well;
 }
@@ -65,16 +66,17 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
     bool well = true;
     for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        if (sent && axis->answers.count != 0u) {
-            axis_compare(axis, machine->config.apart_counts[i], machine->config.apart_syncs[i]);
+        if (sent && axis->tpdo1.count != 0u) {
+            axis_compare(axis, machine->config.deviation_counts[i],
+                         machine->config.deviation_syncs[i]);
         }
-        if (!sent || !tpdo_monitor_close_answered(&axis->answers)) {
-            close_unanswered(machine, &axis->answers, now_us);
+        if (!sent || !tpdo_monitor_close_answered(&axis->tpdo1)) {
+            close_unanswered(machine, &axis->tpdo1, now_us);
         }
         if (machine->sync_now) {
             axis_synced(axis);
         }
-        well = well && axis_well(axis);
+        well = well && axis_healthy(axis);
     }
     machine->sync_us = now_us;
     return well;
@@ -99,7 +101,7 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
     }
     for (uint8_t i = 0; i < machine->config.axis_count && machine->state != MACHINE_BOOT; ++i) {
         const struct axis *axis = &machine->axes[i];
-        if (!axis_well(axis)) {
+        if (!axis_healthy(axis)) {
             supervise_axis(machine, axis, now_us);
         }
     }

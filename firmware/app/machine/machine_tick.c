@@ -8,7 +8,7 @@
 static uint8_t silent_node(const struct machine *machine)
 {
     uint8_t i = 0;
-    while (i + 1u < machine->config.axis_count && machine->axes[i].answers.present) {
+    while (i + 1u < machine->config.axis_count && machine->axes[i].tpdo1.present) {
         ++i;
     }
     return machine->axes[i].node;
@@ -42,7 +42,7 @@ static void step_boot(struct machine *machine)
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        tpdo_monitor_restart(&machine->axes[i].answers);
+        tpdo_monitor_restart(&machine->axes[i].tpdo1);
     }
     machine->silent_node = 0;
     machine->state = MACHINE_OFF;
@@ -86,7 +86,7 @@ static void step_arriving(struct machine *machine)
     if (away == NULL) {
         machine->state = MACHINE_READY;
     } else if (++machine->arriving_ticks > MACHINE_ARRIVE_TICKS) {
-        machine_raise(machine, FAULT_AWAY, away->node, axis_apart(away));
+        machine_raise(machine, FAULT_POSITION_DEVIATION, away->node, axis_deviation_counts(away));
     }
 }
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements app/machine/outputs.h (see there): the delay by ticks, and the frame to the I/O module. */
 #include "app/machine/outputs.h"
 
 #include <string.h>

@@ -180,6 +180,8 @@ def load_job(
     scale: float | None = None,
     unit_mm: float | None = None,
     closed: bool = False,
+    block_delete: bool = False,
+    skip_optional_stops: bool = False,
 ) -> Job:
     """The job of a toolpath file: G-code, DXF, SVG or points; the end of its name shows which.
 
@@ -190,10 +192,21 @@ def load_job(
     lift_mm        drawings: how far above the drawing rapid moves are
     scale, unit_mm drawings and points: factor of lengths; length of a unit
     closed         points: back to the first point
+    block_delete   G-code: lines that begin with "/" are left out
+    skip_optional_stops  G-code: M1 is left out
 
     Raises InputError, naming file and line, and PlanError.
     """
     reading = ReadOptions(
-        feed_mm_s, tuple(layers), tuple(ids), gap_mm, lift_mm, scale, unit_mm, closed
+        feed_mm_s,
+        tuple(layers),
+        tuple(ids),
+        gap_mm,
+        lift_mm,
+        scale,
+        unit_mm,
+        closed,
+        block_delete,
+        skip_optional_stops,
     )
     return Job(jobs.load_job(FilePath(file), machine._file, tolerance_mm, reading), machine)

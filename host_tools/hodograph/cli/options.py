@@ -263,7 +263,12 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         metavar="UNIT",
         help="of a drawing or of points: mm, cm, m, um, in, or a number of mm (default: as the file says)",
     )
-    parser.add_argument("--closed", action="store_true", help="of points: return to the first one")
+    for name, text in (
+        ("closed", "of points: return to the first one"),
+        ("block-delete", "of G-code: leave out lines that begin with /"),
+        ("skip-optional-stops", "of G-code: leave out M1"),
+    ):
+        parser.add_argument(f"--{name}", action="store_true", help=text)
 
 
 def kernel(parser: argparse.ArgumentParser) -> None:

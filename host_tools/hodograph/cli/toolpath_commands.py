@@ -19,14 +19,28 @@ from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command
 from .output import note, number, print_json, print_rows, progress, write_file
 
-_OPTIONS = ("tolerance", "feed", "layer", "id", "gap", "lift", "scale", "unit", "closed")
+_OPTIONS = (
+    "tolerance",
+    "feed",
+    "layer",
+    "id",
+    "gap",
+    "lift",
+    "scale",
+    "unit",
+    "closed",
+    "block_delete",
+    "skip_optional_stops",
+)
 
 
 def refuse_toolpath_options(options: Namespace, file: Path) -> None:
     """Raises InputError: options of toolpaths are given with a path file."""
     for name in _OPTIONS:
         if getattr(options, name) not in (None, [], False):
-            raise InputError(f"{file}: --{name} is for toolpaths, not for path files: leave it out")
+            raise InputError(
+                f"{file}: --{name.replace('_', '-')} is for toolpaths, not for path files: leave it out"
+            )
 
 
 def toolpath_job(options: Namespace, file: Path) -> Job:
@@ -51,6 +65,8 @@ def reading_of(options: Namespace) -> ReadOptions:
         scale=options.scale,
         unit_mm=options.unit,
         closed=options.closed,
+        block_delete=options.block_delete,
+        skip_optional_stops=options.skip_optional_stops,
     )
 
 

@@ -2,8 +2,8 @@
 """Whether a drive can do what an axis of a machine needs, object by object.
 
 The objects are those that the controller reads and writes before it switches a drive on (firmware/app/drives), in the
-same order. What the controller writes itself need not be set; what it only can write where the drive has it is named
-with what is lost without it.
+same order. What the controller writes itself need not be set. An object that the controller writes only where the drive
+has it is a note, with what is lost without it. Reads the drive only.
 """
 
 from __future__ import annotations

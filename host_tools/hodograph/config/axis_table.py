@@ -24,13 +24,17 @@ HOMING_METHODS = (0, 17, 18, 19, 20, 21, 22, 35, 37)
 
 @dataclass(frozen=True)
 class Homing:
-    """How `hodograph home` finds this axis' zero; method 0: not at all. Degrees instead of mm where the axis turns."""
+    """How `hodograph home` finds this axis' zero; method 0: not at all. Degrees instead of mm where the axis turns.
+
+    Axes home one after the other, from the lowest `sequence` on, those of one number in the order of the controller.
+    """
 
     method: int = 0
     offset_mm: float = 0.0
     speed_mm_s: float = 10.0
     slow_mm_s: float = 1.0
     acceleration_mm_s2: float = 100.0
+    sequence: int = 0
 
 
 @dataclass(frozen=True)
@@ -139,7 +143,7 @@ _AXIS = (
     "scaling",
     "identity",
 )
-_HOMING = ("method", "offset_mm", "speed_mm_s", "slow_mm_s", "acceleration_mm_s2")
+_HOMING = ("method", "sequence", "offset_mm", "speed_mm_s", "slow_mm_s", "acceleration_mm_s2")
 _FEEDFORWARD = ("velocity", "torque_permille_s2_m", "torque_permille_s_m")
 _IDENTITY = ("vendor", "product", "revision")
 _SCALING = (
@@ -314,6 +318,7 @@ def _homing(axis: _AxisTable, counts_per_unit: int, reach_mm: float) -> Homing:
     slow = _counted(table, "slow_mm_s", min(usual.slow_mm_s, speed), counts_per_unit)
     if slow > speed:
         raise table.error("slow_mm_s", f"is {slow:g}, above {table.key('speed_mm_s')} = {speed:g}")
+    first = axis.table.text("name").lower() == "z"  # the tool leaves the work first
     return Homing(
         method=method,
         offset_mm=table.number("offset_mm", usual.offset_mm, low=-reach_mm, high=reach_mm),
@@ -322,6 +327,7 @@ def _homing(axis: _AxisTable, counts_per_unit: int, reach_mm: float) -> Homing:
         acceleration_mm_s2=_counted(
             table, "acceleration_mm_s2", usual.acceleration_mm_s2, counts_per_unit
         ),
+        sequence=table.table.integer("sequence", 0 if first else 1, low=0, high=15),
     )
 
 

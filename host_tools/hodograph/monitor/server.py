@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""HTTP and WebSocket: the page, messages to it, commands from it."""
+"""The HTTP and WebSocket server of the live page: serves the page, sends it messages, takes its commands.
+
+Runs in the asyncio loop of session.py and does not touch the bus: commands go to the function that it is given.
+"""
 
 from __future__ import annotations
 

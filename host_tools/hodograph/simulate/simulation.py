@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A run of a program without a bus, as fast as it goes."""
+"""Runs a program without a bus: the controller's kernel and the simulated axes, as fast as they go (hodograph.native).
+
+Reads and writes no file. For commands, the report, tuning and the API.
+"""
 
 from __future__ import annotations
 

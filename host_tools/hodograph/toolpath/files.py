@@ -39,6 +39,7 @@ class ReadOptions:
     scale      drawings and points: by which lengths are multiplied
     unit_mm    drawings and points: length of a unit
     closed     points: back to the first point
+    block_delete, skip_optional_stops  G-code: lines that begin with "/" are left out, M1 is left out
     """
 
     feed_mm_s: float | None = None
@@ -49,6 +50,8 @@ class ReadOptions:
     scale: float | None = None
     unit_mm: float | None = None
     closed: bool = False
+    block_delete: bool = False
+    skip_optional_stops: bool = False
 
 
 _OPTIONS_OF = {
@@ -59,6 +62,8 @@ _OPTIONS_OF = {
     "--scale": ("scale", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
     "--unit": ("unit_mm", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
     "--closed": ("closed", POINT_SUFFIXES),
+    "--block-delete": ("block_delete", GCODE_SUFFIXES),
+    "--skip-optional-stops": ("skip_optional_stops", GCODE_SUFFIXES),
 }
 """Options of the command line: their field of ReadOptions, and the kinds of files that they are for."""
 
@@ -90,8 +95,9 @@ def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
 
 def _check_options(file: Path, options: ReadOptions) -> None:
     """Raises InputError: an option is not for files of this kind."""
+    suffix = GCODE_SUFFIXES[0] if is_gcode(file) else file.suffix.lower()
     for option, (name, suffixes) in _OPTIONS_OF.items():
-        if getattr(options, name) not in (None, (), False) and file.suffix.lower() not in suffixes:
+        if getattr(options, name) not in (None, (), False) and suffix not in suffixes:
             raise InputError(f"{file}: {option} is for {', '.join(suffixes)}: leave it out")
 
 
@@ -125,7 +131,12 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
             if is_gcode(file):
                 from .gcode import Options, read_gcode
 
-                yield from read_gcode(lines, str(file), Options(feed_mm_s=options.feed_mm_s))
+                own = Options(
+                    feed_mm_s=options.feed_mm_s,
+                    block_delete=options.block_delete,
+                    optional_stops=not options.skip_optional_stops,
+                )
+                yield from read_gcode(lines, str(file), own)
             else:
                 from .points import read_points
 

@@ -131,11 +131,11 @@ class _LateSdo:
         self._answers: list[bytes] = []
         self.responses = self
         self.asked: list[bytes] = []
-        self.tpdo_monitor_at_once = False
+        self.answers_at_once = False
 
     def send_request(self, request: bytearray) -> None:
         self.asked.append(bytes(request))
-        if self.tpdo_monitor_at_once:
+        if self.answers_at_once:
             self.answer(self.asked[-1])
 
     def answer(self, request: bytes) -> None:
@@ -169,12 +169,30 @@ def test_an_answer_to_nobody_that_is_late_is_not_taken_for_another(
     assert sdo.asked[0] != sdo.asked[1]
     sdo.answer(sdo.asked[0])
     sdo.answer(sdo.asked[1])
-    sdo.tpdo_monitor_at_once = True
+    sdo.answers_at_once = True
     with node.turn():
         assert sdo.empty(), "whatever came before the newest answer is gone"
     with node.turn():
         assert len(sdo.asked) == 3, "and the channel is ours until somebody else has it"
     node.close()
+
+
+def test_questions_of_other_clients_differ(clock: SteppedClock) -> None:
+    """In virtual time they are made from the time: 4.096 ms later too the question is another one."""
+    asked = set()
+    for number in range(200):
+        mine, yours = Turns(BUS, 5), _LateSdo(clock)
+        with mine.turn():
+            pass
+        node = Node(BUS, 5, types.SimpleNamespace(sdo=yours), clock)
+        yours.answers_at_once = True
+        with node.turn():
+            pass
+        asked.add(yours.asked[0])
+        node.close()
+        mine.close()
+        clock.sleep(0.004096)
+        assert len(asked) == number + 1
 
 
 def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(clock: SteppedClock) -> None:
@@ -186,7 +204,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(clock: SteppedC
     with pytest.raises(SdoCommunicationError), node.turn():
         raise SdoCommunicationError("No SDO response received")
     sdo.put(bytes.fromhex("4f02200003000000"))
-    sdo.tpdo_monitor_at_once = True
+    sdo.answers_at_once = True
     with node.turn():
         assert sdo.empty()
     node.close()

@@ -63,7 +63,7 @@ def test_every_key_of_real_drives() -> None:
     assert machine.program_bytes == 129008
     x, y, z = machine.axes
     assert (x.following_window_mm, x.following_timeout_ms, x.quick_stop_mm_s2) == (2, 20, 3000)
-    assert x.homing == Homing(17, -200.0, 20.0, 2.0, 200.0)
+    assert x.homing == Homing(17, -200.0, 20.0, 2.0, 200.0, 1)
     assert x.feedforward == Feedforward(1.0, 12.5, 3.0)
     assert x.scaling == Scaling(131072, 10_000_000, 1, 1)
     assert y.homing.method == 37
@@ -109,6 +109,7 @@ MISTAKES = [
     ("node = 3", "node = 3\nhoming = {speed_mm_s = 3}", r"\[axis 2.homing\] method is missing"),
     ("node = 3", "node = 3\nhoming = {method = 5}", r"\[axis 2.homing\] method must be one of 0, 17, .*but is 5"),
     ("node = 3", "node = 3\nhoming = {method = 17, speed_mm_s = 1, slow_mm_s = 2}", r"slow_mm_s is 2, above"),
+    ("node = 3", "node = 3\nhoming = {method = 17, sequence = 16}", r"sequence must be .*0 to 15"),
     ("node = 3", "node = 3\nhoming = 17", r"\[axis 2\] homing must be a section"),
     ("node = 3", "node = 3\nfeedforward = {velocity = 2.5}", r"\[axis 2.feedforward\] velocity must be from 0 to 2"),
     ("node = 3", "node = 3\nfeedforward = {torque_permille_s_mm = 1}", r'did you mean "torque_permille_s_m"\?'),
@@ -229,7 +230,7 @@ def test_every_key_of_an_axis_that_turns(tmp_path: Path) -> None:
     )
     c = load_machine(file).axes[4]
     assert (c.following_window_mm, c.quick_stop_mm_s2) == (2, 1000)
-    assert c.homing == Homing(17, 3, 4, 0.5, 7)
+    assert c.homing == Homing(17, 3, 4, 0.5, 7, 1)
     assert c.feedforward == Feedforward(1, 8, 9)
 
 

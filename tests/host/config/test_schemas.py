@@ -49,6 +49,7 @@ AXIS: Document = {
     "quick_stop_mm_s2": 3000,
     "homing": {
         "method": 17,
+        "sequence": 2,
         "offset_mm": -100,
         "speed_mm_s": 20,
         "slow_mm_s": 2,

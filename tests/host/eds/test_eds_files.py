@@ -98,6 +98,7 @@ CONTROLLER_OBJECTS = [
     (0x2025, 4, U32, "ro"),
     (0x2026, 6, U8, "ro"),
     (0x2030, 6, U32, "rw"),
+    (0x2034, 6, U8, "rw"),
     (0x2032, 1, U32, "rw"),
     (0x1006, None, U32, "rw"),
     (0x1019, None, U8, "const"),

@@ -72,6 +72,17 @@ def test_every_kind_is_read_with_its_options(
     assert imported(capsys, *words)["length_mm"] == pytest.approx(length_mm, abs=0.05)
 
 
+def test_switches_of_the_operator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Block delete and optional stop, as a machine's panel has them."""
+    file = tmp_path / "part.ngc"
+    file.write_text("F1200\nG1 X10\nM1\n/G1 X30\nX20\nM2\n")
+    both = ("--block-delete", "--skip-optional-stops")
+    assert imported(capsys, str(file))["length_mm"] == pytest.approx(40.0)
+    assert imported(capsys, str(file), *both)["length_mm"] == pytest.approx(20.0)
+    assert imported(capsys, str(file), both[0])["sections"] == 2
+    assert imported(capsys, str(file), *both)["sections"] == 1
+
+
 def test_what_was_left_out_is_a_note(capsys: pytest.CaptureFixture[str]) -> None:
     notes = imported(capsys, "d.svg", "--feed", "20", "--layer", "cut")["notes"]
     assert isinstance(notes, list)
@@ -106,6 +117,10 @@ def test_standard_input_is_gcode() -> None:
         ("simulate d.svg --feed 20 --layer x", 'no layer "x"'),
         ("simulate d.svg --feed 20 --closed", "--closed is for .csv, .txt"),
         ("simulate G.NGC --gap 1", "--gap is for .dxf, .svg"),
+        (
+            "simulate p.csv --feed 20 --skip-optional-stops",
+            "--skip-optional-stops is for .ngc, .nc",
+        ),
         ("simulate none.svg --feed 20", "none.svg: cannot be read: No such file"),
         ("simulate none.csv --feed 20", "none.csv: no such file"),
         ("import part.toml", "part.toml: no toolpath by the end of its name"),

@@ -128,6 +128,7 @@ def _axis(axis: Axis) -> Iterator[tuple[int, int]]:
     yield objects.AXIS_JERK_LIMIT, round(axis.jerk_mm_s3)
     homing, forward, scaling = axis.homing, axis.feedforward, axis.scaling
     yield objects.HOMING_METHOD, homing.method
+    yield objects.HOMING_SEQUENCE, homing.sequence
     yield objects.HOME_OFFSET, counts(homing.offset_mm)
     yield objects.HOMING_SPEED, counts(homing.speed_mm_s)
     yield objects.HOMING_SLOW, counts(homing.slow_mm_s)

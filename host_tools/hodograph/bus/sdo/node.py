@@ -317,8 +317,8 @@ class Node:
 
 
 def _nowhere(number: int) -> bytes:
-    """One of a million objects that no EDS has, as three bytes of an SDO: index and sub-index."""
-    return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 16 & 0xFF)
+    """One of 2^20 objects that no EDS has, by the lowest bits of a number: index and sub-index as in an SDO."""
+    return struct.pack("<HB", NOWHERE | (number & 0xFFF), number >> 12 & 0xFF)
 
 
 def _frame_bytes(index: int, sub: int | None) -> bytes:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/numerics.md 5.6.
 
-With r as a function of x (grid.py) and R1, R2, R3 its derivatives, p = (dx/dt)^2:
+With the position r of an axis in mm as a function of the grid's parameter x (grid.py), its derivatives R1, R2, R3, and
+p = (dx/dt)^2:
 
     velocity R1 sqrt(p)     acceleration R2 p + R1 p'/2     jerk sqrt(p) (R3 p + 3/2 R2 p' + R1 p''/2)
 

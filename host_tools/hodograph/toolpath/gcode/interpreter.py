@@ -406,7 +406,8 @@ class Interpreter:
         if code is None:
             return
         if code in (0, 1):
-            commands.append(ProgramStop(block.line.number, code == 1))
+            if code == 0 or self.options.optional_stops:
+                commands.append(ProgramStop(block.line.number, code == 1))
             return
         commands.append(ProgramEnd(block.line.number))
         self.ended = True

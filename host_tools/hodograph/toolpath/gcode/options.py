@@ -26,6 +26,7 @@ class Options:
     feed_mm_s       feed of moves that have none of their own, in degrees per second where axes turn alone; None:
                     such moves are refused. What F gives is replaced by those who ask for it (job.py).
     block_delete    whether lines that begin with "/" are left out
+    optional_stops  whether M1 stops; False: it is left out
     most_jumps      most subroutine calls and backward jumps of loops; a program that makes more is refused, since its
                     loops may be without end
     fast_path       whether plain straight moves are read without the general interpreter. The moves are the same.
@@ -38,6 +39,7 @@ class Options:
     tools: Mapping[int, Position] | None = None
     feed_mm_s: float | None = None
     block_delete: bool = False
+    optional_stops: bool = True
     most_jumps: int = MOST_JUMPS
     fast_path: bool = True
 
