@@ -62,7 +62,7 @@ def _plane(axes: Axes, pipeline: Pipeline) -> None:
     )
     mark_outputs(axes, pipeline)
     _start(axes, spline)
-    plan_axes(axes)
+    plan_axes(axes, pipeline.drawing_axes)
     axes.margins(0.06)
     axes.set_title(f"{pipeline.file.name}: polygon, nodes, curve")
     axes.legend(loc="best")

@@ -37,7 +37,7 @@ def _plane(axes: Axes, pipeline: Pipeline, motion: Motion, worst: int) -> None:
     axes.plot(set_mm[:, 0], set_mm[:, 1], color=GREY, linewidth=3.5, label="commanded")
     axes.plot(act_mm[:, 0], act_mm[:, 1], color=BLUE, linewidth=1.2, label="actual")
     axes.plot(*act_mm[worst], "o", color=RED, markersize=7, fillstyle="none", label="worst place")
-    plan_axes(axes)
+    plan_axes(axes, pipeline.drawing_axes)
     axes.set_title(f"{pipeline.file.name}: commanded and actual path")
     axes.legend(loc="best")
 
