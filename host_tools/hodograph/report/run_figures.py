@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from ..pipeline import Pipeline
 from ..simulate import Motion
+from .output_marks import mark_switching_times
 from .style import BLUE, GREEN, GREY, ORANGE, RED, SOFT, plan_axes, png
 
 ALLOWED_UM = 30.0
@@ -98,6 +99,7 @@ def error_axes(axes: Axes, motion: Motion, worst: int) -> None:
     axes.set_xlabel("time, s (dashed: last setpoint, then settling)")
     axes.set_ylabel("contour error, µm")
     axes.set_title("distance of the encoder position from the exact curve")
+    mark_switching_times(axes, motion)
 
 
 def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:

@@ -13,6 +13,7 @@ from ..config import SpacePathSpec
 from ..pipeline import Pipeline
 from ..simulate import Motion
 from ..spline.spatial import SpatialPHSpline
+from .output_marks import mark_outputs
 from .run_figures import error_axes
 from .style import BLUE, GREY, ORANGE, RED, png
 
@@ -34,6 +35,7 @@ def space_path_figure(pipeline: Pipeline) -> bytes:
     view = _isometric(figure, grid[0, 0], pipeline)
     view.plot(*given.T, "o", color=ORANGE, markersize=4, label="given points")
     view.plot(*curve, color=BLUE, linewidth=1.6, label="C2 PH quintic spline")
+    mark_outputs(view, pipeline)
     view.legend(loc="best")
     curvature = figure.add_subplot(grid[0, 1])
     curvature.plot(s_mm, np.abs(spline.curvature(s_mm)), color=BLUE)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Whether a machine has the outputs that a job switches, and whether the job turns axes: found before anything moves.
 
-A toolpath is read part by part while the machine moves, so an output that the machine does not have, or a move of A, B
-or C, would be found in motion. A scan of the text of G-code costs far less than reading it. It knows numbers only: where
-it is not sure that all is well (an expression, a number that the machine does not have, a place of A, B or C that is not
-0), the file is read once as it will be read in motion, which gives the message. So the scan may be wrong to one side
-only.
+A toolpath is read part by part while the machine moves, so an output that the machine does not have, or a move of A,
+B or C, would be found in motion. A scan of the text of G-code costs far less than reading it. It knows numbers only:
+where it is not sure that all is well (an expression, a number that the machine does not have, a place of A, B or C that
+is not 0), the file is read once as it will be read in motion, which gives the message. So the scan may be wrong to one
+side only.
 """
 
 from __future__ import annotations
