@@ -33,7 +33,7 @@ from hodograph.native import NativeProgram
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import encode
-from hodograph.report.path_figures import mark_outputs
+from hodograph.report.output_marks import mark_outputs
 from hodograph.report.style import BLUE, GREEN, GREY, INK, ORANGE, RED, SOFT, styled
 from hodograph.simulate import simulate_on
 from hodograph.toolpath.files import ReadOptions, read_toolpath

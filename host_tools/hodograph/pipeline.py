@@ -12,9 +12,11 @@ from time import perf_counter
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .config import (
     PLANE_AXES,
+    SPACE_AXES,
     Drive,
     Machine,
     PathFile,
@@ -252,6 +254,21 @@ class Pipeline:
     given_machine: Path | Machine | None = None
     """A machine, or its file, that replaces the one the path file names."""
 
+    @property
+    def standing_mm(self) -> tuple[float, ...]:
+        """Where the axes of the path before those of the program stand, without the work offset."""
+        return ()
+
+    @property
+    def whole_machine(self) -> Machine:
+        """The machine with all axes of its path, also where the program turns some of them alone."""
+        return self.machine
+
+    @property
+    def unit(self) -> str:
+        """Of lengths of the path: "mm", or "deg" where the program turns axes alone."""
+        return "mm"
+
     @cached_property
     def machine_or_none(self) -> Machine | None:
         """The machine, None when none is named."""
@@ -326,12 +343,7 @@ class Pipeline:
         spline, machine = self.found_spline.spline, self.machine_or_none
         axes = spline.axes if machine is None else len(machine.path_axes)
         if axes < spline.axes:
-            one, every = ("only two", "three") if axes == 2 else (f"{axes}", f"{spline.axes}")
-            raise InputError(
-                f"{self.file.file}: [path] has points [{', '.join(AXES[: spline.axes])}], but {one} axes of the "
-                f"machine follow a path: name {every} of them, path = [...], at the top of its file, or give "
-                f"points [{', '.join(AXES[:axes])}]"
-            )
+            raise _too_few_axes(self.file, spline.axes, axes)
         if isinstance(spline, PHSpline):
             if axes == PLANE_AXES:
                 return spline
@@ -485,6 +497,108 @@ class Pipeline:
         )
         return (*found.notes, *plan.notes, *excesses, *idle)
 
+    @property
+    def drawing_axes(self) -> tuple[str, ...]:
+        """The axes that draw the path with their units, for figures."""
+        machine = self.machine
+        named = zip(machine.path_names, machine.path_units, strict=True)
+        return tuple(f"{name}, {unit}" for name, unit in named)[:SPACE_AXES]
+
+
+@dataclass(frozen=True, eq=False)
+class TurningPipeline(Pipeline):
+    """A pipeline of a path on which axes turn alone, while x, y and z rest: its machine is `Machine.turning`, and its
+    points are those of the axes that the program moves. Lengths and feeds are in degrees.
+    """
+
+    given_whole: Machine | None = None
+    given_standing_mm: tuple[float, ...] = ()
+
+    @property
+    def standing_mm(self) -> tuple[float, ...]:
+        """Where the axes before those of the program stand."""
+        return self.given_standing_mm
+
+    @property
+    def whole_machine(self) -> Machine:
+        """The machine with all axes of its path."""
+        return self.machine if self.given_whole is None else self.given_whole
+
+    @property
+    def unit(self) -> str:
+        """Of lengths of the path."""
+        return "deg"
+
+
+def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeline:
+    """The pipeline of a path file, on its own machine or on this one.
+
+    Raises InputError: the path turns axes alone, and the machine does not have them.
+    """
+    plain, path = Pipeline(file, machine), file.given_path
+    if not (isinstance(path, SpacePathSpec) and path.turns_alone):
+        return plain
+    whole = plain.machine_or_none
+    count = path.axes if whole is None else len(whole.path_axes)
+    if count < path.axes:
+        raise _too_few_axes(file, path.axes, count)
+    first = min(SPACE_AXES, count - PLANE_AXES)
+    points = np.concatenate((path.points, path.extra), axis=1)
+    still = np.zeros((len(points), count - path.axes))
+    moved = np.concatenate((points, still), axis=1)[:, first:]
+    _require_one_way(file, moved, path.closed)
+    limits = replace(
+        file.limits, axis=file.limits.axis.behind(first), names=AXES[: path.axes - first]
+    )
+    return TurningPipeline(
+        replace(file, given_path=_drawn_by(path, moved), limits=limits),
+        None if whole is None else whole.turning,
+        whole,
+        tuple(path.points[0, :first].tolist()),
+    )
+
+
+def _require_one_way(file: PathFile, moved: NDArray[np.float64], closed: bool) -> None:
+    """Raises PlanError: the only axis that turns turns back, which a smooth curve does by a loop of another axis."""
+    turning = np.flatnonzero(np.ptp(moved, axis=0))
+    step = np.diff(moved[:, turning[0]])
+    back = np.flatnonzero(np.sign(step) == -np.sign(step[step != 0.0][0]))
+    if turning.size > 1 or not (closed or back.size):
+        return
+    place = "a closed path" if closed else f"point {back[0]}"
+    raise PlanError(
+        f"{file.file}: [path] the only axis that turns turns back at {place}: end the path there, and give the way "
+        "back a file of its own"
+    )
+
+
+def start_counts(pipeline: Pipeline, kernel: str) -> list[int]:
+    """Where all axes of the machine's path stand at the start of the program, in counts."""
+    whole, standing = pipeline.whole_machine, pipeline.standing_mm
+    _, first = pipeline.accepted.setpoints(kernel, pipeline.machine.path_counts, 0, 1)
+    before = [
+        round((at + offset) * counts)
+        for at, offset, counts in zip(standing, whole.offset_mm, whole.path_counts, strict=False)
+    ]
+    return [*before, *first[0].tolist()]
+
+
+def _drawn_by(path: SpacePathSpec, moved: NDArray[np.float64]) -> PathSpec | SpacePathSpec:
+    """A path on which axes turn alone, drawn by the axes (n, 2 or 3) of its program."""
+    if moved.shape[1] > PLANE_AXES:
+        return replace(path, points=moved, extra=np.zeros((0, 0)))
+    plane = moved[:, 0] + 1j * moved[:, 1]
+    return PathSpec(path.closed, plane, path.through, path.ends, None, None, path.knots)
+
+
+def _too_few_axes(file: PathFile, points: int, axes: int) -> InputError:
+    one, every = ("only two", "three") if axes == PLANE_AXES else (f"{axes}", f"{points}")
+    return InputError(
+        f"{file.file}: [path] has points [{', '.join(AXES[:points])}], but {one} axes of the "
+        f"machine follow a path: name {every} of them, path = [...], at the top of its file, or give "
+        f"points [{', '.join(AXES[:axes])}]"
+    )
+
 
 @contextmanager
 def _named_by(place: str) -> Iterator[None]:
@@ -503,4 +617,4 @@ def load_pipeline(
     found = load_path_file(file)
     if not allow_space:
         found.require_planar()
-    return Pipeline(found, machine)
+    return pipeline_of(found, machine)

@@ -287,6 +287,9 @@ def _feed() -> Schema:
                 LEAST_FEED_MM_S,
                 GREATEST_FEED_MM_S,
             ),
+            "nominal_deg_s": _number(
+                "The same on a path that turns axes alone", LEAST_FEED_MM_S, GREATEST_FEED_MM_S
+            ),
             "ramp_time_s": _number("Duration of a feed ramp", LEAST_RAMP_S, GREATEST_RAMP_S),
             "n_c": {
                 "anyOf": [{"const": "optimise"}, _number("A number", 0, GREATEST_N_C)],
@@ -297,7 +300,10 @@ def _feed() -> Schema:
         },
         more={
             "if": {"properties": {"profile": {"const": OPTIMAL}}, "required": ["profile"]},
-            "else": {"required": ["nominal_mm_s", "ramp_time_s"]},
+            "else": {
+                "required": ["ramp_time_s"],
+                "anyOf": [{"required": ["nominal_mm_s"]}, {"required": ["nominal_deg_s"]}],
+            },
         },
     )
 
@@ -319,6 +325,9 @@ def _limits() -> Schema:
             "feed_mm_s": _number("Greatest feed", *FEED),
             "acceleration_mm_s2": _number("Greatest acceleration along the path", *ACCELERATION),
             "jerk_mm_s3": _number("Greatest jerk along the path", *JERK),
+            "feed_deg_s": _number("Greatest feed of a path that turns axes alone", *FEED),
+            "acceleration_deg_s2": _number("Greatest acceleration along it", *ACCELERATION),
+            "jerk_deg_s3": _number("Greatest jerk along it", *JERK),
             "centripetal_mm_s2": _number("Greatest feed squared times curvature", *ACCELERATION),
             "volts": _number("Greatest volts of each axis, by its drive file", 1e-3, 1e3),
             "policy": _choice("Lower the feed, or run as asked and report", POLICIES, "respect"),

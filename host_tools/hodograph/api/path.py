@@ -22,7 +22,7 @@ from ..feed.limits import LEAST_RESERVE
 from ..feed.request import OPTIMAL, PROFILES
 from ..job import JobSection, SectionPipeline
 from ..names import AXES
-from ..pipeline import Pipeline
+from ..pipeline import Pipeline, pipeline_of
 from ..spline import PHSpline, coordinates
 from ..spline.frames import frames
 from ..spline.spatial import SpatialPHSpline
@@ -139,7 +139,8 @@ class Path:
         name: str = "path",
     ) -> Path:
         """The path through points (n, A): x, y, or x, y, z, or these and up to three extra axes, in degrees where they
-        turn.
+        turn. Where x, y and z are the same at all points, the other axes turn alone: they draw the path, and its
+        lengths and feeds are in degrees.
 
         closed         the end is the start; each point is given once, 3 or more
         ends           of an open path: "cubic", or "natural" (no curvature)
@@ -176,7 +177,7 @@ class Path:
 
     @property
     def axes(self) -> int:
-        """A: 2 in the plane, 3 in space, 4 to 6 with extra axes."""
+        """A: 2 in the plane, 3 in space, 4 to 6 with extra axes; where axes turn alone, those that draw the path."""
         return int(self.node_points_mm.shape[1])
 
     @property
@@ -253,11 +254,13 @@ class Path:
             raise InputError(f'plan: profile "{profile}" needs nominal_mm_s and ramp_time_s')
         else:
             feed = FeedRequest(profile, nominal_mm_s or 0.0, ramp_time_s or 0.0, n_c, degree)
-        given = FileLimits() if limits is None else _file_limits(limits, self.axes)
+        path = self._file.given_path
+        count = path.axes if isinstance(path, SpacePathSpec) else self.axes
+        given = FileLimits() if limits is None else _file_limits(limits, count)
         file = replace(self._file, feed=feed, limits=given, machine_file=None)
         on = None if machine is None else machine._file
         if self._fitted is None:
-            return Plan(self, machine, Pipeline(file, on))
+            return Plan(self, machine, pipeline_of(file, on))
         if on is None:
             raise InputError(f"{self.name}: a path of a toolpath needs machine= to be planned")
         return Plan(self, machine, SectionPipeline(file, on, self._fitted))
@@ -355,7 +358,7 @@ def load_path(file: str | PathLike[str]) -> Path:
 
 def path_of(file: PathFile) -> Path:
     """The path that a path file describes."""
-    pipeline = Pipeline(file)
+    pipeline = pipeline_of(file)
     found = pipeline.found_spline
     return Path(file, found.spline, found.notes)
 
@@ -436,7 +439,7 @@ def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan
         known = Pipeline(found).machine_or_none
         machine = None if known is None else Machine(known)
     return Plan(
-        path_of(found), machine, Pipeline(found, None if machine is None else machine._file)
+        path_of(found), machine, pipeline_of(found, None if machine is None else machine._file)
     )
 
 

@@ -12,6 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..config import SPACE_AXES
+from ..config import Machine as MachineFile
 from ..errors import InputError
 from ..native import NativeProgram
 from ..pipeline import controller_verdict
@@ -128,7 +130,7 @@ class Program:
     machine: Machine
 
     def __post_init__(self) -> None:
-        fault = controller_verdict(self._native, self.machine._file)
+        fault = controller_verdict(self._native, self._moved)
         if fault is not None:
             raise InputError(
                 f"program image: {fault.text} (code {fault.code}, number {fault.index}): "
@@ -138,6 +140,16 @@ class Program:
     @cached_property
     def _native(self) -> NativeProgram:
         return NativeProgram(self.image)
+
+    @property
+    def _moved(self) -> MachineFile:
+        """The machine, with the axes that the program moves. Raises InputError: it has none to turn alone."""
+        whole = self.machine._file
+        if not self._native.first_axis:
+            return whole
+        if whole.path_count <= SPACE_AXES:
+            raise InputError("program image: turns axes alone, which the machine does not have")
+        return whole.turning
 
     @property
     def ticks(self) -> int:
@@ -156,7 +168,7 @@ class Program:
 
     def setpoints_counts(self, kernel: Kernel | None = None) -> NDArray[np.int32]:
         """All setpoints in counts (ticks, A), as the controller computes them. `kernel` None: the machine's."""
-        machine = self.machine._file
+        machine = self._moved
         _, counts = self._native.setpoints(kernel or machine.kernel, machine.path_counts)
         return counts
 
@@ -165,7 +177,7 @@ class Program:
 
         Raises InputError when an axis of the machine has no drive file.
         """
-        return Run(simulate_on(self.machine._file, self._native, kernel))
+        return Run(simulate_on(self._moved, self._native, kernel))
 
     def save(self, file: str | PathLike[str]) -> None:
         """Writes the image. Raises OSError."""

@@ -116,17 +116,23 @@ def run_program(
     record: Path | None = None,
     *,
     unhomed: bool = False,
+    on: Machine | None = None,
+    start: list[int] | None = None,
 ) -> BusRun:
     """Runs a program image from wherever the axes stand, and analyses the recording, which is kept in `record`.
-    `unhomed`: also when axes with a homing method are not homed.
+
+    unhomed    also when axes with a homing method are not homed
+    on, start  the machine with all axes of its path, and where these start, in counts; None: those of the program
 
     Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
     not those that the same kernel gives here.
     """
-    program = NativeProgram(image)
-    _, start = program.setpoints(kernel, machine.path_counts, 0, 1)
-    bring_up(at, machine, kernel)
-    goto(at.controller, machine, start[0].tolist(), unhomed=unhomed)
+    whole = on or machine
+    if start is None:
+        _, first = NativeProgram(image).setpoints(kernel, machine.path_counts, 0, 1)
+        start = first[0].tolist()
+    bring_up(at, whole, kernel)
+    goto(at.controller, whole, start, unhomed=unhomed)
     recorded = record_program(at, machine, image, progress, unhomed=unhomed)
     return analysed(at, machine, image, kernel, recorded, record)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Length of classic CAN frames in bits (ISO 11898-1), stuff bits included; docs/reference/bus-time.md section 1.
+"""Length of CAN frames in bits (ISO 11898-1), stuff bits included; docs/reference/bus-time.md sections 1 and 2.1.
 
 From the start bit to the last bit of the CRC a complementary bit follows every five equal bits; delimiters,
 acknowledgement, end of frame and the three bits of intermission are never stuffed. A length here counts them all,
@@ -44,6 +44,25 @@ def worst_bits(identifier: int, size: int) -> int:
     stuffed, run = _stuff_count(header)
     free = 8 * size + CRC_BITS - (5 - int(run[0]))
     return plain_bits(size) + int(stuffed[0]) + (1 + free // 4 if free >= 0 else 0)
+
+
+_FD_HEADER_BITS = 17
+"""At the nominal bit rate: start bit, identifier, RRS, IDE, FDF, a reserved bit, BRS."""
+_FD_CONTROL_BITS = 5
+"""At the data bit rate: ESI, DLC."""
+_FD_CRC_BITS = 4 + 17 + 6
+"""At the data bit rate: stuff count, CRC-17, and the fixed stuff bits of both; frames of up to 16 bytes."""
+
+
+def fd_bits(size: int, *, stuffed: bool) -> tuple[int, int]:
+    """Bits of a CAN FD base frame with `size` (0 … 8) data bytes, at the nominal and at the data bit rate.
+
+    stuffed  with as many stuff bits as can be, most of them at the nominal bit rate; else without one
+    """
+    inside = _FD_HEADER_BITS + _FD_CONTROL_BITS + 8 * size
+    every, slow = ((inside - 1) // 4, (_FD_HEADER_BITS - 1) // 4) if stuffed else (0, 0)
+    fast = _FD_CONTROL_BITS + 8 * size + _FD_CRC_BITS
+    return _FD_HEADER_BITS + slow + UNSTUFFED_BITS, fast + every - slow
 
 
 def exact_bits(frames: NDArray[Any]) -> NDArray[np.int64]:

@@ -3,10 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from .frame_bits import fd_bits
 from .response import Task, response_time
 from .traffic import CYCLIC, NEEDED, SDO, SPORADIC, Message, sync_bits
 
@@ -25,6 +26,8 @@ class BusTime:
     """Periodic frames on a bus of `bitrate` bit/s, with SDO frames in between at any time.
 
     Every length is the greatest that the frame can have. Times of `messages` run from the tick's request to send SYNC.
+
+    data_bitrate  CAN FD: bit rate of data and CRC, `bitrate` or a multiple of it that divides 10^6; 0: classic CAN
     """
 
     messages: tuple[Message, ...]
@@ -32,34 +35,36 @@ class BusTime:
     period_us: int
     reaction_us: int = DRIVE_REACTION_US
     compute_us: int = COMPUTE_US
+    data_bitrate: int = 0
 
     @property
     def load_percent(self) -> float:
         """Bus load of all frames with worst-case stuffing, inputs changing all the time."""
-        return self._percent((m, m.worst_bits) for m in self.messages)
+        return self._percent(self.messages, self._length)
 
     @property
     def plain_load_percent(self) -> float:
         """The same without a single stuff bit and with inputs at rest: no run can be below."""
-        return self._percent((m, _least_bits(m)) for m in self.messages)
+        return self._percent(self.messages, self._least_length)
 
     def load_of(self, kind: str) -> tuple[float, float]:
         """Load in per cent of one kind of frames: without stuff bits, and at worst."""
         own = [m for m in self.messages if m.kind == kind]
-        return (
-            self._percent((m, _least_bits(m)) for m in own),
-            self._percent((m, m.worst_bits) for m in own),
-        )
+        return self._percent(own, self._least_length), self._percent(own, self._length)
 
-    def _percent(self, frames: Iterable[tuple[Message, int]]) -> float:
-        return sum(100e6 * bits / (m.period_us * self.bitrate) for m, bits in frames)
+    def _percent(self, frames: Iterable[Message], length: Callable[[Message], int]) -> float:
+        return sum(100.0 * length(m) / (m.period_us * self.bitrate) for m in frames)
 
     @property
     def sync_jitter_us(self) -> float:
         """How much the end of SYNC moves about: a frame in the way, and the stuffing of its counter."""
-        least, greatest = sync_bits()
         sync = self.messages[0]
-        return (self._blocking(sync) + _SCALE * (greatest - least)) / self.bitrate
+        if self.data_bitrate:
+            stuffing = self._length(sync) - self._least_length(sync)
+        else:
+            least, greatest = sync_bits()
+            stuffing = _SCALE * (greatest - least)
+        return (self._blocking(sync) + stuffing) / self.bitrate
 
     @cached_property
     def responses_us(self) -> tuple[float | None, ...]:
@@ -86,7 +91,20 @@ class BusTime:
     # Below: integers in units of 1 us / bitrate, so that bits and microseconds are both whole.
 
     def _length(self, message: Message) -> int:
+        if self.data_bitrate:
+            return self._fd_length(message, stuffed=True)
         return message.worst_bits * _SCALE
+
+    def _least_length(self, message: Message) -> int:
+        if message.kind in SPORADIC:
+            return 0
+        if self.data_bitrate:
+            return self._fd_length(message, stuffed=False)
+        return message.plain_bits * _SCALE
+
+    def _fd_length(self, message: Message, *, stuffed: bool) -> int:
+        slow, fast = fd_bits(message.size, stuffed=stuffed)
+        return slow * _SCALE + fast * (_SCALE * self.bitrate // self.data_bitrate)
 
     def _blocking(self, message: Message) -> int:
         behind = [m for m in self.messages if m.identifier > message.identifier]
@@ -126,7 +144,3 @@ class BusTime:
         elif message.kind in CYCLIC and message.kind != "SYNC":
             jitter = self._sync_end + self.reaction_us * self.bitrate
         return Task(self._length(message), message.period_us * self.bitrate, jitter)
-
-
-def _least_bits(message: Message) -> int:
-    return 0 if message.kind in SPORADIC else message.plain_bits

@@ -192,6 +192,11 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
     for name in _list(root, raw, "paths", '["path.toml"]'):
         one = Table(root.file, "", {"paths": name}, ("paths",))
         path = load_path_file(one.present("paths"))
+        if path.turns_alone:
+            raise one.error(
+                "paths",
+                f"names {path.file}, which turns axes alone: a campaign takes paths of x and y",
+            )
         pipeline = Pipeline(path, machine)
         pipeline.feed  # noqa: B018  (says what is missing)
         found.append(Source(path, pipeline.machine))

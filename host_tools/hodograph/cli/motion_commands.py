@@ -18,14 +18,15 @@ from ..config import SPACE_AXES, Machine, load_machine, read_toml
 from ..errors import InputError
 from ..names import is_toolpath
 from ..native import NativeProgram
-from ..pipeline import load_pipeline, program_limits
+from ..pipeline import load_pipeline, program_limits, start_counts
 from .bus_commands import reached, stopping
 from .output import duration_text, note, print_json, print_rows, progress, size_text
 from .path_commands import motion_rows, print_notes, read_image
 from .targets import DEFAULT_BITRATE
 
 
-def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
+def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None, list[int] | None]:
+    """The image, its machine, and where all axes of the path stand at the start of the program, where that is known."""
     image = read_image(options.file)
     if image is not None:
         machine = load_machine(options.machine) if options.machine else None
@@ -33,18 +34,19 @@ def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None]:
             program_limits(machine)
             require_axes(NativeProgram(image), machine)
             require_fit(machine)
-        return image, machine
+        return image, machine, None
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
-    require_fit(pipeline.machine)
+    machine = pipeline.whole_machine
+    require_fit(machine)
     image = pipeline.image
     print_notes(pipeline, pipeline.compilation.plan)
-    return image, pipeline.machine
+    return image, machine, start_counts(pipeline, options.kernel or machine.kernel)
 
 
 def upload(options: Namespace) -> None:
     """hodograph upload."""
     address = bus_address(options.bus)
-    image, machine = _image_and_machine(options)
+    image, machine, _ = _image_and_machine(options)
     node, bitrate = (machine.node, machine.bitrate) if machine else (1, DEFAULT_BITRATE)
     with reached(address, node, bitrate, options.wait) as controller:
         if machine is not None:
@@ -66,15 +68,17 @@ def goto(options: Namespace) -> None:
     """hodograph goto."""
     address = bus_address(options.bus)
     image: bytes | None = None
+    end: list[int] | None = None
     if options.to is None:
-        image, named = _image_and_machine(options)
+        image, named, end = _image_and_machine(options)
         if named is None:
             raise InputError(f"{options.file}: a program image needs --machine FILE")
         machine = named
     else:
         machine = machine_of(options.file, options.machine)
         require_fit(machine)
-    end = _end_counts(options, machine, image)
+    if end is None or options.z is not None:
+        end = _end_counts(options, machine, image)
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
         controller.require_standing()
         controller.configure(machine, options.kernel or machine.kernel)
@@ -113,7 +117,8 @@ def require_axes(program: NativeProgram, machine: Machine) -> None:
     """Raises InputError: the program has more path axes than the machine, or turns axes alone."""
     if program.first_axis:
         raise InputError(
-            "the program turns axes alone, as a section of a toolpath: hodograph run takes the toolpath"
+            "the program turns axes alone, and does not hold where x, y and z stand: give its path file, or "
+            "hodograph run its toolpath"
         )
     if program.axis_count > len(machine.path_axes):
         raise InputError(
@@ -128,7 +133,7 @@ def machine_of(file: Path, given: Path | None) -> Machine:
         return load_machine(given)
     if not is_toolpath(file) and ("axis" in (data := read_toml(file)) or "path" not in data):
         return load_machine(file)
-    return load_pipeline(file, allow_space=True).machine
+    return load_pipeline(file, allow_space=True).whole_machine
 
 
 def print_run(title: str, result: BusRun) -> None:

@@ -40,7 +40,7 @@ from .toolpath_commands import refuse_toolpath_options, section_pipeline, simula
 def spline(options: Namespace) -> None:
     """hodograph spline."""
     pipeline = load_pipeline(options.file, allow_space=True)
-    found = pipeline.found_spline
+    found, unit = pipeline.found_spline, pipeline.unit
     curve = found.spline
     for line in found.notes:
         note(f"{options.file.name}: {line}")
@@ -60,7 +60,7 @@ def spline(options: Namespace) -> None:
         "bending_ratio": found.bending_ratio,
     }
     if options.at is not None:
-        s = np.atleast_1d(_within("--at", options.at, curve.length_mm, "mm"))
+        s = np.atleast_1d(_within("--at", options.at, curve.length_mm, unit))
         result["points"] = _places(curve, s)
         result["tangents"] = coordinates(curve.tangent(s)).tolist()
         result["curvatures"] = curve.curvature(s).tolist()
@@ -72,23 +72,25 @@ def spline(options: Namespace) -> None:
     print_rows(
         [
             ("path", f"{'closed' if curve.closed else 'open'}, {curve.segment_count} segments"),
-            ("length", f"{number(curve.length_mm)} mm"),
-            ("greatest curvature", f"{number(curve.max_curvature_per_mm())} /mm"),
+            ("length", f"{number(curve.length_mm)} {unit}"),
+            ("greatest curvature", f"{number(curve.max_curvature_per_mm())} /{unit}"),
             ("Newton iterations", str(found.newton_iterations)),
         ]
     )
     if options.at is not None:
-        _print_places(curve, s)
+        _print_places(curve, s, unit)
 
 
-def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> None:
-    columns = [("curvature /mm", curve.curvature(s))]
+def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64], unit: str) -> None:
+    columns = [(f"curvature /{unit}", curve.curvature(s))]
     if isinstance(curve, SpatialPHSpline):
-        columns.append(("torsion /mm", curve.torsion(s)))
+        columns.append((f"torsion /{unit}", curve.torsion(s)))
     points = np.array(_places(curve, s))
-    own = [*(f"{axis} mm" for axis in "xyz"), "axis 4", "axis 5", "axis 6"][: points.shape[1]]
+    first = 1 if unit == "mm" else 4
+    own = [f"{axis} mm" for axis in "xyz"] if unit == "mm" else []
+    own += [f"axis {first + k}" for k in range(len(own), points.shape[1])]
     names = own + [name for name, _ in columns]
-    print(f"{'s mm':>12} " + " ".join(f"{name:>16}" for name in names))
+    print(f"{f's {unit}':>12} " + " ".join(f"{name:>16}" for name in names))
     for at, row in zip(s, np.column_stack((points, *(v for _, v in columns))), strict=True):
         print(f"{at:12.6g} " + " ".join(f"{value:16.9f}" for value in row))
 
@@ -155,31 +157,31 @@ def _feed_document(
 
 
 def _print_feed(pipeline: Pipeline, program: Program | None, at_s: np.ndarray | None) -> None:
-    plan = pipeline.plan
+    plan, unit = pipeline.plan, pipeline.unit
     slope = "" if plan.n_c is None else f", n_c {plan.n_c:.6g} ({plan.evaluations} evaluations)"
     ramps = [] if plan.ramp_time_s is None else [("ramps", f"{number(plan.ramp_time_s)} s")]
     print_rows(
         [
             ("profile", plan.profile + slope),
-            ("feed", f"{number(plan.feed_mm_s)} mm/s"),
+            ("feed", f"{number(plan.feed_mm_s)} {unit}/s"),
             *ramps,
             ("duration", duration_text(plan.duration_s)),
             ("planned in", duration_text(pipeline.planning_s)),
-            ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} mm/s^2"),
-            ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} mm/s^3"),
+            ("peak acceleration", f"{number(plan.peak_acceleration_mm_s2)} {unit}/s^2"),
+            ("peak jerk", f"{number(plan.peak_jerk_mm_s3)} {unit}/s^3"),
         ]
     )
     if program is not None:
-        for line in stops_text(program.stops, program.piece_starts_mm):
+        for line in stops_text(program.stops, program.piece_starts_mm, pipeline.unit):
             print(line)
-    print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {'at mm':>12}")
+    print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {f'at {unit}':>12}")
     for name, peak in pipeline.peaks.items():
         print(
             f"{name:28} {peak.value:12.6g} {peak.limit.given:12.6g} "
             f"{100.0 * peak.value / peak.limit.given:8.2f} {peak.s_mm:12.6g}"
         )
     if at_s is not None:
-        print(f"{'t s':>12} {'arc length mm':>16} {'feed mm/s':>16}")
+        print(f"{'t s':>12} {f'arc length {unit}':>16} {f'feed {unit}/s':>16}")
         for at, s, v in zip(at_s, plan.arc_length(at_s), plan.feed(at_s), strict=True):
             print(f"{at:12.6g} {s:16.9f} {v:16.9f}")
 
@@ -202,7 +204,7 @@ def compile_(options: Namespace) -> None:
     else:
         refuse_toolpath_options(options, options.file)
         pipeline = load_pipeline(options.file, options.machine, allow_space=True)
-    require_fit(pipeline.machine)
+    require_fit(pipeline.whole_machine)
     image = pipeline.image
     print_notes(pipeline, pipeline.compilation.plan)
     output = options.output or Path(pipeline.file.name + ".hdgp")
@@ -216,7 +218,7 @@ def compile_(options: Namespace) -> None:
         f"{output}: {size_text(len(image))}, {program.segment_count} segments, {program.piece_count} feed "
         f"pieces, {program.ticks} ticks of {program.period_us} us"
     )
-    for line in stops_text(program.stops, program.piece_starts_mm):
+    for line in stops_text(program.stops, program.piece_starts_mm, pipeline.unit):
         print(line)
 
 
@@ -324,7 +326,7 @@ def simulate_(options: Namespace) -> None:
         return
     print_rows(motion_rows(motion))
     if stops:
-        _print_stops(stops)
+        _print_stops(stops, pipeline.unit)
 
 
 def _shortest(value: float) -> str:
@@ -348,10 +350,11 @@ def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> 
     )
 
 
-def _print_stops(stops: list[StoppedRun]) -> None:
+def _print_stops(stops: list[StoppedRun], unit: str) -> None:
+    off = "contour um" if unit == "mm" else "mdeg"
     print(
-        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {'way mm':>9} {'mm/s^2':>9} {'mm/s^3':>9} "
-        f"{'contour um':>10}"
+        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {f'way {unit}':>9} {f'{unit}/s^2':>9} "
+        f"{f'{unit}/s^3':>9} {off:>10}"
     )
     for stop in stops:
         most = {
@@ -374,9 +377,10 @@ def motion_rows(motion: Motion) -> list[tuple[str, str]]:
     """A run's results for people."""
     mdeg = motion.max_following_error_mdeg
     turning = "" if mdeg is None else f", {mdeg:.1f} mdeg"
+    off = "mdeg" if motion.turns_alone else "um"
     return [
         ("ticks", f"{motion.ticks} of {motion.period_us} us, kernel {motion.kernel}"),
-        ("greatest contour error", f"{motion.max_contour_error_um:.3f} um"),
+        ("greatest contour error", f"{motion.max_contour_error_um:.3f} {off}"),
         *_orientation_rows(motion),
         ("greatest following error", f"{motion.max_following_error_um:.1f} um{turning}"),
         ("greatest voltage", volts_words(motion)),

@@ -17,7 +17,7 @@ from ..errors import BusError, InputError
 from ..job import write_job_trace
 from ..job_run import JobRun, NoRoomError, PreparedJob, operator_stops, prepared, run_job
 from ..names import is_toolpath
-from ..pipeline import Pipeline, load_pipeline
+from ..pipeline import Pipeline, load_pipeline, start_counts
 from ..simulate import write_trace
 from .bus_session import await_enter, pass_stop, session
 from .motion_commands import print_run
@@ -99,7 +99,7 @@ def _task(options: Namespace, file: Path) -> Task:
         if options.no_stops:
             raise InputError(f"{file}: --no-stops is for toolpaths, not for path files")
         pipeline = load_pipeline(file, options.machine, allow_space=True)
-        require_fit(pipeline.machine)
+        require_fit(pipeline.whole_machine)
         pipeline.image  # noqa: B018
         return pipeline
     job = toolpath_job(options, file)
@@ -124,12 +124,15 @@ def _run_one(task: Task, address: BusAddress, options: Namespace) -> BusRun | Jo
     machine = task.machine
     print_notes(task, task.compilation.plan)
     with (
-        session(machine, address, options) as at,
+        session(task.whole_machine, address, options) as at,
         progress(f"run {task.file.name}", "tick", task.program.ticks) as bar,
     ):
         kernel = options.kernel or machine.kernel
         return run_program(
-            at, machine, task.image, kernel, bar, options.record, unhomed=options.unhomed
+            *(at, machine, task.image, kernel, bar, options.record),
+            unhomed=options.unhomed,
+            on=task.whole_machine,
+            start=start_counts(task, kernel),
         )
 
 

@@ -25,7 +25,7 @@ from ..feed.request import (
     OPTIMAL,
     PROFILES,
 )
-from ..names import AXES, is_toolpath
+from ..names import AXES, in_unit, is_toolpath
 from ..spline import END_NAMES, KNOT_NAMES
 from .outputs import PATH_OUTPUT, PathOutput, read_path_outputs
 from .table import Table, read_toml
@@ -70,6 +70,11 @@ class SpacePathSpec:
         """3, and the extra axes."""
         return 3 + int(self.extra.shape[1])
 
+    @property
+    def turns_alone(self) -> bool:
+        """Whether the extra axes move while x, y and z rest: the unit of length is then the degree."""
+        return bool(np.ptp(self.extra, axis=0).any()) and not np.ptp(self.points, axis=0).any()
+
 
 @dataclass(frozen=True, eq=False)
 class PathFile:
@@ -82,6 +87,11 @@ class PathFile:
     limits: Limits
     machine_file: Path | None
     outputs: tuple[PathOutput, ...] = ()
+
+    @property
+    def turns_alone(self) -> bool:
+        """As `SpacePathSpec.turns_alone`."""
+        return isinstance(self.given_path, SpacePathSpec) and self.given_path.turns_alone
 
     @property
     def path(self) -> PathSpec:
@@ -116,11 +126,14 @@ LONGEST_DWELL_MS = 86_400_000
 _RESTS = ("dwell_ms", "stop")
 _SECTIONS = ("path", "feed", "limits", "machine", "output")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
-_FEED = ("profile", "nominal_mm_s", "ramp_time_s", "n_c", "degree")
+_FEED = ("profile", "nominal_mm_s", "nominal_deg_s", "ramp_time_s", "n_c", "degree")
 _LIMITS = (
     "feed_mm_s",
     "acceleration_mm_s2",
     "jerk_mm_s3",
+    "feed_deg_s",
+    "acceleration_deg_s2",
+    "jerk_deg_s3",
     "centripetal_mm_s2",
     "volts",
     "policy",
@@ -163,6 +176,13 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     found = tuple(_listed(root, table, i) for i, table in enumerate(tables, 1))
     if len({type(one.file.given_path) for one in found}) > 1:
         raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")
+    for number, one in enumerate(found, 1):
+        if one.file.turns_alone:
+            raise root.error(
+                "path",
+                f"number {number} turns axes alone, while x, y and z rest: give it a file of its own, with one [path], "
+                "and run the files one after the other: hodograph run FILE FILE …",
+            )
     for key in _RESTS:
         if tables[0].has(key):
             raise tables[0].error(
@@ -182,9 +202,10 @@ def _path_file(root: Table, table: Table, outputs: Table, outputs_name: str) -> 
     file = root.file
     machine = root.table("machine", ("file",), required=False)
     path = _path(table)
-    feed = _feed(root.table("feed", _FEED)) if root.has("feed") else None
+    unit = "deg" if isinstance(path, SpacePathSpec) and path.turns_alone else "mm"
+    feed = _feed(root.table("feed", _FEED), unit) if root.has("feed") else None
     axes = path.axes if isinstance(path, SpacePathSpec) else 2
-    limits = _limits(root.table("limits", _LIMITS, required=False), axes)
+    limits = _limits(root.table("limits", _LIMITS, required=False), axes, unit)
     return PathFile(
         file=file,
         name=file.stem,
@@ -215,13 +236,20 @@ def _path(table: Table) -> PathSpec | SpacePathSpec:
     key = "through" if through else "control_points"
     points = table.points(key, limit=COORDINATE_LIMIT_MM)
     if closed:
-        _check_closing(table, key, points[:, :3])
+        rests = not np.ptp(points[:, :3], axis=0).any()
+        _check_closing(table, key, points[:, 3:] if rests else points[:, :3])
     ends = table.choice("ends", END_NAMES, END_NAMES[0])
     knots = table.choice("knots", KNOT_NAMES, KNOT_NAMES[0])
     if points.shape[1] > 2:
         start, end = _direction(table, "start_tangent"), _direction(table, "end_tangent")
         drawn, extra = points[:, :3], points[:, 3:]
-        return SpacePathSpec(closed, drawn, through, ends, start, end, knots, extra)
+        path = SpacePathSpec(closed, drawn, through, ends, start, end, knots, extra)
+        for name in ("start_tangent", "end_tangent"):
+            if path.turns_alone and table.has(name):
+                raise table.error(
+                    name, "is a direction of x, y and z, which rest on this path: remove it"
+                )
+        return path
     return PathSpec(
         closed=closed,
         points=np.asarray(points[:, 0] + 1j * points[:, 1]),
@@ -274,15 +302,25 @@ def _direction(table: Table, key: str) -> NDArray[np.float64] | None:
     return vector
 
 
-def _feed(table: Table) -> FeedRequest:
+def _in_unit(table: Table, key: str, unit: str) -> str:
+    """The key in the unit of length of the path. Raises InputError: the table has it in the other one."""
+    own, other = in_unit(key, unit), in_unit(key, "mm" if unit == "deg" else "deg")
+    if table.has(other):
+        why = "turns axes alone" if unit == "deg" else "moves x, y or z"
+        raise table.error(other, f"does not apply to a path that {why}: give {own}")
+    return own
+
+
+def _feed(table: Table, unit: str) -> FeedRequest:
     profile = table.choice("profile", PROFILES, "exponential")
     feeds = {"low": LEAST_FEED_MM_S, "high": GREATEST_FEED_MM_S}
+    nominal = _in_unit(table, "nominal_mm_s", unit)
     if profile == OPTIMAL:
-        nominal_mm_s = table.optional_number("nominal_mm_s", **feeds)
+        nominal_mm_s = table.optional_number(nominal, **feeds)
         return FeedRequest(profile, inf if nominal_mm_s is None else nominal_mm_s)
     return FeedRequest(
         profile=profile,
-        nominal_mm_s=table.number("nominal_mm_s", **feeds),
+        nominal_mm_s=table.number(nominal, **feeds),
         ramp_time_s=table.number("ramp_time_s", low=LEAST_RAMP_S, high=GREATEST_RAMP_S),
         n_c=_n_c(table),
         degree=table.integer("degree", 5, low=LEAST_DEGREE, high=GREATEST_DEGREE),
@@ -296,11 +334,17 @@ def _n_c(table: Table) -> float | Literal["optimise"]:
     return table.number("n_c", low=0, high=GREATEST_N_C)
 
 
-def _limits(table: Table, axes: int) -> Limits:
+def _limits(table: Table, axes: int, unit: str) -> Limits:
+    feed, acceleration, jerk = (
+        _in_unit(table, key, unit) for key in ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+    )
+    for key in ("centripetal_mm_s2", "cap") if unit == "deg" else ():
+        if table.has(key):
+            raise table.error(key, "does not apply to a path that turns axes alone: remove it")
     return Limits(
-        feed_mm_s=table.optional_number("feed_mm_s", **_FEEDS),
-        acceleration_mm_s2=table.optional_number("acceleration_mm_s2", **_ACCELERATIONS),
-        jerk_mm_s3=table.optional_number("jerk_mm_s3", **_JERKS),
+        feed_mm_s=table.optional_number(feed, **_FEEDS),
+        acceleration_mm_s2=table.optional_number(acceleration, **_ACCELERATIONS),
+        jerk_mm_s3=table.optional_number(jerk, **_JERKS),
         policy=table.choice("policy", POLICIES, "respect"),
         centripetal_mm_s2=table.optional_number("centripetal_mm_s2", **_ACCELERATIONS),
         volts=table.optional_number("volts", low=1e-3, high=1e3),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..bus.capture.frames import Frames
 from ..config import Machine
+from ..errors import InputError
 from ..native import NativeProgram
 from ..pipeline import load_pipeline
 from ..simulate import Motion, simulate_on
@@ -71,6 +72,10 @@ class CaseRun:
 def load_clean_run(path: Path) -> CleanRun:
     """The program of a path file; raises InputError, PlanError."""
     pipeline = load_pipeline(path, allow_space=True)
+    if pipeline.standing_mm:
+        raise InputError(
+            f"{path}: turns axes alone: fault scenarios take paths that x, y or z draw"
+        )
     machine, image = pipeline.machine, pipeline.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.path_counts)
     motion = simulate_on(machine, image, "fixed", keep_rows=False)

@@ -238,6 +238,11 @@ class AxisLimits:
         """The same limits times `share`."""
         return AxisLimits(*(_scaled(getattr(self, one.name), share) for one in fields(self)))
 
+    def behind(self, first: int) -> AxisLimits:
+        """Those of the axes from number `first` on."""
+        each = (getattr(self, one.name) for one in fields(self))
+        return AxisLimits(*(given and given[first:] for given in each))
+
     def and_of(self, other: AxisLimits) -> AxisLimits:
         """What keeps both: the lower of each."""
         pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))

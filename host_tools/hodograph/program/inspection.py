@@ -31,7 +31,10 @@ _ROWS = 12
 
 
 def inspect_dict(program: Program) -> dict[str, Any]:
-    """What a program holds, as plain numbers in mm and s, for JSON."""
+    """What a program holds, as plain numbers in mm and s, for JSON.
+
+    Where `first_axis` is not 0, axes turn alone: mm stands for their degrees.
+    """
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)
     return {
@@ -41,6 +44,7 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "record_bytes": _bytes(program),
         "period_us": program.period_us,
         "closed": program.closed,
+        "first_axis": program.first_axis,
         "segments": program.segment_count,
         "pieces": program.piece_count,
         "ticks": program.ticks,
@@ -148,9 +152,14 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         if d[name] is not None
     )
     names = AXES[: program.axis_count]
+    turning = (
+        "axes      turn alone: x, y below are numbers "
+        f"{program.first_axis + 1} and {program.first_axis + 2} of the machine's path; mm stands for its degrees"
+    )
     lines = [
         f"program   {d['name'] or '(no name)'}, format {d['version']}, {d['image_bytes']} bytes",
         _bytes_text(d["record_bytes"]),
+        *([turning] if program.first_axis else []),
         f"path      {'closed' if d['closed'] else 'open'}, {d['length_mm']:.9f} mm in {d['segments']} segments",
         f"from      ({', '.join(f'{mm:.9f}' for mm in d['start_mm'])}) mm",
         f"to        ({', '.join(f'{mm:.9f}' for mm in d['end_mm'])}) mm",
@@ -161,7 +170,7 @@ def inspect_text(program: Program, *, full: bool = False) -> str:
         f"mm/s^2, jerk {d['peak_jerk_mm_s3']:.6g} mm/s^3 (bounds of the pieces)",
         f"override  factor {d['override_factor_least']:.4g}, rate {d['override_rate_least_per_s']:.4g} /s, "
         f"second {d['override_second_least_per_s2']:.4g} /s^2 (tightest)",
-        *stops_text(program.stops, program.piece_starts_mm),
+        *stops_text(program.stops, program.piece_starts_mm, "deg" if program.first_axis else "mm"),
         "",
         " segment       start mm"
         + "".join(f"{one + ' mm':>15}" for one in names)

@@ -108,11 +108,11 @@ def stops_dict(stops: Stops, start_mm: Real) -> dict[str, Any]:
     return out
 
 
-def stops_text(stops: Stops, start_mm: Real) -> Iterator[str]:
-    """The same for reading: one line for each kind."""
+def stops_text(stops: Stops, start_mm: Real, unit: str) -> Iterator[str]:
+    """The same for reading: one line for each kind. `unit`: of lengths of the path."""
     for kind, name in enumerate(("hold, stop", "fault stop")):
         worst = stops.worst(kind)
         yield (
-            f"{name:<10} at most {worst.time_s:.4g} s and {worst.distance_mm:.4g} mm to rest, "
+            f"{name:<10} at most {worst.time_s:.4g} s and {worst.distance_mm:.4g} {unit} to rest, "
             f"longest from arc length {start_mm[worst.piece]:.6g} mm (piece {worst.piece})"
         )

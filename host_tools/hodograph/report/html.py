@@ -79,11 +79,18 @@ def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, A
         "name": pipeline.file.name,
         "anchor": file_name(pipeline.file.name, "path"),
         "file": str(pipeline.file.file),
-        "notes": pipeline.notes(plan),
+        "notes": (*_unit_note(pipeline), *pipeline.notes(plan)),
         "proof": proved_limits(pipeline.machine),
         "figures": figures,
         "load": _load(run),
     }
+
+
+def _unit_note(pipeline: Pipeline) -> tuple[str, ...]:
+    """What mm stands for on a path that turns axes alone."""
+    if pipeline.unit == "mm":
+        return ()
+    return ("axes turn alone: mm stands for degrees, µm for thousandths of a degree",)
 
 
 def _plane_path(pipeline: Pipeline) -> Figure:

@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from ..feed import FeedPlan
 from ..paper import chord_acceleration_mm_s2, joint_disturbance
 from ..pipeline import Pipeline
-from ..simulate.acted import acted_outputs
 from ..spline import PHSpline
-from .style import BLUE, GREEN, GREY, ORANGE, RED, plan_axes, png
+from .output_marks import mark_outputs
+from .style import BLUE, GREEN, GREY, ORANGE, plan_axes, png
 
 _SAMPLES = 2000
 
@@ -62,33 +62,10 @@ def _plane(axes: Axes, pipeline: Pipeline) -> None:
     )
     mark_outputs(axes, pipeline)
     _start(axes, spline)
-    plan_axes(axes)
+    plan_axes(axes, pipeline.drawing_axes)
     axes.margins(0.06)
     axes.set_title(f"{pipeline.file.name}: polygon, nodes, curve")
     axes.legend(loc="best")
-
-
-def mark_outputs(axes: Axes, pipeline: Pipeline) -> None:
-    """The places where outputs of a path in the plane switch, with their names."""
-    if not pipeline.file.outputs or pipeline.machine_or_none is None:
-        return
-    events = pipeline.events
-    spline = pipeline.spline_result.spline
-    ticks = np.zeros(len(events), dtype=np.int64)
-    acted = acted_outputs(pipeline.machine.outputs, events, ticks, 1000)
-    places = np.minimum([one.place_mm for one in acted], spline.length_mm)
-    points = spline.point(places)
-    axes.plot(points.real, points.imag, "v", color=RED, markersize=7, label="outputs switch")
-    for place in np.unique(places):
-        here = [one for one, at in zip(acted, places, strict=True) if at == place]
-        point = points[int(np.argmax(places == place))]
-        axes.annotate(
-            "\n".join(f"{one.name} {one.words}" for one in here),
-            (point.real, point.imag),
-            xytext=(7, 5),
-            textcoords="offset points",
-            fontsize=8,
-        )
 
 
 def _start(axes: Axes, spline: PHSpline) -> None:

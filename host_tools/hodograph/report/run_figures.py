@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from ..pipeline import Pipeline
 from ..simulate import Motion
+from .output_marks import mark_switching_times
 from .style import BLUE, GREEN, GREY, ORANGE, RED, SOFT, plan_axes, png
 
 ALLOWED_UM = 30.0
@@ -37,7 +38,7 @@ def _plane(axes: Axes, pipeline: Pipeline, motion: Motion, worst: int) -> None:
     axes.plot(set_mm[:, 0], set_mm[:, 1], color=GREY, linewidth=3.5, label="commanded")
     axes.plot(act_mm[:, 0], act_mm[:, 1], color=BLUE, linewidth=1.2, label="actual")
     axes.plot(*act_mm[worst], "o", color=RED, markersize=7, fillstyle="none", label="worst place")
-    plan_axes(axes)
+    plan_axes(axes, pipeline.drawing_axes)
     axes.set_title(f"{pipeline.file.name}: commanded and actual path")
     axes.legend(loc="best")
 
@@ -98,6 +99,7 @@ def error_axes(axes: Axes, motion: Motion, worst: int) -> None:
     axes.set_xlabel("time, s (dashed: last setpoint, then settling)")
     axes.set_ylabel("contour error, µm")
     axes.set_title("distance of the encoder position from the exact curve")
+    mark_switching_times(axes, motion)
 
 
 def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:

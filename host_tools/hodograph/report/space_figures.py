@@ -13,6 +13,7 @@ from ..config import SpacePathSpec
 from ..pipeline import Pipeline
 from ..simulate import Motion
 from ..spline.spatial import SpatialPHSpline
+from .output_marks import mark_outputs
 from .run_figures import error_axes
 from .style import BLUE, GREY, ORANGE, RED, png
 
@@ -34,6 +35,7 @@ def space_path_figure(pipeline: Pipeline) -> bytes:
     view = _isometric(figure, grid[0, 0], pipeline)
     view.plot(*given.T, "o", color=ORANGE, markersize=4, label="given points")
     view.plot(*curve, color=BLUE, linewidth=1.6, label="C2 PH quintic spline")
+    mark_outputs(view, pipeline)
     view.legend(loc="best")
     curvature = figure.add_subplot(grid[0, 1])
     curvature.plot(s_mm, np.abs(spline.curvature(s_mm)), color=BLUE)
@@ -52,15 +54,15 @@ def space_contour_figure(pipeline: Pipeline, motion: Motion) -> bytes:
     grid = figure.add_gridspec(3, 2, height_ratios=(1, 1, 0.8))
     worst = int(np.argmax(motion.contour_error_um))
     set_mm, act_mm = motion.cmd_mm[:, :3].T, motion.act_mm[:, :3].T
-    names = [axis.name for axis in pipeline.machine.path_axes]
+    names = pipeline.drawing_axes
     views: list[tuple[Any, tuple[int, ...]]] = [
         (_isometric(figure, grid[0, 0], pipeline), (0, 1, 2))
     ]
     for place, (across, up) in zip((grid[0, 1], grid[1, 0], grid[1, 1]), _SIDES, strict=True):
         axes = figure.add_subplot(place)
         axes.set_aspect("equal", adjustable="datalim")
-        axes.set_xlabel(f"{names[across]}, mm")
-        axes.set_ylabel(f"{names[up]}, mm")
+        axes.set_xlabel(names[across])
+        axes.set_ylabel(names[up])
         views.append((axes, (across, up)))
     for axes, which in views:
         rows = list(which)
@@ -105,8 +107,8 @@ def extra_axes_figure(pipeline: Pipeline, motion: Motion) -> bytes:
 def _isometric(figure: Figure, place: Any, pipeline: Pipeline) -> Any:
     axes = figure.add_subplot(place, projection="3d", proj_type="ortho")
     axes.view_init(elev=float(np.degrees(np.arctan(np.sqrt(0.5)))), azim=-45.0)
-    names = [axis.name for axis in pipeline.machine.path_axes]
-    axes.set(xlabel=f"{names[0]}, mm", ylabel=f"{names[1]}, mm", zlabel=f"{names[2]}, mm")
+    names = pipeline.drawing_axes
+    axes.set(xlabel=names[0], ylabel=names[1], zlabel=names[2])
     axes.set_title(pipeline.file.name)
     axes.set_aspect("equal")
     return axes

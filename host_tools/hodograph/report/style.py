@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -65,8 +65,8 @@ def png(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
-def plan_axes(axes: Axes) -> None:
-    """Axes that show the plane: equal scales, mm."""
+def plan_axes(axes: Axes, names: Sequence[str] = ("x, mm", "y, mm")) -> None:
+    """Axes that show the plane of these: equal scales."""
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("x, mm")
-    axes.set_ylabel("y, mm")
+    axes.set_xlabel(names[0])
+    axes.set_ylabel(names[1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the outputs on the path did in a run."""
+"""The outputs on a path by their names: where they switch, and what they did in a run."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..config.outputs import Outputs
 from ..events import DIGITAL, PROPORTIONAL, Event, Events
 
 
-@dataclass(frozen=True)
-class ActedOutput:
-    """What became of one output in a run, and when: the tick whose setpoint was the first at or past the place.
+@dataclass(frozen=True, kw_only=True)
+class PlacedOutput:
+    """One output that switches at a place of a path.
 
     value  true or false of a digital output; of an analogue one in its own unit; `per_mm_s`: from there on it follows
            the feed, by so much for each mm/s
@@ -22,17 +22,23 @@ class ActedOutput:
 
     name: str
     place_mm: float
-    tick: int
-    time_s: float
     value: float | bool | None
     per_mm_s: float | None = None
 
     @property
     def words(self) -> str:
-        """What became of it, in short."""
+        """What becomes of it, in short."""
         if isinstance(self.value, bool):
             return "on" if self.value else "off"
         return f"{self.value:g}" if self.per_mm_s is None else f"{self.per_mm_s:g} by mm/s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActedOutput(PlacedOutput):
+    """What became of one output in a run, and when: the tick whose setpoint was the first at or past the place."""
+
+    tick: int
+    time_s: float
 
     def summary(self) -> dict[str, object]:
         """As `--json` gives it."""
@@ -44,6 +50,13 @@ class ActedOutput:
             "value": self.value,
         }
         return found if self.per_mm_s is None else found | {"per_mm_s": self.per_mm_s}
+
+
+def placed_outputs(outputs: Outputs | None, events: Events) -> list[PlacedOutput]:
+    """What the events of a path switch, in their order; nothing where no outputs are known."""
+    if outputs is None:
+        return []
+    return [one for event in events.tolist() for one in _changes(outputs, Event(*event))]
 
 
 def acted_outputs(
@@ -58,20 +71,25 @@ def acted_outputs(
     found = []
     for event, tick in zip(events.tolist(), event_ticks.tolist(), strict=True):
         if tick >= 0:
-            at = (event[0] * 2.0**-40, tick, tick * period_us / 1e6)
-            found += _changes(outputs, Event(*event), at)
+            at = {"tick": tick, "time_s": tick * period_us / 1e6}
+            found += [ActedOutput(**vars(one), **at) for one in _changes(outputs, Event(*event))]
     return found
 
 
-def _changes(outputs: Outputs, event: Event, at: tuple[float, int, float]) -> list[ActedOutput]:
+def _changes(outputs: Outputs, event: Event) -> list[PlacedOutput]:
     out = []
+    place_mm = event.place_q40 * 2.0**-40
     for one in outputs.channels:
+        value: float | bool | None
+        gain = None
         if one.digital and event.kind == DIGITAL and event.mask >> one.number & 1:
-            out.append(ActedOutput(one.name, *at, bool(event.value >> one.number & 1)))
+            value = bool(event.value >> one.number & 1)
         elif not one.digital and event.kind != DIGITAL and event.channel == one.number:
             if event.kind == PROPORTIONAL:
-                gain = event.value / 65536 / one.scale
-                out.append(ActedOutput(one.name, *at, None, gain))
+                value, gain = None, event.value / 65536 / one.scale
             else:
-                out.append(ActedOutput(one.name, *at, event.value / one.scale))
+                value = event.value / one.scale
+        else:
+            continue
+        out.append(PlacedOutput(name=one.name, place_mm=place_mm, value=value, per_mm_s=gain))
     return out

@@ -73,6 +73,11 @@ class Motion:
     """The machine's outputs, which name what the events switch; None: it has none."""
 
     @property
+    def turns_alone(self) -> bool:
+        """Whether the path is drawn by axes that turn: its lengths are in degrees."""
+        return "deg" in self.units[:2]
+
+    @property
     def extra_names(self) -> tuple[str, ...]:
         """The axes after x, y, z."""
         return self.names[3:]

@@ -33,6 +33,7 @@ from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, S
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
 from .geometry import Block, sliced, with_joints
+from .output_check import require_no_turning
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -70,11 +71,7 @@ class _Windows(Divider):
         return self.moved and self.builder.length_mm >= SHORTEST_MM
 
     def _move(self, move: Move) -> None:
-        if move.end[3:] != ORIGIN[3:]:
-            raise InputError(
-                f"{self.file}:{move.line}: the move turns A, B or C, and stream takes x, y and z only: use run, "
-                "with exact stops (G61.1) where a section does not fit the controller"
-            )
+        require_no_turning(self.file, move)
         super()._move(move)
         while self.builder.count > self.window + self.searched + _SEARCHED:
             chord, turn = _straightest(self.builder, self.window + self.searched, _SEARCHED)

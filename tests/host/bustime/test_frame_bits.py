@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hodograph.bus.capture.recorder import FRAME_DTYPE, Frames
 from hodograph.bustime import exact_bits, generic_worst_bits, plain_bits, worst_bits
-from hodograph.bustime.frame_bits import ERROR, EXTENDED, REMOTE, crc15
+from hodograph.bustime.frame_bits import ERROR, EXTENDED, REMOTE, crc15, fd_bits
 
 CRC_OF_123456789 = 0x059E  # CRC-15/CAN, check value of the catalogue of parametrised CRCs
 
@@ -126,3 +126,12 @@ def test_bound_for_an_identifier_is_nearly_reached(identifier: int) -> None:
 def test_error_frames_take_no_bits_and_none_is_fine() -> None:
     assert exact_bits(one(ERROR | 4, 8, bytes(8))).tolist() == [0]
     assert exact_bits(np.zeros(0, dtype=FRAME_DTYPE)).tolist() == []
+
+
+def test_fd_frames_by_hand() -> None:
+    """ISO 11898-1: 17 bits up to BRS, ESI and DLC, data, stuff count, CRC-17, fixed stuff bits; 13 at the end."""
+    assert fd_bits(0, stuffed=False) == (30, 5 + 27)
+    assert fd_bits(6, stuffed=False) == (30, 5 + 48 + 27)
+    nominal, data = fd_bits(6, stuffed=True)
+    assert (nominal, data) == (34, 80 + 13), "17 stuff bits in 70: 4 before BRS, 13 after"
+    assert nominal + data / 5 == pytest.approx(52.6)

@@ -208,3 +208,15 @@ def test_more_time_never_takes_fewer_drives(bitrate: int) -> None:
     counts = [max_drives(period_us, bitrate) for period_us in (1000, 2000, 4000, 8000)]
     assert counts == sorted(counts)
     assert bitrate == RATE or counts[0] <= max_drives(1000, RATE)
+
+
+def test_can_fd_shortens_the_tick_as_far_as_identifiers_allow() -> None:
+    classic = machine(6, 1000, LEAST)
+    ticks = [replace(classic, data_bitrate=rate * RATE).tick_us for rate in (1, 2, 4, 5, 8)]
+    assert ticks == sorted(ticks, reverse=True)
+    assert classic.tick_us > ticks[1] > 1000 > ticks[2], "six drives at 1 ms take 4 Mbit/s"
+    # By hand at 1 and 5 Mbit/s: a frame of 8 bytes in the way, then six positions and six setpoints.
+    eight, six = 34 + 113 / 5, 34 + 93 / 5
+    assert ticks[3] == pytest.approx(COMPUTE_US + eight + 12 * six)
+    loads = [replace(classic, data_bitrate=rate * RATE).load_percent for rate in (2, 8)]
+    assert classic.load_percent > loads[0] > loads[1]

@@ -192,6 +192,11 @@ COMPLETE: dict[str, list[Document]] = {
             "output": SWITCHED,
         },
         {
+            "path": {"closed": False, "through": [[1, 2, 3, 0, 0], [1, 2, 3, 30, 40]]},
+            "feed": {"profile": "exponential", "nominal_deg_s": 50, "ramp_time_s": 0.1},
+            "limits": {"feed_deg_s": 100, "acceleration_deg_s2": 1000, "jerk_deg_s3": 10_000},
+        },
+        {
             "path": {"closed": True, "control_points": [[0, 0], [9, 0], [9, 9], [0, 9]]},
             "feed": {"profile": "optimal"},
         },
@@ -526,6 +531,7 @@ def changes(kind: str) -> Iterator[Change]:
 
 
 BEYOND_SCHEMAS = (
+    "does not apply to a path that",
     r"u32 in counts",
     r"which is not there",
     r"must be (above|below) \w+ = ",
