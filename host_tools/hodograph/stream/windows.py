@@ -41,8 +41,10 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 _Made = TypeVar("_Made")
 
-FIRST_WINDOW_S, WINDOW_S = 1.0, 3.0
-"""Motion that a window keeps: the first is shorter, so that a job starts soon."""
+FIRST_WINDOW_S, WINDOW_S = 0.3, 3.0
+"""Motion that a window keeps: the first one little, so that a job starts soon, and each next one twice as much until it
+is WINDOW_S.
+"""
 
 _STOPS = 4.0
 """The rejected end of a window, in times that stopping takes."""
@@ -149,7 +151,7 @@ class SectionFeed:
         self._carried = (0.0, 0.0)
         self._low_q40 = begin_q40
         self._low_mm = 0.0
-        self._first = True
+        self._wanted_s = FIRST_WINDOW_S
         self._needed = 0
 
     def windows(self) -> Iterator[Window]:
@@ -168,7 +170,7 @@ class SectionFeed:
 
     def _advance(self, window: Window) -> None:
         found, count = window.solution, window.count
-        self._first, self._last = False, window
+        self._last, self._wanted_s = window, min(2.0 * self._wanted_s, WINDOW_S)
         self._low_mm = window.end_mm
         self._low_q40 = window.joint_q40(count)
         if window.rests:
@@ -279,10 +281,6 @@ class SectionFeed:
                 self.path.complete = True
             else:
                 self.path.append(block)
-
-    @property
-    def _wanted_s(self) -> float:
-        return FIRST_WINDOW_S if self._first else WINDOW_S
 
     def _estimate(self, limits: PlanLimits) -> tuple[Real, Real, float]:
         """Arc lengths (n,), roughly when they are passed (n,), and how long stopping takes."""
