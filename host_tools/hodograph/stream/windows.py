@@ -23,11 +23,12 @@ from ..events import EVENT
 from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
 from ..feed.limits import Plants
+from ..feed.optimal.brake import brake_to_rest
 from ..feed.optimal.feasible import check_feasible, within_reach
 from ..feed.optimal.knots import first_estimate
 from ..feed.optimal.plan_limits import PlanLimits, gather
 from ..feed.optimal.sequence import kept, measured, stopping_s, trusted_to
-from ..feed.optimal.track import Ends, Track, ends_of, make_track
+from ..feed.optimal.track import Ends, Track, ends_of, make_track, piece_usage
 from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
@@ -57,6 +58,9 @@ RESERVE = 0.01
 
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
+
+_BRAKE_WAYS = (1.2, 1.35, 1.5, 1.75, 2.1, 2.6)
+"""Ways of brakes without a quadratic program, tried first, in times the way that braking takes at least."""
 
 _TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
 """Ways of tails that are tried, in times the way that braking takes at least: some, and then those between them."""
@@ -392,6 +396,7 @@ class SectionFeed:
         state = State(float(found.q[knot]), float(found.slope[knot]))
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
+        yield from self._brakes(window, joint, state, low, least)
         tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
@@ -415,6 +420,28 @@ class SectionFeed:
             yield self._lowered(one, made, lambda tail: tail, _TAIL_LOWERED)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
+
+    def _brakes(
+        self, window: Window, joint: int, state: State, low: float, least: float
+    ) -> Iterator[Stretch]:
+        """The shortest of the brakes to rest, as _BRAKE_WAYS has them, that keeps the limits of a window."""
+        curve, tried = self.path.curve, {-1}
+        ends = curve.segment_starts_mm
+        for way in _BRAKE_WAYS:
+            wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
+            at = int(np.searchsorted(ends, wanted))
+            if at in tried or at >= ends.size or ends[at] >= window.solution.grid.s[-1]:
+                continue
+            tried.add(at)
+            high = float(ends[at])
+            brake = brake_to_rest(state, low, high, self._period_s)
+            if brake is None:
+                continue
+            limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
+            track = make_track(brake, 1.0, ends)
+            if piece_usage(curve, limits, track).max() <= 1.0:
+                yield self._stretch(track, window.plan, window.joint_q40(joint))
+                return
 
 
 def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:
