@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import random
 import time
@@ -61,6 +62,7 @@ def stream(options: Namespace) -> None:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
     for file in options.files:
         _require_job_file(options, file)
+    gc.freeze()  # modules stay: planning would look through them time and again for what is no longer used
     if options.simulate:
         if options.record is not None:
             raise InputError("--record: --simulate has no bus to record")

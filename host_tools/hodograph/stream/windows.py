@@ -126,6 +126,15 @@ class Window:
         return int(pieces.start_q40[joint]) if joint < len(pieces) else self.stretch.end_q40
 
 
+@dataclass(frozen=True, eq=False)
+class _Estimate:
+    """Arc lengths s (n,), roughly when they are passed t (n,), and how long stopping takes."""
+
+    s: Real
+    t: Real
+    stop_s: float
+
+
 class SectionFeed:
     """Plans the windows of a section, whose path it reads from blocks as far as it needs it."""
 
@@ -149,6 +158,7 @@ class SectionFeed:
         self._joint = joint
         self._exceeded = exceeded
         self._period_s = 1e-6 * machine.period_us
+        self._estimated: tuple[tuple[int, int], _Estimate] | None = None
         self._held: Solution | None = None
         self._last: Window | None = None
         self._moving: State | None = None
@@ -286,23 +296,30 @@ class SectionFeed:
             else:
                 self.path.append(block)
 
-    def _estimate(self, limits: PlanLimits) -> tuple[Real, Real, float]:
-        """Arc lengths (n,), roughly when they are passed (n,), and how long stopping takes."""
+    def _estimate(self, limits: PlanLimits) -> _Estimate:
+        """The estimate of all of the path that is known; kept until more of it is, or the window has moved on."""
+        key = (self.path.passed + self.path.count, self._low_q40)
+        if self._estimated is None or self._estimated[0] != key:
+            self._estimated = key, self._estimate_of(limits)
+        return self._estimated[1]
+
+    def _estimate_of(self, limits: PlanLimits) -> _Estimate:
         curve, moving = self.path.curve, self._moving
         length = curve.length_mm
         if length - self._low_mm < 1e-6:
-            return np.array([self._low_mm, length]), np.zeros(2), 0.0
+            return _Estimate(np.array([self._low_mm, length]), np.zeros(2), 0.0)
         q = None if moving is None else moving.q
         found = first_estimate(curve, limits, self._low_mm, length, q, self._period_s)
-        return found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max())))
+        return _Estimate(found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max()))))
 
     def _ahead_s(self) -> float:
-        _, t, stop_s = self._estimate(self._limits()[0])
-        return float(t[-1]) - (_STOPS + 2.0) * stop_s
+        found = self._estimate(self._limits()[0])
+        return float(found.t[-1]) - (_STOPS + 2.0) * found.stop_s
 
     def _high(self, limits: PlanLimits) -> tuple[float, float]:
         """Where the next window ends, at an end of a segment, and how long stopping takes."""
-        s, t, stop_s = self._estimate(limits)
+        found = self._estimate(limits)
+        s, t, stop_s = found.s, found.t, found.stop_s
         wanted_s = self._wanted_s + _STOPS * stop_s
         curve = self.path.curve
         if self.path.complete and t[-1] < wanted_s * (1.0 + _END_SHARE):
