@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import random
 import time
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -61,6 +62,7 @@ def stream(options: Namespace) -> None:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
     for file in options.files:
         _require_job_file(options, file)
+    gc.freeze()  # modules stay: planning would look through them time and again for what is no longer used
     if options.simulate:
         if options.record is not None:
             raise InputError("--record: --simulate has no bus to record")
@@ -178,10 +180,15 @@ def _run(
     if begin is None:
         assert entry is not None
         begin = _rests_at(entry, job.machine, address, options.wait)  # None: the job is lost
-    with (
-        recorded(options.record, job.machine, address) as recording,
-        session(job.machine, address, options) as at,
-    ):
+
+    def planned(begin: Place) -> JobPlan:
+        stops, processes = not options.no_stops, _processes(options)
+        return JobPlan(job, None, job_number, begin, stops=stops, processes=processes)
+
+    with ExitStack() as stack:
+        plan = None if begin is None else stack.enter_context(planned(begin))
+        recording = stack.enter_context(recorded(options.record, job.machine, address))
+        at = stack.enter_context(session(job.machine, address, options))
         bring_up(at, job.machine, kernel)
         if begin is None:
             assert entry is not None
@@ -204,29 +211,24 @@ def _run(
         close_stream(at.controller)
         room = at.controller.read(STREAM, 7) // _RING_SHARE
         most = min(room, CHUNK_BYTES)
-        with JobPlan(
-            job,
-            most,
-            job_number,
-            begin,
-            stops=not options.no_stops,
-            processes=_processes(options),
-        ) as plan:
-            sender = Sender(
-                at,
-                job.machine,
-                plan,
-                pass_stop if options.no_stops else await_enter,
-                journal,
-                None if options.quiet or options.no_progress else _Progress(_EVERY_S),
-                kernel,
-                unhomed=options.unhomed,
-                slow=_free_rate(job.machine, address),
-                recording=recording,
-            )
-            done = sender.run()
-            for line in plan.notes:
-                note(line)
+        if plan is None:
+            plan = stack.enter_context(planned(begin))
+        plan.allow(most)
+        sender = Sender(
+            at,
+            job.machine,
+            plan,
+            pass_stop if options.no_stops else await_enter,
+            journal,
+            None if options.quiet or options.no_progress else _Progress(_EVERY_S),
+            kernel,
+            unhomed=options.unhomed,
+            slow=_free_rate(job.machine, address),
+            recording=recording,
+        )
+        done = sender.run()
+        for line in plan.notes:
+            note(line)
     _print(done, options)
 
 

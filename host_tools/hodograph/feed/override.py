@@ -218,6 +218,44 @@ class Axes:
 
 
 @dataclass(frozen=True, eq=False)
+class _Volts:
+    """What does not depend on the override of |lambda v + lambda^2 T a|, at all samples (A, C, K).
+
+    pull     T a, signed; size: its magnitude
+    against  whether v and T a pull apart; between: the greatest value then, v^2 / (4 T |a|)
+    slope    T v
+    """
+
+    reach: Real
+    signed_v: Real
+    pull: Real
+    size: Real
+    against: NDArray[np.bool_]
+    between: Real
+    slope: Real
+
+    @classmethod
+    def of(cls, axes: Axes, reach: Real, time_constant: Real) -> _Volts:
+        pull = time_constant * axes.signed_a
+        size = np.abs(pull)
+        return cls(
+            reach,
+            axes.signed_v,
+            pull,
+            size,
+            axes.signed_v * pull < 0.0,
+            axes.v**2 / (4.0 * np.maximum(size, _TINY)),
+            time_constant * axes.v,
+        )
+
+    def left(self, f: Real) -> Real:
+        """What the greatest value over 0 <= lambda <= f leaves of the reach: that at f, or `between`."""
+        at_f = raised(f * self.signed_v + f**2 * self.pull)
+        apart = self.against & (np.abs(self.signed_v) < 2.0 * f * self.size)
+        return np.asarray(self.reach - np.maximum(at_f, np.where(apart, self.between, 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
 class Headroom:
     """What the limits along a path leave the override in each of M feed pieces."""
 
@@ -277,9 +315,8 @@ class Headroom:
         axes, f = self.axes, factor[self._samples.piece, None]
         rest = (axes.acceleration - f**2 * axes.a) / axes.v
         jerk = (axes.jerk - f**3 * axes.j) / (3.0 * f * axes.a)
-        if axes.reach is not None and axes.time_constant is not None:
-            left = axes.reach - _greatest_volts(axes, axes.time_constant, f)
-            rest = np.minimum(rest, left / (axes.time_constant * axes.v))
+        if self._volts is not None:
+            rest = np.minimum(rest, self._volts.left(f) / self._volts.slope)
         return self._least(rest.min(axis=0)), self._least(jerk.min(axis=0))
 
     def seconds(self, factor: Real) -> Callable[[Real], Real]:
@@ -293,6 +330,14 @@ class Headroom:
             return self._least((still - rate[piece, None] * falls).min(axis=0))
 
         return second
+
+    @cached_property
+    def _volts(self) -> _Volts | None:
+        """None: no drive is known."""
+        axes = self.axes
+        if axes.reach is None or axes.time_constant is None:
+            return None
+        return _Volts.of(axes, axes.reach, axes.time_constant)
 
     def _least(self, values: Real) -> Real:
         """The least of the samples (C, K) of each piece."""
@@ -315,13 +360,3 @@ def _factor_of_volts(axes: Axes, reach: Real, time_constant: Real) -> Real:
     goal = np.maximum(FACTOR_SHARE * (g + reach), reach * (g > reach))
     whole = g + axes.v
     return np.asarray((axes.v + np.sqrt(axes.v**2 + 4.0 * whole * goal)) / (2.0 * whole))
-
-
-def _greatest_volts(axes: Axes, time_constant: Real, f: Real) -> Real:
-    """Greatest |lambda v + lambda^2 T a| over 0 <= lambda <= f: at f, or v^2 / (4 T |a|) where the two pull apart."""
-    pull = time_constant * axes.signed_a
-    at_f = raised(f * axes.signed_v + f**2 * pull)
-    size = np.abs(pull)
-    apart = (axes.signed_v * pull < 0.0) & (np.abs(axes.signed_v) < 2.0 * f * size)
-    between = axes.v**2 / (4.0 * np.maximum(size, _TINY))
-    return np.asarray(np.maximum(at_f, np.where(apart, between, 0.0)))

@@ -30,6 +30,7 @@ HEADERS = (
     "plant/drive.h",
     "offline/contour.h",
     "offline/offline.h",
+    "offline/smoothing.h",
     "offline/stop_search.h",
     "offline/stream.h",
     "offline/stop_trial.h",

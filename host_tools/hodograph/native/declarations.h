@@ -297,6 +297,14 @@ struct stop_trial {
 int stop_trial_run(const struct program *p, struct stop_trial *trial);
 int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
 
+/* offline/smoothing.h */
+struct smoothing {
+    uint32_t count, ways;
+    const double *point, *normal, *bound, *coefficient;
+};
+size_t smoothing_work(uint32_t count, uint32_t ways);
+void smoothing_solve(const struct smoothing *s, double barrier, double *shift, double *work);
+
 /* offline/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;

@@ -79,6 +79,10 @@ class PlannedSection:
     rest: Rest | None = None
 
 
+class _EndedError(Exception):
+    """The plan is no longer wanted."""
+
+
 class JobPlan:
     """Chunks of a job in order, planned ahead of those who read them. A context manager: its end ends the planning.
 
@@ -91,15 +95,16 @@ class JobPlan:
     def __init__(
         self,
         job: JobFiles,
-        most_bytes: int,
+        most_bytes: int | None,
         number: int,
         begin: Place,
         *,
         stops: bool = True,
         processes: int = PROCESSES,
     ) -> None:
-        """`number`: of the job in the controller that begins with section 0, others have it plus the number of their
-        first section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator;
+        """`most_bytes`: of a chunk; None: not known before `allow`, the files are only read and fitted until then.
+        `number`: of the job in the controller that begins with section 0, others have it plus the number of their first
+        section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator;
         `processes`: 1 reads and fits in this one too. The chunks are the same.
         """
         self.stops = stops
@@ -132,6 +137,12 @@ class JobPlan:
         self._thread.join(_INPUT_WAIT_S if from_input else None)
         if not self._thread.is_alive():
             self._store.forget_all()
+
+    def allow(self, most_bytes: int) -> None:
+        """Chunks may have so many bytes."""
+        with self._changed:
+            self._most = most_bytes
+            self._changed.notify_all()
 
     def item(self, index: int, wait_s: float) -> tuple[PlannedSection, Chunk, float] | None:
         """The chunk with this index, its section and its new motion in s. None: not yet planned after `wait_s`.
@@ -208,6 +219,14 @@ class JobPlan:
     def greatest_rate(self) -> float:
         """Greatest bytes for each second of motion, over about _RATE_S, so far."""
         return self._rate.worst
+
+    def _allowed(self) -> int:
+        """The most bytes of a chunk, as soon as they are known. Raises _EndedError."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._ending or self._most is not None)
+            if self._most is None:
+                raise _EndedError
+            return self._most
 
     def _work(self) -> None:
         try:
@@ -298,7 +317,7 @@ class JobPlan:
                         file.stem,
                         switching(chain([block], blocks), switched),
                         self._number + first,
-                        self._most,
+                        self._allowed(),
                         begin_q40,
                         place,
                         partial(self._goes_on, section),
@@ -329,7 +348,7 @@ class JobPlan:
         begin = self._begin
         first = max(begin.section - number, 0)
         begin_q40 = begin.way_q40 if begin.section >= number else 0
-        job = PathsJob(file, self._job.machine, self._number + number, self._most, self.stops)
+        job = PathsJob(file, self._job.machine, self._number + number, self._allowed(), self.stops)
         for made in job.chunks(first, begin_q40):
             header = made.chunk.header
             before, start_q40 = made.before, header.job_start_q40

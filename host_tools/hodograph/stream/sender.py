@@ -48,7 +48,10 @@ _START_COUNTS = 2
 _PASSED_Q40 = 1 << 20
 """A section is in motion when the way is so far behind its start, 2^-20 mm."""
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
-"""A section starts when so much motion is sent, or so long after its first chunk."""
+"""A section starts at the latest when so much motion is sent, or so long after its first chunk."""
+
+_IN_TIME = 0.7
+"""A chunk comes in time if its transfer takes this share of the motion that was sent before it."""
 
 
 class _GoesOnError(Exception):
@@ -110,6 +113,10 @@ class Sender:
     _kept_s: float = field(default=-1e9)
     _underrun_s: float = field(default=-1e9)
     _percent: int = 100
+    _sending_s: float = 0.0
+    """What the transfers of _bytes took."""
+    _done_s: float = 0.0
+    """Motion of jobs that are over."""
     _ahead: deque[PlannedSection] = field(default_factory=deque)
     _unplanned: HodographError | None = None
     """Why the job cannot be planned on. What was sent is still carried out."""
@@ -207,7 +214,7 @@ class Sender:
         controller = self.at.controller
         follower = Follower(controller, self.at.note)
         started = all_sent = False
-        sent, first_s = 0, 0.0
+        sent, first_s, self._done_s = 0, 0.0, self._motion_s
         while True:
             self._look()
             status = stream_status(controller) if sent else None
@@ -236,12 +243,32 @@ class Sender:
                 started = True
 
     def _may_start(self, first_s: float) -> bool:
-        """Whether enough is sent, or the first chunk has waited for long enough."""
+        """Whether enough is sent, or the first chunk has waited for long enough, or waiting is of no use."""
         waited_s = self.at.controller.clock.now_s() - first_s
         return (
             waited_s > _START_WAIT_S
+            or self._need_not_wait()
             or stream_status(self.at.controller).committed_s > _START_AHEAD_S
         )
+
+    def _need_not_wait(self) -> bool:
+        """Whether the next chunk comes before the motion leaves the last joint, at the rate of the transfers so far.
+        Where a bus whose feed override is not lowered carries less than a job needs, the motion rests at tails anyway:
+        it need not wait either, but for a job that is over so soon that it may be sent as a whole before.
+        """
+        try:
+            item = self.plan.item(self._next, 0.0)
+        except HodographError:
+            return False
+        if item is None:
+            return False
+        _, chunk, new_s = item
+        sent_s = self._motion_s - self._done_s
+        transfer_s = chunk.size * self._sending_s / self._bytes
+        if transfer_s < _IN_TIME * sent_s:
+            return True
+        long = self.plan.planned_s - self._done_s > _START_AHEAD_S
+        return long and self.slow is None and transfer_s > new_s
 
     def _pass_sections(self, status: StreamStatus) -> None:
         """Goes on to the section in motion, and says what is to be said before it."""
@@ -285,8 +312,10 @@ class Sender:
         if status is not None and status.free_bytes < len(data):
             return None
         place = f"{section.file}:{header.line}"
+        begun_s = self.at.controller.clock.now_s()
         if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
             return None
+        self._sending_s += self.at.controller.clock.now_s() - begun_s
         self._next += 1
         self._bytes += len(data)
         self._motion_s += new_s

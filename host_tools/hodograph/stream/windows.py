@@ -23,11 +23,12 @@ from ..events import EVENT
 from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
 from ..feed.limits import Plants
+from ..feed.optimal.brake import brake_to_rest
 from ..feed.optimal.feasible import check_feasible, within_reach
 from ..feed.optimal.knots import first_estimate
 from ..feed.optimal.plan_limits import PlanLimits, gather
 from ..feed.optimal.sequence import kept, measured, stopping_s, trusted_to
-from ..feed.optimal.track import Ends, Track, ends_of, make_track
+from ..feed.optimal.track import Ends, Track, ends_of, make_track, piece_usage
 from ..feed.optimal.window import Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
@@ -41,8 +42,10 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 _Made = TypeVar("_Made")
 
-FIRST_WINDOW_S, WINDOW_S = 1.0, 3.0
-"""Motion that a window keeps: the first is shorter, so that a job starts soon."""
+FIRST_WINDOW_S, WINDOW_S = 0.3, 3.0
+"""Motion that a window keeps: the first one little, so that a job starts soon, and each next one twice as much until it
+is WINDOW_S.
+"""
 
 _STOPS = 4.0
 """The rejected end of a window, in times that stopping takes."""
@@ -55,6 +58,9 @@ RESERVE = 0.01
 
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
+
+_BRAKE_WAYS = (1.2, 1.35, 1.5, 1.75, 2.1, 2.6)
+"""Ways of brakes without a quadratic program, tried first, in times the way that braking takes at least."""
 
 _TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
 """Ways of tails that are tried, in times the way that braking takes at least: some, and then those between them."""
@@ -120,6 +126,15 @@ class Window:
         return int(pieces.start_q40[joint]) if joint < len(pieces) else self.stretch.end_q40
 
 
+@dataclass(frozen=True, eq=False)
+class _Estimate:
+    """Arc lengths s (n,), roughly when they are passed t (n,), and how long stopping takes."""
+
+    s: Real
+    t: Real
+    stop_s: float
+
+
 class SectionFeed:
     """Plans the windows of a section, whose path it reads from blocks as far as it needs it."""
 
@@ -143,13 +158,14 @@ class SectionFeed:
         self._joint = joint
         self._exceeded = exceeded
         self._period_s = 1e-6 * machine.period_us
+        self._estimated: tuple[tuple[int, int], _Estimate] | None = None
         self._held: Solution | None = None
         self._last: Window | None = None
         self._moving: State | None = None
         self._carried = (0.0, 0.0)
         self._low_q40 = begin_q40
         self._low_mm = 0.0
-        self._first = True
+        self._wanted_s = FIRST_WINDOW_S
         self._needed = 0
 
     def windows(self) -> Iterator[Window]:
@@ -168,7 +184,7 @@ class SectionFeed:
 
     def _advance(self, window: Window) -> None:
         found, count = window.solution, window.count
-        self._first, self._last = False, window
+        self._last, self._wanted_s = window, min(2.0 * self._wanted_s, WINDOW_S)
         self._low_mm = window.end_mm
         self._low_q40 = window.joint_q40(count)
         if window.rests:
@@ -280,27 +296,30 @@ class SectionFeed:
             else:
                 self.path.append(block)
 
-    @property
-    def _wanted_s(self) -> float:
-        return FIRST_WINDOW_S if self._first else WINDOW_S
+    def _estimate(self, limits: PlanLimits) -> _Estimate:
+        """The estimate of all of the path that is known; kept until more of it is, or the window has moved on."""
+        key = (self.path.passed + self.path.count, self._low_q40)
+        if self._estimated is None or self._estimated[0] != key:
+            self._estimated = key, self._estimate_of(limits)
+        return self._estimated[1]
 
-    def _estimate(self, limits: PlanLimits) -> tuple[Real, Real, float]:
-        """Arc lengths (n,), roughly when they are passed (n,), and how long stopping takes."""
+    def _estimate_of(self, limits: PlanLimits) -> _Estimate:
         curve, moving = self.path.curve, self._moving
         length = curve.length_mm
         if length - self._low_mm < 1e-6:
-            return np.array([self._low_mm, length]), np.zeros(2), 0.0
+            return _Estimate(np.array([self._low_mm, length]), np.zeros(2), 0.0)
         q = None if moving is None else moving.q
         found = first_estimate(curve, limits, self._low_mm, length, q, self._period_s)
-        return found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max())))
+        return _Estimate(found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max()))))
 
     def _ahead_s(self) -> float:
-        _, t, stop_s = self._estimate(self._limits()[0])
-        return float(t[-1]) - (_STOPS + 2.0) * stop_s
+        found = self._estimate(self._limits()[0])
+        return float(found.t[-1]) - (_STOPS + 2.0) * found.stop_s
 
     def _high(self, limits: PlanLimits) -> tuple[float, float]:
         """Where the next window ends, at an end of a segment, and how long stopping takes."""
-        s, t, stop_s = self._estimate(limits)
+        found = self._estimate(limits)
+        s, t, stop_s = found.s, found.t, found.stop_s
         wanted_s = self._wanted_s + _STOPS * stop_s
         curve = self.path.curve
         if self.path.complete and t[-1] < wanted_s * (1.0 + _END_SHARE):
@@ -394,6 +413,7 @@ class SectionFeed:
         state = State(float(found.q[knot]), float(found.slope[knot]))
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
+        yield from self._brakes(window, joint, state, low, least)
         tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
@@ -417,6 +437,28 @@ class SectionFeed:
             yield self._lowered(one, made, lambda tail: tail, _TAIL_LOWERED)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
+
+    def _brakes(
+        self, window: Window, joint: int, state: State, low: float, least: float
+    ) -> Iterator[Stretch]:
+        """The shortest of the brakes to rest, as _BRAKE_WAYS has them, that keeps the limits of a window."""
+        curve, tried = self.path.curve, {-1}
+        ends = curve.segment_starts_mm
+        for way in _BRAKE_WAYS:
+            wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
+            at = int(np.searchsorted(ends, wanted))
+            if at in tried or at >= ends.size or ends[at] >= window.solution.grid.s[-1]:
+                continue
+            tried.add(at)
+            high = float(ends[at])
+            brake = brake_to_rest(state, low, high, self._period_s)
+            if brake is None:
+                continue
+            limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
+            track = make_track(brake, 1.0, ends)
+            if piece_usage(curve, limits, track).max() <= 1.0:
+                yield self._stretch(track, window.plan, window.joint_q40(joint))
+                return
 
 
 def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:

@@ -86,6 +86,30 @@ def test_chunks_are_the_same_by_one_process_and_by_two(tmp_path: Path, machine: 
     assert not multiprocessing.active_children()
 
 
+@pytest.mark.parametrize("processes", [1, 2])
+def test_room_of_the_controller_may_be_known_late(
+    tmp_path: Path, machine: Machine, processes: int
+) -> None:
+    """The chunks are the same; nothing is planned before."""
+    file = tmp_path / "part.ngc"
+    file.write_text(PART)
+    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    with JobPlan(job, None, 7, Place(), processes=processes) as plan:
+        assert plan.item(0, 0.2) is None
+        plan.allow(MOST)
+        chunks = [chunk.encode() for chunks in plan.by_job() for chunk in chunks]
+    assert chunks == _plan(file, machine, processes)[0]
+
+
+def test_plan_may_end_before_the_room_is_known(wave: Path, machine: Machine) -> None:
+    """As when the controller does not answer."""
+    job = JobFiles((wave,), machine, 0.01, ReadOptions())
+    with JobPlan(job, None, 7, Place(), processes=2) as plan:
+        assert plan.chunks == 0
+    assert not plan._thread.is_alive()
+    assert not multiprocessing.active_children()
+
+
 def test_error_of_a_late_line_is_that_of_one_process(tmp_path: Path, machine: Machine) -> None:
     """Class, message and place."""
     file = tmp_path / "wrong.ngc"

@@ -346,6 +346,30 @@ def test_feed_is_lowered_to_what_the_bus_carries(
     assert all("the bus has 5.0 for it: feed override set to" in text for text in at.said)
 
 
+@pytest.mark.parametrize(
+    ("next_bytes", "next_s", "planned_s", "slow", "at_once"),
+    [
+        (6000, 1.0, 1.5, 17e3, True),  # there after 0.6 s; 1 s of motion was sent
+        (8000, 1.0, 1.5, 17e3, False),
+        (12_000, 1.0, 5.0, 17e3, False),  # the feed override will be lowered
+        (12_000, 1.0, 5.0, None, True),  # it rests at tails anyway
+        (12_000, 1.0, 1.9, None, False),  # all of it is soon there
+        (12_000, 1.5, 5.0, None, False),
+        (None, 1.0, 5.0, None, False),
+    ],
+)
+def test_motion_starts_when_waiting_is_of_no_use(
+    next_bytes: int | None, next_s: float, planned_s: float, slow: float | None, at_once: bool
+) -> None:
+    """10 kB took 1 s and hold 1 s of motion."""
+    item = None if next_bytes is None else (None, SimpleNamespace(size=next_bytes), next_s)
+    plan: Any = SimpleNamespace(item=lambda *_: item, planned_s=planned_s)
+    nothing: Any = None
+    sender = Sender(nothing, nothing, plan, lambda *_: None, slow=slow)
+    sender._bytes, sender._sending_s, sender._motion_s = 10_000, 1.0, 1.0
+    assert sender._need_not_wait() == at_once
+
+
 def test_the_free_part_of_a_bus() -> None:
     """A virtual bus has no bit rate; of a real one the chunks get what setpoints leave, less pauses."""
     machine = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")

@@ -16,7 +16,7 @@ from ..extremum import greatest_curvature
 from ..frames import Frames
 from ..quintics import extra_frames
 from ..splitting import Image, split_segments
-from .quaternion import polar
+from .quaternion import polar, polar_of
 
 _GREATEST_COMPONENT = 8.0 - 2.0**-40
 """Of A in a program: it has 48 bits for one, 44 of them after the point (docs/reference/protocol.md 1.2)."""
@@ -212,12 +212,12 @@ def _inner(a: Real, b: Real) -> Real:
 
 def _image(a: Real, b: Real) -> Real:
     """(a i b* + b i a*) / 2 (3, …) of quaternions (4, …), as `polar`."""
-    return np.moveaxis(polar(np.moveaxis(a, 0, -1), np.moveaxis(b, 0, -1)), -1, 0)
+    return np.stack(polar_of(a, b))
 
 
 def hodograph_of(preimage: Real) -> Real:
     """Bernstein coefficients (…, 3, 5) of A i A* for quadratics A (…, 4, 3)."""
-    a, b, c = np.moveaxis(preimage, -1, 0)
+    a, b, c = preimage[..., 0], preimage[..., 1], preimage[..., 2]
     middle = (2.0 * polar(b, b) + polar(a, c)) / 3.0
     parts = (polar(a, a), polar(a, b), middle, polar(b, c), polar(c, c))
     return np.stack(parts, axis=-1)
@@ -225,7 +225,7 @@ def hodograph_of(preimage: Real) -> Real:
 
 def speed_of(preimage: Real) -> Real:
     """Bernstein coefficients (…, 5) of |A|^2 for quadratics A (…, 4, 3)."""
-    a, b, c = np.moveaxis(preimage, -1, 0)
+    a, b, c = preimage[..., 0], preimage[..., 1], preimage[..., 2]
     pairs = ((a, a), (a, b), (b, b), (a, c), (b, c), (c, c))
     aa, ab, bb, ac, bc, cc = (np.sum(one * other, axis=-1) for one, other in pairs)
     return np.stack((aa, ab, (2.0 * bb + ac) / 3.0, bc, cc), axis=-1)

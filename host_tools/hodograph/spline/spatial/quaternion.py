@@ -7,6 +7,8 @@ A e^(i phi), have the same image.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..bernstein import Real
@@ -14,7 +16,7 @@ from ..bernstein import Real
 
 def left(a: Real) -> Real:
     """Matrices (…, 3, 4) with left(a) b = (a i b* + b i a*) / 2, the polar form of a i a*."""
-    u, v, p, q = np.moveaxis(a, -1, 0)
+    u, v, p, q = _components(a)
     out = np.empty((*a.shape[:-1], 3, 4))
     out[..., 0, 0], out[..., 0, 1], out[..., 0, 2], out[..., 0, 3] = u, v, -p, -q
     out[..., 1, 0], out[..., 1, 1], out[..., 1, 2], out[..., 1, 3] = q, p, v, u
@@ -24,16 +26,26 @@ def left(a: Real) -> Real:
 
 def polar(a: Real, b: Real) -> Real:
     """(a i b* + b i a*) / 2 (…, 3): symmetric, bilinear, a i a* for a = b."""
-    u, v, p, q = np.moveaxis(a, -1, 0)
-    u_b, v_b, p_b, q_b = np.moveaxis(b, -1, 0)
-    return np.stack(
-        (
-            (u * u_b + v * v_b) - (p * p_b + q * q_b),
-            (u * q_b + q * u_b) + (v * p_b + p * v_b),
-            (v * q_b + q * v_b) - (u * p_b + p * u_b),
-        ),
-        axis=-1,
+    x, y, z = polar_of(_components(a), _components(b))
+    out = np.empty((*x.shape, 3))
+    out[..., 0], out[..., 1], out[..., 2] = x, y, z
+    return out
+
+
+def polar_of(a: Real | Sequence[Real], b: Real | Sequence[Real]) -> tuple[Real, Real, Real]:
+    """The same by component: x, y and z from u, v, p, q of both."""
+    u, v, p, q = a
+    u_b, v_b, p_b, q_b = b
+    return (
+        (u * u_b + v * v_b) - (p * p_b + q * q_b),
+        (u * q_b + q * u_b) + (v * p_b + p * v_b),
+        (v * q_b + q * v_b) - (u * p_b + p * u_b),
     )
+
+
+def _components(a: Real) -> tuple[Real, Real, Real, Real]:
+    """u, v, p, q. np.moveaxis takes longer than what is made of them where there are few."""
+    return a[..., 0], a[..., 1], a[..., 2], a[..., 3]
 
 
 def along_fibre(a: Real) -> Real:
@@ -43,7 +55,7 @@ def along_fibre(a: Real) -> Real:
 
 def across_fibre(a: Real) -> Real:
     """Matrices (…, 4, 3) with columns a, a j, a k: the three directions that are orthogonal to a i."""
-    u, v, p, q = np.moveaxis(a, -1, 0)
+    u, v, p, q = _components(a)
     by_j, by_k = np.stack((-p, -q, u, v), axis=-1), np.stack((-q, p, -v, u), axis=-1)
     return np.stack((a, by_j, by_k), axis=-1)
 
