@@ -13,9 +13,6 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 /* A state that others see as FEED_RUNNING: at rest at the end of a tail. */
 #define STATE_WAITING ((uint32_t)FEED_HELD + 1u)
 
-/* Whether a brake would rest before the end of the path: found out a tick before it begins. */
-enum look { LOOK_NOT_YET, LOOK_SEEN, LOOK_FITS, LOOK_WAIT };
-
 #define TICK_Q30          ((int64_t)1 << 30)
 #define SPARE_TICKS       2        /* of the deadline: rounding */
 #define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
@@ -128,7 +125,6 @@ static void ask(struct feed_override *f, enum program_stop_kind kind)
     const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
     f->kind = (uint32_t)kind;
     f->left_q30 = qmath_greater(deadline_q30(f), left_q30);
-    f->look = LOOK_NOT_YET;
     read_numbers(f);
 }
 
@@ -298,17 +294,6 @@ static int is_far_from_end(const struct feed_override *f, const struct path_stat
 
 /* --- From the plan to the brake --- */
 
-/* Whether a brake may begin at this state: far from the end at once, else when the look at an earlier tick says so. */
-static int may_leave(struct feed_override *f, const struct path_state *state)
-{
-    if (f->look == LOOK_FITS || is_far_from_end(f, state)) {
-        return 1;
-    }
-    f->seen = *state;
-    f->look = LOOK_SEEN;
-    return 0;
-}
-
 /* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk of the
  * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
@@ -316,11 +301,8 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
         return 0;
     }
-    if (!may_leave(f, state)) {
-        return 0;
-    }
-    f->look = LOOK_NOT_YET;
-    if (!path_brake_begin(&f->brake, state, &f->numbers)) {
+    if (!path_brake_begin(&f->brake, state, &f->numbers) ||
+        !(is_far_from_end(f, state) || fits_before_end(f, state))) {
         return 0;
     }
     f->phase = PHASE_BRAKE;
@@ -363,22 +345,15 @@ static void enter_piece(struct feed_override *f)
     }
 }
 
-/* A stop has been requested, and the plan is still what goes on: it is left, or it goes on for another tick. What there is
- * to find out before is spread over ticks. */
+/* A stop has been requested, and the plan is still what goes on: it is left, or it goes on for another tick. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
         if (f->numbers_piece != f->clock.piece) {
             enter_piece(f);
         }
-        if (f->look == LOOK_SEEN) {
-            f->look = fits_before_end(f, &f->seen) ? LOOK_FITS : LOOK_WAIT;
-        }
-        if (f->look != LOOK_WAIT && leaves_or_rests(f, it)) {
+        if (leaves_or_rests(f, it)) {
             return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERPOLATOR_OK;
-        }
-        if (f->look != LOOK_SEEN) {
-            f->look = LOOK_NOT_YET; /* what fits, fits in this tick only */
         }
         f->left_q30 -= qmath_lesser(override_q30(f), TICK_Q30);
         wait_slowly(f);
@@ -390,13 +365,8 @@ static int wait_tick(struct feed_override *f, struct interpolator *it)
 static void replace_brake(struct feed_override *f)
 {
     const struct path_state at = f->brake.at;
-    if (f->look == LOOK_NOT_YET && f->numbers_kind == f->kind && fits_before_end(f, &at)) {
-        f->look = LOOK_FITS;
-        return;
-    }
-    if (f->look == LOOK_FITS) {
+    if (f->numbers_kind == f->kind && fits_before_end(f, &at)) {
         (void)path_brake_begin(&f->brake, &at, &f->numbers);
-        f->look = LOOK_NOT_YET;
     }
     f->replace = 0;
 }

@@ -47,8 +47,6 @@ struct feed_override {
     struct path_brake_numbers numbers; /* of the requested stop, in this piece: */
     uint32_t numbers_piece;
     uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
-    struct path_state seen;           /* near the end of the program: the state looked at, */
-    uint32_t look;                    /* and how far the look has come */
     struct interpolator_search place; /* of rest */
     struct interpolator_point point;  /* of the last setpoint */
     uint32_t state;   /* enum feed_state: what is wanted, and whether it is reached, */

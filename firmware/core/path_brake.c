@@ -9,10 +9,11 @@
 #define MOST_BITS        12 /* of PATH_BRAKE_MOST_TICKS */
 #define SIXTH_Q32        715827882u
 #define THREE_HALVES_Q16 98304u
-#define SPARE     3 /* ticks of path_brake_fits: one of the motion, two that the brake takes more */
-#define RISE_BITS 7 /* of an acceleration at which a brake begins, over its deceleration */
-#define LEAST     (1 << 22) /* 2^-34 mm a tick squared, or cubed */
-#define FITS_BITS 57        /* of a deceleration that path_brake_fits knows */
+#define SPARE_HALVES 3 /* half ticks of path_brake_fits: what a brake in whole ticks takes more */
+#define ONE_TICK_Q16 65536u
+#define RISE_BITS    7 /* of an acceleration at which a brake begins, over its deceleration */
+#define LEAST        (1 << 22) /* 2^-34 mm a tick squared, or cubed */
+#define FITS_BITS    57        /* of a deceleration that path_brake_fits knows */
 
 enum phase { FALLING, READY, SETTLING, RESTING };
 
@@ -190,36 +191,53 @@ static int squares_within(int64_t x, int64_t y, int64_t a_q56, int64_t way_q40_m
     return within(need, rough_of(a_q56), rough_of(way_q40_mm), FINE_BITS - 2 * (33 - up));
 }
 
+/* a^2 / (2 j): the speed that an acceleration makes while it goes to 0. */
+static int64_t speed_of_rise(int64_t a_q56, int64_t jerk_q56)
+{
+    return over_ticks(a_q56, ramp_ticks_q16(a_q56, jerk_q56)) / 2;
+}
+
+/* x^2 + 3/8 y^2 <= 2 a way, for the way to rest from an onset `fall` that is behind a speed. */
+static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
+                        int64_t fall_q56, int64_t most_q56, int64_t way_q40_mm)
+{
+    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the way, a t^2 / 6 */
+    const uint32_t exact_q16 = ramp_ticks_q16(fall_q56, numbers->jerk_down_q56);
+    const uint32_t first_q16 = exact_q16 > ONE_TICK_Q16 ? exact_q16 : ONE_TICK_Q16;
+    const int64_t early = over_ticks(fall_q56, first_q16) / 2;
+    const int64_t saved = qmath_third(over_ticks(early, first_q16 - (first_q16 >> 10)));
+    const int64_t late = speed_of_rise(most_q56, numbers->jerk_up_q56);
+    if ((early | late) >> 60 != 0) {
+        return 0;
+    }
+    return squares_within(speed_q56 + early, late, most_q56, way_q40_mm + (saved >> FINE_BITS));
+}
+
 /* The way is at most that with the deceleration alone from a higher speed, and what the last jerk takes
  * (docs/theory/numerics.md section 12); the deceleration is one that is about reached. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t way_q40_mm)
 {
-    const int64_t way_left = way_q40_mm - SPARE * (from->speed_q56 >> FINE_BITS);
-    if (!in_range(from, numbers) || way_left <= 0 || from->acceleration_q56 >> FITS_BITS > 0) {
+    const int64_t a = from->acceleration_q56;
+    if (!in_range(from, numbers) || a >> FITS_BITS > 0 || -a >> FITS_BITS > 0) {
         return 0;
     }
+    const int64_t rise = qmath_greater(a, 0);
+    const int64_t turned = speed_of_rise(qmath_magnitude(a), numbers->jerk_down_q56);
+    if (turned >= MOST_Q56) {
+        return 0;
+    }
+    const int64_t speed = from->speed_q56 + rise / 2;
+    const int64_t greatest = speed + (a > 0 ? turned : 0);
+    const int64_t way_left = way_q40_mm - (SPARE_HALVES * greatest >> (FINE_BITS + 1));
     const int64_t jerk = qmath_lesser(numbers->jerk_down_q56, numbers->jerk_up_q56);
-    const int64_t change =
-        numbers->jerk_down_q56; /* of the acceleration, in a tick of the motion */
-    const int64_t rise = qmath_greater(from->acceleration_q56, 0) + change;
     const int64_t reached =
-        qmath_greater(depth(from->speed_q56 >> 1, jerk), from->speed_q56 >> MOST_BITS);
+        qmath_greater(depth((from->speed_q56 + turned) >> 1, jerk), from->speed_q56 >> MOST_BITS);
     const int64_t most = qmath_lesser(numbers->deceleration_q56, reached);
-    const int64_t fall = qmath_greater(most + from->acceleration_q56 + change, 0);
-    if (most >> FITS_BITS != 0) {
+    if (way_left <= 0 || most >> FITS_BITS != 0) {
         return 0;
     }
-    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the way, a t^2 / 6 */
-    const uint32_t first_q16 = ramp_ticks_q16(fall, numbers->jerk_down_q56);
-    const int64_t early = over_ticks(fall, first_q16) / 2;
-    const int64_t saved = qmath_third(over_ticks(early, first_q16 - (first_q16 >> 10)));
-    const int64_t late = over_ticks(most, ramp_ticks_q16(most, numbers->jerk_up_q56)) / 2;
-    const int64_t speed = from->speed_q56 + early + most + rise;
-    if ((early | late) >> 60 != 0) {
-        return 0;
-    }
-    return squares_within(speed, late, most, way_left + (saved >> FINE_BITS));
+    return rests_within(numbers, speed, qmath_greater(most + a, 0), most, way_left);
 }
 
 /* --- Tick --- */

@@ -479,7 +479,6 @@ static void any_motion(uint32_t n)
     f.at_end = nondet_uint32();
     f.phase = nondet_uint32();
     f.kind = nondet_uint32() & 1u;
-    f.look = nondet_uint32() & 3u;
     f.found = nondet_uint32() & 1u;
     f.replace = nondet_uint32() & 1u;
     f.numbers_piece = nondet_uint32();

@@ -10,7 +10,7 @@
  * instead: core/path_brake.c: (uint32_t)((uint64_t)a << zeros >> 33), 33 - zeros => some_mantissa(a), (int)any_between(0 * zeros - 30, 32)
  * instead: core/path_brake.c: rough_of(speed_q56 - fall_q56) => rough_of(any_between(1, speed_q56))
  * instead: core/path_brake.c: rise <= MOST_Q56 && => from->acceleration_q56 <= MOST_Q56 && rise <= MOST_Q56 &&
- * instead: core/path_brake.c: from->acceleration_q56 >> FITS_BITS > 0 => from->acceleration_q56 >= (int64_t)1 << FITS_BITS
+ * instead: core/path_brake.c: a >> FITS_BITS > 0 || -a >> FITS_BITS > 0 => a >= (int64_t)1 << FITS_BITS || a <= -((int64_t)1 << FITS_BITS)
  * instead: core/path_brake.c: (early | late) >> 60 != 0 => early < 0 || early >= MOST_Q56 || late < 0 || late >= MOST_Q56
  * instead: core/path_brake.c: qmath_shift_clamp(ratio_q15, a.exponent => some_shift(ratio_q15, a.exponent
  * instead: core/path_brake.c: qmath_div_up_u64(2u * speed, fall) => ticks_of(2u * speed, fall)

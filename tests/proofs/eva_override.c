@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The feed override, for a program of three pieces: every command, a tick and every question, from any phase, state and
- * look, whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no
+ * The feed override, for a program of three pieces: every command, a tick and every question, from any phase and state,
+ * whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no
  * conversion to a signed type changes a number, no division by 0, no entry of the stop table beyond the last is read, and
  * what stands in a field of few values stays one of them.
  *
@@ -84,8 +84,6 @@ static void place(struct feed_override *f)
     f->numbers = any_numbers();
     f->numbers_piece = (uint32_t)any_between(0, UINT32_MAX);
     f->numbers_kind = (uint32_t)any_between(0, 2);
-    f->seen = any_at();
-    f->look = (uint32_t)any_between(0, 3);
     f->place.piece = &record;
     f->place.piece_index = (uint32_t)any_between(0, COUNT - 1);
     f->place.time_q42_s = (uint64_t)any_between(INT64_MIN, INT64_MAX);
@@ -103,7 +101,7 @@ static void place(struct feed_override *f)
 
 static void stays(const struct feed_override *f)
 {
-    prove(f->numbers_kind <= 2 && f->look <= 3 && f->state <= 6 && f->phase <= 2 && f->kind <= 1);
+    prove(f->numbers_kind <= 2 && f->state <= 6 && f->phase <= 2 && f->kind <= 1);
     prove(f->at_end <= 6 && f->goes_on <= 1);
     prove(f->replace <= 1 && f->found <= 1 && f->clock.piece < COUNT);
 }

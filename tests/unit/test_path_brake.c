@@ -278,10 +278,80 @@ static bool ordinary(const struct brake_case *c)
            c->most < 4000 * c->period * fmin(c->down, c->up) && c->speed > least;
 }
 
+/* What path_brake_fits takes for the distance of a brake: the least distance in which it says that one fits. */
+static int64_t bound_of(const struct path_state *from, const struct path_brake_numbers *n)
+{
+    int64_t low = 0;
+    int64_t high = (int64_t)1 << 60;
+    TEST_ASSERT_TRUE(path_brake_fits(from, n, high));
+    while (high - low > 1) {
+        const int64_t middle = low + (high - low) / 2;
+        *(path_brake_fits(from, n, middle) ? &high : &low) = middle;
+    }
+    return high;
+}
+
+/* Distance of a brake whose first tick is in place of a step. */
+static int64_t way_of_stop(const struct path_state *from, const struct path_brake_numbers *n)
+{
+    struct path_brake brake;
+    TEST_ASSERT_TRUE(path_brake_begin(&brake, from, n));
+    path_brake_first(&brake);
+    while (!path_brake_rests(&brake)) {
+        path_brake_step(&brake);
+    }
+    return way_from(from, &brake.at);
+}
+
+/* A brake out of a motion that comes to its end needs no more than is promised, and at most two ticks of its speed less. */
+static void test_bound_near_the_end_of_a_program(void)
+{
+    for (uint32_t i = 0; i < CASES / 10; i++) {
+        struct brake_case c = {.speed = spread(4, 50), .most = 5000, .period = 1e-3};
+        c.down = c.up = spread(5e4, 2e5);
+        c.acceleration = -uniform(0.2, 0.9) * sqrt(c.speed * c.up);
+        const struct path_state from = state_of(&c);
+        const struct path_brake_numbers n = numbers_of(&c);
+        struct path_brake brake;
+        if (path_brake_begin(&brake, &from, &n)) {
+            const int64_t spare = bound_of(&from, &n) - way_of_stop(&from, &n);
+            TEST_ASSERT_TRUE(spare >= 0);
+            TEST_ASSERT_TRUE((double)spare <= 2 * c.speed * c.period * Q40);
+        }
+    }
+}
+
+/* The end of the alpha: 27.4 ms before it 0.126 mm are left. */
+static void test_bound_at_the_end_of_the_alpha(void)
+{
+    const struct brake_case c = {14.925, -1175.35, 185362, 4870.9, 185362, 1e-3};
+    const struct path_state from = state_of(&c);
+    const struct path_brake_numbers n = numbers_of(&c);
+    TEST_ASSERT_TRUE(path_brake_fits(&from, &n, (int64_t)(0.126 * Q40)));
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.0857, (double)way_of_stop(&from, &n) / Q40);
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.1019, (double)bound_of(&from, &n) / Q40);
+}
+
+/* Found by search: the brakes that come nearest to the bound. */
+static void test_brakes_nearest_to_the_bound(void)
+{
+    static const struct brake_case cases[] = {
+        {9.341, 0.085, 587600, 833.6, 104200, 1e-3},
+        {5.08, -7.36, 686000, 969, 428000, 1e-3},
+        {167, -1.85, 48600, 2750, 47300, 1e-3},
+        {0.804, 30800, 475e6, 31400, 556000, 1e-3},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        const struct path_state from = state_of(&cases[i]);
+        const struct path_brake_numbers n = numbers_of(&cases[i]);
+        TEST_ASSERT_TRUE(bound_of(&from, &n) >= way_of_stop(&from, &n));
+    }
+}
+
 /* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and the
  * acceleration is below half the deceleration, there is one. No brake takes
  * MORE_TICKS more than the continuous one; a short one with a slow last jerk takes MORE_IN_SHORT.
- * path_brake_fits never promises less than a brake takes. */
+ * path_brake_fits never promises less than a brake takes, with its first tick in place of a step or without. */
 static void test_random_brakes(void)
 {
     uint32_t found = 0;
@@ -304,6 +374,7 @@ static void test_random_brakes(void)
             TEST_ASSERT_TRUE(ticks <= least + (least < 25 ? MORE_IN_SHORT : MORE_TICKS));
         }
         TEST_ASSERT_FALSE(path_brake_fits(&from, &numbers, way - 1));
+        TEST_ASSERT_FALSE(path_brake_fits(&from, &numbers, way_of_stop(&from, &numbers) - 1));
     }
     TEST_ASSERT_TRUE(found > CASES / 2);
 }
@@ -377,6 +448,9 @@ int main(void)
     RUN_TEST(test_no_rise_before_the_way_to_rest);
     RUN_TEST(test_first_tick);
     RUN_TEST(test_random_brakes);
+    RUN_TEST(test_bound_near_the_end_of_a_program);
+    RUN_TEST(test_bound_at_the_end_of_the_alpha);
+    RUN_TEST(test_brakes_nearest_to_the_bound);
     RUN_TEST(test_refused_states);
     RUN_TEST(test_extreme_numbers);
     return UNITY_END();
