@@ -29,6 +29,7 @@ from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
 from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
+from .program.stops import FAULT
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
@@ -59,8 +60,11 @@ GREATEST_TOLERANCE_MM = 10.0
 _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
-_QUICK_CHORDS = 1000
-"""Sections with more chords are searched for stops with few trials."""
+_THOROUGH_CHORDS = 1000
+"""Sections with at most so many chords are searched for stops with all trials, where few do not suffice."""
+
+_THOROUGH_GAIN = 1.1
+"""About how many times as long the bounds of stops are that few trials find."""
 
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
@@ -74,10 +78,14 @@ _ROUNDING_MM = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class SectionPipeline(Pipeline):
-    """A pipeline whose curve is that of a section."""
+    """A pipeline whose curve is that of a section.
+
+    thorough  whether stops are searched with all trials
+    """
 
     fitted: FittedPath | None = None
     given_events: Events = field(default_factory=no_events)
+    thorough: bool = False
 
     @property
     def events(self) -> Events:
@@ -96,8 +104,7 @@ class SectionPipeline(Pipeline):
     @property
     def stop_terms(self) -> StopTerms:
         """What the stops of the program keep."""
-        assert self.fitted is not None
-        return replace(super().stop_terms, quick=self.fitted.reference.count > _QUICK_CHORDS)
+        return replace(super().stop_terms, quick=not self.thorough)
 
     def _planned(self, limits: Limits) -> FeedPlan:
         """The plan; with more reserve where a piece would have none left for the least override rate."""
@@ -117,7 +124,7 @@ class SectionPipeline(Pipeline):
         steps: list[ReserveStep | float] = [*STEPS, *EVERYWHERE]
         while True:
             try:
-                return super()._compiled(plan)
+                return self._with_stops(plan)
             except LongStopError as error:
                 if late_mostly(error.program, longest_s):
                     steps = [step for step in steps if isinstance(step, float)]
@@ -130,6 +137,20 @@ class SectionPipeline(Pipeline):
                     zones += tuple(reserve_zones(error.program, longest_s, step))
                     lower = replace(limits, reserve_zones=zones)
             plan = self._planned(lower)
+
+    def _with_stops(self, plan: FeedPlan) -> Compilation:
+        """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
+        all. Raises LongStopError.
+        """
+        try:
+            return super()._compiled(plan)
+        except LongStopError as error:
+            longest_s = _THOROUGH_GAIN * self.machine.stop_time_ms * 1e-3
+            assert self.fitted is not None
+            few = self.fitted.reference.count <= _THOROUGH_CHORDS
+            if self.thorough or not few or error.program.stops.worst(FAULT).time_s > longest_s:
+                raise
+            return replace(self, thorough=True)._with_stops(plan)
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:
