@@ -7,21 +7,24 @@ the programs in build/bin.
 
 import os
 import shutil
+import subprocess
 import sys
+import sysconfig
 import zipfile
 from pathlib import Path
 
 from setuptools import setup
 from setuptools.command.bdist_wheel import bdist_wheel
+from setuptools.command.build import build
 from setuptools.command.build_ext import build_ext
-from setuptools.errors import FileError
+from setuptools.errors import CompileError, FileError, PlatformError
 
 ROOT = Path(__file__).resolve().parent
 sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "host_tools/hodograph/native")]
 
 from build_native import extension  # noqa: E402
 
-from dist.programs import build_programs, programs_for  # noqa: E402
+from dist.programs import build_programs, compiler, programs_for  # noqa: E402
 
 PROGRAMS = tuple(programs_for(sys.platform))
 BY_MAKE = os.environ.get("HODOGRAPH_BUILT_BY_MAKE") == "1"
@@ -39,6 +42,33 @@ NEEDED = (
 )
 
 
+class CheckedBuild(build):
+    """Begins with what the computer needs: without it, the message would come after the names of all files."""
+
+    def run(self) -> None:
+        """Builds; raises a PlatformError that says what is missing. Other systems than POSIX find their compilers."""
+        missing = what_is_missing() if os.name == "posix" and not BY_MAKE else None
+        if missing is not None:
+            raise PlatformError(
+                f"{missing}, or install the wheel of hodograph, which is compiled"
+            )
+        super().run()
+
+
+def what_is_missing() -> str | None:
+    """What the computer lacks to compile the package, and what to do; None when it has all."""
+    program = compiler()[0]
+    if shutil.which(program) is None:
+        return (
+            f"no C compiler: {program} was not found; install one (Debian: apt install gcc libc6-dev python3-dev), "
+            "or set CC"
+        )
+    header = Path(sysconfig.get_path("include"), "Python.h")
+    if not header.is_file():
+        return f"no C header of Python: {header} was not found; install it (Debian: apt install python3-dev)"
+    return None
+
+
 class BuildAll(build_ext):
     """The native module, and then, on Linux, the programs, which lie in the package's folder `bin`."""
 
@@ -46,10 +76,15 @@ class BuildAll(build_ext):
         """Compiles both; an installation for editing gets the programs in build/bin, where `make` puts them."""
         super().run()
         work = Path(self.build_temp) / "programs"
-        if self.inplace or self.editable_mode:
-            build_programs(ROOT, work, ROOT / "build/bin")
-        else:
-            build_programs(ROOT, work, Path(self.build_lib) / "hodograph/bin")
+        inside = (
+            ROOT / "build"
+            if self.inplace or self.editable_mode
+            else Path(self.build_lib, "hodograph")
+        )
+        try:
+            build_programs(ROOT, work, inside / "bin")
+        except subprocess.CalledProcessError as error:
+            raise CompileError(f"{error.cmd[0]} ended with status {error.returncode}") from None
 
     def get_outputs(self) -> list[str]:
         """Files of the wheel."""
@@ -101,6 +136,10 @@ remove_stale_build()
 setup(
     ext_modules=[extension(ROOT)],
     data_files=shared_files(),
-    cmdclass={"bdist_wheel": CompleteWheel, "build_ext": NothingToBuild if BY_MAKE else BuildAll},
+    cmdclass={
+        "bdist_wheel": CompleteWheel,
+        "build": CheckedBuild,
+        "build_ext": NothingToBuild if BY_MAKE else BuildAll,
+    },
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

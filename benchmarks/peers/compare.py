@@ -34,7 +34,7 @@ from peers import klipper, linuxcnc, picture, ruckig_stops, toppra_spline
 from peers.motion import AxisLimits, Motion, deviation_um
 from peers.plan_alone import SLOWEST_S, plan_alone
 from peers.process_cost import Cost, run_measured
-from peers.toolpaths import Toolpath, toolpaths
+from peers.toolpaths import WORDS, Toolpath, toolpaths
 
 Real = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--figure", type=Path, help="a corner of the zigzag, drawn as SVG")
-    parser.add_argument("--only", nargs="*", default=[], help="these toolpaths")
+    parser.add_argument("--only", nargs="+", choices=WORDS, metavar="NAME", help=", ".join(WORDS))
     parser.add_argument(
         "--klipper", type=Path, metavar="CLONE", help="folder of a clone of Klipper"
     )
@@ -105,7 +105,7 @@ def _optional_klipper(
 
 
 def _printed(
-    only: list[str], peer: klipper.Klipper | None, motions: dict[str, Motion]
+    only: list[str] | None, peer: klipper.Klipper | None, motions: dict[str, Motion]
 ) -> list[Row]:
     """Measures and prints row by row; keeps the motions that the figure shows."""
     klipper_part = "" if peer is None else f", Klipper {peer.version}"
@@ -123,12 +123,12 @@ def _printed(
 
 
 def _rows(
-    only: list[str], peer: klipper.Klipper | None, motions: dict[str, Motion]
+    only: list[str] | None, peer: klipper.Klipper | None, motions: dict[str, Motion]
 ) -> Iterator[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for feed in FEEDS_MM_MIN:
             for toolpath in toolpaths(feed):
-                if only and toolpath.name not in only:
+                if only and toolpath.word not in only:
                     continue
                 file = Path(folder, f"{toolpath.name.replace(' ', '_')}_{feed:g}.ngc")
                 file.write_text(toolpath.text, encoding="utf-8")

@@ -14,6 +14,8 @@ from hodograph.data import EXAMPLES
 from hodograph.pipeline import load_pipeline
 
 LINUXCNC_FILES = Path("/usr/share/linuxcnc/ncfiles")
+WORDS = ("heart", "rectangle", "zigzag", "spiral", "3D_Chips")
+"""One for each toolpath, as an option names it."""
 _HEAD = "G21 G90 G17 G94\nF{feed:g}\n"
 
 
@@ -30,6 +32,11 @@ class Toolpath:
     text: str
     smooth: bool
     plain: bool
+
+    @property
+    def word(self) -> str:
+        """Of WORDS."""
+        return self.name.split()[-1]
 
     @property
     def feed_mm_s(self) -> float:

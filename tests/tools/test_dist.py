@@ -114,6 +114,59 @@ def check_source(source: Path) -> None:
     assert {"firmware/core/program.c", "sim/hub/main.c", "LICENSE", "CHANGELOG.md"} <= names
 
 
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """What setup.py needs, in a folder into which it may write."""
+    folder = tmp_path / "tree"
+    folder.mkdir()
+    for name in (
+        "pyproject.toml",
+        "README.md",
+        "LICENSE",
+        "host_tools",
+        "tools",
+        "firmware",
+        "sim",
+    ):
+        (folder / name).symlink_to(ROOT / name)
+    (folder / "setup.py").write_bytes((ROOT / "setup.py").read_bytes())
+    return folder
+
+
+def refused(tree: Path, code: str, **variables: str) -> str:
+    """The lines that a build prints; `code` goes before setup.py."""
+    program = f"import runpy; {code}; runpy.run_path('setup.py', run_name='__main__')"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "build"],
+        cwd=tree,
+        env=os.environ | {"HODOGRAPH_BUILT_BY_MAKE": ""} | variables,
+        capture_output=True,
+        text=True,
+        timeout=HANGS_S,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert not (tree / "build/lib").exists()
+    lines = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
+    assert "copying" not in done.stdout + done.stderr
+    assert "Traceback" not in done.stderr
+    (line,) = lines
+    return line
+
+
+def test_without_a_compiler_one_line_says_so(tree: Path) -> None:
+    line = refused(tree, "pass", CC="no-such-compiler -O2")
+    assert line.startswith("error: no C compiler: no-such-compiler was not found; install one (")
+    assert line.endswith("or set CC, or install the wheel of hodograph, which is compiled")
+
+
+def test_without_the_header_of_python_one_line_says_so(tree: Path) -> None:
+    """As on Debian without python3-dev."""
+    elsewhere = "import sysconfig; sysconfig.get_path = lambda *_, **__: '/no/include'"
+    line = refused(tree, elsewhere)
+    assert line.startswith("error: no C header of Python: /no/include/Python.h was not found; ")
+
+
 @pytest.mark.long
 def test_the_same_bytes_twice(tmp_path: Path) -> None:
     first, second = (make_release(tmp_path / name, None) for name in ("a", "b"))

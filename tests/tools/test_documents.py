@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from argparse import _SubParsersAction
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,17 @@ def test_links_and_merges(page: Path) -> None:
     assert [link for link in links if not (page.parent / link).exists()] == []
     marks = [line for line in text.splitlines() if re.match(r"(<{7}|>{7})( |$)|={7}$", line)]
     assert marks == []
+
+
+@pytest.mark.parametrize("page", sorted(ROOT.glob("docs/**/*.md")), ids=lambda page: page.name)
+def test_the_site_takes_the_page(page: Path) -> None:
+    """`make site` ends at each of these: a heading two levels below the one before, a link to a page elsewhere."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    levels = [len(mark) for mark in re.findall(r"^(#+) ", text, re.MULTILINE)]
+    assert levels[0] == 1
+    assert all(below - above <= 1 for above, below in pairwise(levels))
+    pages = [(page.parent / link).resolve() for link in LINK.findall(text) if link.endswith(".md")]
+    assert [file for file in pages if not file.is_relative_to(ROOT / "docs")] == []
 
 
 def code(page: Path) -> str:

@@ -20,7 +20,7 @@ from ..data import EXAMPLES
 from ..pipeline import load_pipeline
 from ..report import write_report
 from .motion_commands import print_run
-from .output import note, print_json, progress
+from .output import note, print_json, progress, require_places
 
 _PROGRAM = EXAMPLES / "alpha.toml"
 _WAIT_S = 10.0
@@ -30,6 +30,7 @@ _URL = re.compile(r"http://\S+(?=\s)")
 
 def demo(options: Namespace) -> None:
     """hodograph demo."""
+    require_places(folders=[options.output])
     pipeline = load_pipeline(_PROGRAM)
     machine = pipeline.machine
     with LocalHub(speed=1.0) as hub, _live_page(hub.address) as url:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import logging
 import os
 import signal
 import sys
@@ -142,6 +143,8 @@ def _run(options: argparse.Namespace) -> None:
     command = options.command
     WANTED.notes = not options.quiet
     WANTED.progress = not (options.quiet or options.no_progress)
+    # Matplotlib warns where a user has no folder for its cache, which is no concern of who wants a report.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     shown = WANTED.progress and command in _COMPUTING
     with waiting(command) if shown else nullcontext():
         module = import_module(f"{__package__}.{_MODULES[command]}")

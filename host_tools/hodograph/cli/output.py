@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -134,14 +136,50 @@ class _Lines:
         note(f"{self._title}: {self._unit} {done}{of}")
 
 
+def require_places(*files: Path | None, folders: Sequence[Path | None] = ()) -> None:
+    """Raises InputError: a file or folder that a command writes at its end cannot be made; None: none is asked for.
+
+    To be called first: a run takes long, and a motion of the machine cannot be had again. It writes nothing.
+    """
+    for file in filter(None, files):
+        _require_place(file, errno.EISDIR if file.is_dir() else _refusal(file.parent))
+    for folder in filter(None, folders):
+        above = (place for place in (folder, *folder.parents) if place.exists())
+        _require_place(folder, _refusal(next(above)))
+
+
+def _require_place(path: Path, code: int | None) -> None:
+    if code is not None:
+        raise InputError(f"{path}: cannot be written: {os.strerror(code)}")
+
+
+def _refusal(folder: Path) -> int | None:
+    """Why nothing can be written into a folder, as errno; None where it can."""
+    if not folder.exists():
+        return errno.ENOENT
+    if not folder.is_dir():
+        return errno.ENOTDIR
+    return None if os.access(folder, os.W_OK | os.X_OK) else errno.EACCES
+
+
 def write_file(file: Path, data: bytes) -> None:
-    """Writes a result, whole or not at all. Raises InputError."""
+    """Writes a result, whole or not at all; into a device or a pipe as it comes. Raises InputError."""
+    if file.exists() and not file.is_file() and not file.is_dir():
+        _write_into(file, data)
+        return
     fresh = file.with_name(file.name + ".part")
     try:
         fresh.write_bytes(data)
         fresh.replace(file)
     except OSError as error:
         fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
+        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+
+
+def _write_into(file: Path, data: bytes) -> None:
+    try:
+        file.write_bytes(data)
+    except OSError as error:
         raise InputError(f"{file}: cannot be written: {error.strerror}") from None
 
 

@@ -31,6 +31,7 @@ from .output import (
     print_json,
     print_rows,
     progress,
+    require_places,
     size_text,
     write_file,
 )
@@ -199,6 +200,7 @@ def _program_of(pipeline: Pipeline) -> Program | None:
 
 def compile_(options: Namespace) -> None:
     """hodograph compile."""
+    require_places(options.output)
     if is_toolpath(options.file):
         pipeline = section_pipeline(options)
     else:
@@ -301,6 +303,7 @@ def simulate_pipeline(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool
 
 def simulate_(options: Namespace) -> None:
     """hodograph simulate."""
+    require_places(options.trace)
     if is_toolpath(options.file):
         simulate_toolpath(options)
         return

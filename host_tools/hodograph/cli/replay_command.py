@@ -7,7 +7,7 @@ from argparse import Namespace
 
 from ..bus.capture.recordings import check_suffix, read_recording
 from ..errors import InputError, RunError
-from .output import print_json
+from .output import print_json, require_places
 
 
 def replay(options: Namespace) -> None:
@@ -20,6 +20,7 @@ def replay(options: Namespace) -> None:
     from .path_commands import print_notes, read_image
 
     check_suffix(options.recording)
+    require_places(options.trace, folders=[options.report])
     image = read_image(options.file)
     pipeline = (
         None

@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..job import simulate_job
 from ..names import is_toolpath
 from ..pipeline import load_pipeline
-from .output import print_json, progress
+from .output import print_json, progress, require_places
 from .path_commands import print_notes, simulate_pipeline
 from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
@@ -18,6 +18,7 @@ def report(options: Namespace) -> None:
     """hodograph report."""
     from ..report import write_report
 
+    require_places(folders=[options.output])
     toolpaths = [file for file in options.files if is_toolpath(file)]
     if toolpaths:
         if len(options.files) > 1:

@@ -21,7 +21,7 @@ from ..pipeline import Pipeline, load_pipeline, start_counts
 from ..simulate import write_trace
 from .bus_session import await_enter, pass_stop, session
 from .motion_commands import print_run
-from .output import duration_text, note, number, print_json, print_rows, progress
+from .output import duration_text, note, number, print_json, print_rows, progress, require_places
 from .path_commands import print_notes
 from .stream_command import has_paths, stream_on
 from .toolpath_commands import job_rows, refuse_toolpath_options, toolpath_job
@@ -32,6 +32,7 @@ Task = Pipeline | PreparedJob
 
 def run(options: Namespace) -> None:
     """hodograph run."""
+    _check_outputs(options)
     with opened_bus(options.bus, note, None if options.pace == "fast" else 1.0) as address:
         _run_all(options, address)
 
@@ -42,7 +43,6 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
             f"{address}: run records at full bus load, which takes SocketCAN: use socketcan:CHANNEL "
             "(slcand makes one of a serial adapter)"
         )
-    _check_outputs(options)
     if len(options.files) == 1 and has_paths(options.files[0]):
         if any((options.trace, options.report)):
             raise InputError(
@@ -90,6 +90,7 @@ def _check_outputs(options: Namespace) -> None:
     if options.report is not None:
         for file in filter(is_toolpath, options.files):
             raise InputError(f"{file}: --report takes path files only: use --trace and --json")
+    require_places(options.trace, options.record, folders=[options.report])
 
 
 def _task(options: Namespace, file: Path) -> Task:

@@ -41,7 +41,16 @@ from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
 from .bus_session import await_enter, pass_stop, session
-from .output import duration_text, note, number, print_json, print_rows, progress, size_text
+from .output import (
+    duration_text,
+    note,
+    number,
+    print_json,
+    print_rows,
+    progress,
+    require_places,
+    size_text,
+)
 from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
 
 _RING_SHARE = 3
@@ -60,6 +69,7 @@ def stream(options: Namespace) -> None:
         return
     if not options.files:
         raise InputError("stream: give one FILE at least, or - for standard input, or --continue")
+    require_places(options.record)
     for file in options.files:
         _require_job_file(options, file)
     gc.freeze()  # modules stay: planning would look through them time and again for what is no longer used

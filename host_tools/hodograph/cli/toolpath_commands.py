@@ -17,7 +17,7 @@ from ..names import TOOLPATH_SUFFIXES, is_toolpath
 from ..pipeline import Pipeline
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command
-from .output import note, number, print_json, print_rows, progress, write_file
+from .output import note, number, print_json, print_rows, progress, require_places, write_file
 
 _OPTIONS = (
     "tolerance",
@@ -116,6 +116,7 @@ def simulate_toolpath(options: Namespace) -> None:
 def import_(options: Namespace) -> None:
     """hodograph import."""
     require_toolpath(options.file)
+    require_places(options.output)
     job = toolpath_job(options, options.file)
     found = imported(job)
     if options.output is not None:

@@ -13,7 +13,7 @@ from ..config.axis_table import Feedforward
 from ..config.rewrite import rewritten
 from ..errors import InputError
 from ..pipeline import load_pipeline
-from .output import note, print_json, progress, write_files
+from .output import note, print_json, progress, require_places, write_files
 
 
 def tune(options: Namespace) -> None:
@@ -22,6 +22,7 @@ def tune(options: Namespace) -> None:
     from ..tune import tune as tune_machine
 
     _check(options)
+    require_places(options.output, folders=[options.report])
     machine = load_machine(options.file)
     pipelines = [load_pipeline(file, options.file) for file in options.path or ()]
     asked = Asked(

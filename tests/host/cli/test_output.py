@@ -15,10 +15,26 @@ from pathlib import Path
 
 import pytest
 
+from hodograph.cli import (
+    demo_command,
+    path_commands,
+    report_commands,
+    run_command,
+    toolpath_commands,
+)
 from hodograph.cli import waiting as waiting_module
 from hodograph.cli.main import main
-from hodograph.cli.output import WANTED, duration_text, note, progress, size_text
+from hodograph.cli.output import (
+    WANTED,
+    duration_text,
+    note,
+    progress,
+    require_places,
+    size_text,
+    write_file,
+)
 from hodograph.cli.waiting import held, waiting
+from hodograph.errors import InputError
 
 ALPHA = str(Path(__file__).resolve().parents[3] / "examples" / "alpha.toml")
 
@@ -243,3 +259,85 @@ def test_a_full_disk_behind_stdout_is_one_message() -> None:
 def test_closed_streams_change_nothing(stream: str) -> None:
     done = command("schema", "path", after=stream)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+# -- files that are written ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("demo", "--no-browser", "--output", "file/out"),
+        ("report", ALPHA, "-o", "file/out"),
+        ("run", ALPHA, "--report", "file/out"),
+        ("run", ALPHA, "--trace", "none/out.csv"),
+        ("run", ALPHA, "--record", "none/out.log"),
+        ("simulate", ALPHA, "--trace", "none/out.csv"),
+        ("compile", ALPHA, "-o", "none/out.hdgp"),
+        ("import", "part.ngc", "-o", "none/out.toml"),
+    ],
+    ids=lambda words: f"{words[0]} {words[-2]}",
+)
+def test_a_place_that_cannot_be_written_is_found_before_the_work(
+    words: tuple[str, ...],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Nothing is planned, started or moved."""
+    (tmp_path / "file").touch()
+    (tmp_path / "part.ngc").write_text("G1 X1 F100\n")
+    for module in (path_commands, report_commands, run_command, demo_command):
+        monkeypatch.setattr(module, "load_pipeline", None)
+    monkeypatch.setattr(toolpath_commands, "toolpath_job", None)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    assert main(words) == 2
+    reason = "Not a directory" if words[-1].startswith("file") else "No such file or directory"
+    (line,) = (x for x in capsys.readouterr().err.splitlines() if "using the local bus" not in x)
+    assert line == f"hodograph: {words[-1]}: cannot be written: {reason}"
+    assert {file.name for file in tmp_path.iterdir()} <= {"file", "part.ngc", "hodograph"}
+
+
+def test_places_that_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder may be new; nothing is made."""
+    monkeypatch.chdir(tmp_path)
+    require_places(Path("new.csv"), None, folders=[Path("a/b"), tmp_path / "c", None, Path()])
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(InputError, match="Is a directory"):
+        require_places(tmp_path)
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(InputError, match="a/b: cannot be written: Permission denied"):
+        require_places(folders=[Path("a/b")])
+
+
+def test_a_pipe_stays_a_pipe(tmp_path: Path) -> None:
+    """As /dev/stdout, or /dev/null for root: it is written into, not replaced by a file."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    found: list[bytes] = []
+    reader = threading.Thread(target=lambda: found.append(pipe.read_bytes()))
+    reader.start()
+    write_file(pipe, b"image")
+    reader.join()
+    assert found == [b"image"]
+    assert pipe.is_fifo()
+
+
+def test_without_a_home_matplotlib_says_nothing(tmp_path: Path) -> None:
+    """It warns on stderr, beside our notes, when it can make no folder below the user's; here a file is in the way."""
+    home = tmp_path / "home"
+    home.touch()
+    program = (
+        "from hodograph.cli.main import main; main(['schema', 'path'])\n"
+        "import matplotlib; print(matplotlib.get_cachedir())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {"HOME": str(home), "XDG_CONFIG_HOME": str(home), "MPLCONFIGDIR": ""},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stderr == ""
+    assert str(home) not in done.stdout.splitlines()[-1]
