@@ -66,7 +66,8 @@ controller_MAIN    := firmware/app/main.c
 controller_SRC     := $(wildcard firmware/port/mps2/*.c firmware/port/semihost/*.c firmware/port/common/*.c firmware/can/*.c)
 controller_TARGETS := an385 an386 an500 an505 microbit $(BOARDS)
 
-# The same bytes wherever the tree and its build lie (tests/system/test_firmware_bytes.py).
+# The same bytes wherever the tree and its build lie (tests/system/test_firmware_bytes.py). So a copy of the tree
+# keeps its objects, which these paths do not change.
 TARGET_PATHS  := -ffile-prefix-map=$(abspath $(BUILD))=build -ffile-prefix-map=$(CURDIR)=.
 TARGET_CFLAGS := -std=c99 $(WARN) -O2 -g -ffp-contract=off -ffunction-sections -fdata-sections -fno-common -fstack-usage -DNDEBUG $(INCLUDES) $(TARGET_PATHS)
 TARGET_SRC    := $(filter-out %/kernels_all.c,$(core_SRC)) $(canopen_SRC) $(app_SRC) $(OD_C)
@@ -81,7 +82,7 @@ TICK_SRC := $(addprefix firmware/core/,kernel_fixed.c feed_piece.c interpolator.
 target_object = $(patsubst %.c,$(BUILD)/firmware/$(1)/obj/%.o,$(patsubst $(BUILD)/%,%,$(2)))
 
 define TARGET_RULES # target
-$(call NOTE,$(BUILD)/firmware/$(1)/obj/flags,$($(1)_CROSS) $($(1)_CPU) $(TARGET_CFLAGS))
+$(call NOTE,$(BUILD)/firmware/$(1)/obj/flags,$($(1)_CROSS) $($(1)_CPU) $(filter-out $(TARGET_PATHS),$(TARGET_CFLAGS)))
 $(BUILD)/firmware/$(1)/obj/generated/%.o: $(BUILD)/generated/%.c $(BUILD)/firmware/$(1)/obj/flags | $(OD_H) $(READY)/packages-firmware
 	@mkdir -p $$(@D)
 	$$(call say,$(1),$$<)

@@ -16,7 +16,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -56,7 +56,7 @@ class Groups:
         for old in record.glob("*.jsonl"):
             old.unlink()
         self.records.append(record)
-        environment = os.environ | {
+        environment = _with_bytecode(os.environ) | {
             "HODOGRAPH_RECORD": str(record),
             "HODOGRAPH_GROUP": group,
             "OPENBLAS_NUM_THREADS": "1",  # a group has a process for each core
@@ -141,6 +141,13 @@ class Groups:
         except BaseException:
             _end(process)
             raise
+
+
+def _with_bytecode(environment: Mapping[str, str]) -> dict[str, str]:
+    """Without the variable that keeps Python from writing bytecode: else each of some hundred processes compiles all
+    modules that it imports.
+    """
+    return {name: text for name, text in environment.items() if name != "PYTHONDONTWRITEBYTECODE"}
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
