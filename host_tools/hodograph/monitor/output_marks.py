@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..config.outputs import Outputs
+from ..config.outputs import Outputs, placed_outputs
 from ..events import Events
-from ..simulate.acted import placed_outputs
 from .decoder import Floats
 from .derived import ProgramPath
 
