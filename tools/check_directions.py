@@ -189,7 +189,17 @@ PYTHON_RULES: dict[str, set[str]] = {
     },
     "tune": {"errors", "config", "native", "simulate", "pipeline"},
     "identify": {"errors", "config", "native", "bus"},
-    "monitor": {"errors", "data", "config", "native", "bus", "bustime", "stream", "__init__"},
+    "monitor": {
+        "errors",
+        "events",
+        "data",
+        "config",
+        "native",
+        "bus",
+        "bustime",
+        "stream",
+        "__init__",
+    },
     "faults.scenario": {"errors", "config"},
     "faults": {
         "errors",

@@ -21,7 +21,7 @@ from hodograph.bus.address import DEFAULT_BUS, parse_address
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.run import BusRun, run_program, run_session
 from hodograph.errors import HodographError
-from hodograph.pipeline import Pipeline, load_pipeline
+from hodograph.pipeline import Pipeline, load_pipeline, start_counts
 
 EMULATE = Path(__file__).resolve().parent / "emulate.py"
 
@@ -39,8 +39,10 @@ def local_bus(*, virtual: bool = True) -> Iterator[str]:
 
 def run(pipeline: Pipeline, bus: str, pace: str, controller: str | None) -> BusRun:
     """One run; `controller` None: hodograph-controller."""
-    with run_session(pipeline.machine, parse_address(bus), pace, 15.0, _note, controller) as at:
-        return run_program(at, pipeline.machine, pipeline.image, pipeline.machine.kernel)
+    machine, whole = pipeline.machine, pipeline.whole_machine
+    start = start_counts(pipeline, machine.kernel)
+    with run_session(whole, parse_address(bus), pace, 15.0, _note, controller) as at:
+        return run_program(at, machine, pipeline.image, machine.kernel, on=whole, start=start)
 
 
 def compare(file: Path, options: argparse.Namespace, bus: str) -> bool:

@@ -86,6 +86,7 @@ def machine_layout(machine: Machine) -> Layout:
         bitrate=machine.bitrate,
         limits=step_limits(machine),
         controller=machine.node,
+        outputs=machine.outputs,
     )
 
 

@@ -16,6 +16,7 @@ from ..events import (
     VALUE_HIGH,
     VALUE_LOW,
     Event,
+    Events,
 )
 from .table import Table
 
@@ -290,3 +291,51 @@ def _path_output(table: Table, where: str, through_points: int | None) -> PathOu
         value=table.optional_number("value", low=-1e12, high=1e12),
         per_mm_s=table.optional_number("per_mm_s", low=-1e12, high=1e12),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedOutput:
+    """One output that switches at a place of a path.
+
+    value  true or false of a digital output; of an analogue one in its own unit; `per_mm_s`: from there on it follows
+           the feed, by so much for each mm/s
+    """
+
+    name: str
+    place_mm: float
+    value: float | bool | None
+    per_mm_s: float | None = None
+
+    @property
+    def words(self) -> str:
+        """What becomes of it, in short."""
+        if isinstance(self.value, bool):
+            return "on" if self.value else "off"
+        return f"{self.value:g}" if self.per_mm_s is None else f"{self.per_mm_s:g} by mm/s"
+
+
+def placed_outputs(outputs: Outputs | None, events: Events) -> list[PlacedOutput]:
+    """What the events of a path switch, in their order; nothing where no outputs are known."""
+    if outputs is None:
+        return []
+    return [one for event in events.tolist() for one in placed_by(outputs, Event(*event))]
+
+
+def placed_by(outputs: Outputs, event: Event) -> list[PlacedOutput]:
+    """What one event switches."""
+    out = []
+    place_mm = event.place_q40 * 2.0**-40
+    for one in outputs.channels:
+        value: float | bool | None
+        gain = None
+        if one.digital and event.kind == DIGITAL and event.mask >> one.number & 1:
+            value = bool(event.value >> one.number & 1)
+        elif not one.digital and event.kind != DIGITAL and event.channel == one.number:
+            if event.kind == PROPORTIONAL:
+                value, gain = None, event.value / 65536 / one.scale
+            else:
+                value = event.value / one.scale
+        else:
+            continue
+        out.append(PlacedOutput(name=one.name, place_mm=place_mm, value=value, per_mm_s=gain))
+    return out

@@ -221,6 +221,10 @@ class Table:
         if not isinstance(value, list) or not value:
             raise self.error(key, f"must be a list [[x, y], ...], but is {_show(value)}")
         first = value[0]
+        if isinstance(first, list) and len(first) > len(AXES):
+            raise self.error(
+                key, f"point 0 has {len(first)} numbers: at most {len(AXES)}, one for each axis"
+            )
         size = len(first) if isinstance(first, list) and 2 <= len(first) <= len(AXES) else 2
         form = f"[{', '.join(AXES[:size])}]" + (" like the first" if size > 2 else "")
         for i, point in enumerate(value):

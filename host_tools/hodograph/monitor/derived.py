@@ -46,6 +46,8 @@ class ProgramPath:
         self.crc32 = zlib.crc32(image[16:])
         self.period_us = program.period_us
         self.name = image[80:112].rstrip(b"\0").decode("utf-8", "replace")
+        self.events = program.events
+        """Outputs that switch on the path."""
         self.length_mm = int(program.pointer.header.length_q40_mm) / 2**40
         self.duration_s = program.duration_q32_s / 2**32
         self._arc_mm, places = _table(program)
@@ -60,6 +62,10 @@ class ProgramPath:
         """Points of the curve in mm, (n, 2) or in space (n, 3), at equal distances, the last one included."""
         arcs = np.linspace(0.0, self.length_mm, min(DRAWN_POINTS, self._arc_mm.size))
         return self._at(arcs, self._points_mm)
+
+    def points_mm(self, arc_mm: Floats) -> Floats:
+        """Points (n, 2) or (n, 3) of the curve at arc lengths (n,)."""
+        return self._at(arc_mm, self._points_mm)
 
     def extra_drawing(self) -> tuple[Floats, Floats]:
         """Arc lengths (n,) in mm and the axes after x, y, z there (n, A - 3), in mm or degrees."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -53,9 +54,11 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
     return [value if math.isfinite(value) else None for value in rounded]
 
 
-def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
+def path_message(
+    path: ProgramPath | None, note: str = "", marks: Sequence[dict[str, Any]] = ()
+) -> dict[str, Any]:
     """The program's curve to draw, in space with z; axes after z over arc length; `note` says why there is none, or
-    what is odd about it.
+    what is odd about it. `marks`: places where outputs switch.
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
     if path is not None:
@@ -67,6 +70,8 @@ def path_message(path: ProgramPath | None, note: str = "") -> dict[str, Any]:
             "duration_s": path.duration_s,
             "crc32": path.crc32,
         }
+        if marks:
+            message["marks"] = list(marks)
         arcs, extra = path.extra_drawing()
         if extra.shape[1]:
             message |= {
@@ -85,10 +90,17 @@ def job_message(job: int, points_mm: Floats) -> dict[str, Any]:
 
 
 def rows_message(
-    rows: Rows, period_s: float, age_ms: float | None, drawn: int = 2, path_axes: int = 0
+    rows: Rows,
+    period_s: float,
+    age_ms: float | None,
+    drawn: int = 2,
+    path_axes: int = 0,
+    marks: Sequence[tuple[float, str]] = (),
 ) -> dict[str, Any]:
     """The rows of one look, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
     path, whose positions the points have; further axes of the `path_axes` have theirs with the arc length.
+
+    marks  outputs whose places were passed, with the times
     """
     starts = group_starts(rows.count, round(GROUP_S / period_s), MOST_GROUPS)
     message: dict[str, Any] = {
@@ -104,6 +116,8 @@ def rows_message(
     if rows.cmd_mm.shape[1] >= 2:
         message["cmd"] = [numbers(column, 5) for column in rows.cmd_mm[points, :drawn].T]
         message["act"] = [numbers(column, 5) for column in rows.act_mm[points, :drawn].T]
+    if marks:
+        message["marks"] = [[round(t_s, 4), text] for t_s, text in marks]
     if path_axes > drawn:
         message["arc"] = numbers(rows.arc_mm[points], 3)
         message["extra"] = [

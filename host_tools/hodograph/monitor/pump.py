@@ -19,6 +19,7 @@ from ..bus.capture.load import LoadCapture
 from ..bus.capture.setpoint_check import StepLimits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
 from ..bus.diagnostics.texts import drive_state
+from ..config.outputs import Outputs
 from ..errors import BusError, InputError
 from ..stream.bus_chunks import ChunkCapture, JobPoints
 from .decoder import Decoder, Samples
@@ -26,6 +27,7 @@ from .derived import Derivation, FollowedPath, ProgramPath
 from .emergencies import Emergencies
 from .job_path import JobPath
 from .messages import job_message, path_message, rows_message
+from .output_marks import PassedMarks, drawn_marks, output_marks
 from .source import Source, Taken
 
 LOOK_S = 0.04
@@ -54,6 +56,8 @@ class Layout:
     """How many of the axes follow a path."""
     controller: int = 1
     """Its node."""
+    outputs: Outputs | None = None
+    """Of the machine, which name what a program switches; None: they are not known."""
 
 
 @dataclass
@@ -75,6 +79,7 @@ class Pump:
         self._publish = publish
         self._path: ProgramPath | None = None
         self._job_path = JobPath(layout.counts_per_unit[0])
+        self._passed = PassedMarks()
         self._streams = False
         self._ending = threading.Event()
         self._again = threading.Event()
@@ -116,9 +121,11 @@ class Pump:
             except InputError as error:
                 note = str(error)
         self._path = path
+        marks = () if path is None else output_marks(self._layout.outputs, path.events)
+        self._passed = PassedMarks(marks)
         if path is not None:
             self._streams = False
-        self._publish(path_message(path, note))
+        self._publish(path_message(path, note, drawn_marks(marks, path) if path else ()))
 
     def _fresh_derivation(self) -> Derivation:
         layout = self._layout
@@ -138,6 +145,7 @@ class Pump:
             self._watch = SetpointWatch(self._layout.nodes)
             self._decoder = Decoder(self._layout.nodes)
             self._derivation = self._fresh_derivation()
+            self._passed = self._passed.anew()
             try:
                 self._look_on(source)
             except BusError as error:
@@ -181,6 +189,7 @@ class Pump:
                     age_ms,
                     self._layout.drawn,
                     self._layout.path_axes,
+                    () if self._streams else self._passed.feed(rows.t_s, rows.arc_mm),
                 )
             )
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):

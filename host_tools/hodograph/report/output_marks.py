@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ..config.outputs import PlacedOutput, placed_outputs
 from ..pipeline import Pipeline
 from ..simulate import Motion
-from ..simulate.acted import PlacedOutput, placed_outputs
 from ..spline import coordinates
 from .style import RED
 

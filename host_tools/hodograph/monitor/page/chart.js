@@ -31,8 +31,8 @@ export class Chart {
     parent.append(box);
   }
 
-  /** Draws `seconds` up to `end`; `hover`: a time to mark, or null. */
-  draw(groups, end, seconds, colours, hover) {
+  /** Draws `seconds` up to `end`; `hover`: a time to mark, or null; `marks`: [time, text] of outputs that switched. */
+  draw(groups, end, seconds, colours, hover, marks) {
     const { context, width, height } = prepare(this.canvas);
     const columns = Math.max(1, Math.floor(width - LEFT));
     const place = (t) => LEFT + ((t - end) / seconds + 1) * (width - LEFT);
@@ -45,6 +45,9 @@ export class Chart {
     this.lines.forEach((line, i) => {
       stroke(context, reduced[i], at, colours[line.colour]);
     });
+    const shown = marks.filter(([t]) => t <= end && t >= end - seconds);
+    for (const [t, words] of shown) mark(context, place(t), words, height, colours);
+    this.canvas.dataset.marks = shown.map(([, words]) => words).join("; ");
     if (hover !== null) {
       context.fillStyle = colours.soft;
       context.fillRect(place(hover), 0, 1, height);
@@ -149,6 +152,16 @@ function stroke(context, { low, high, missing, gap }, at, colour) {
   }
   context.stroke();
   context.lineWidth = 1;
+}
+
+/** When an output switched: a line, and its name from the bottom up. */
+function mark(context, x, words, height, colours) {
+  context.fillStyle = colours.second;
+  context.fillRect(x, 0, 1, height);
+  context.font = "10px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.textBaseline = "bottom";
+  words.split("\n").forEach((line, k, lines) => context.fillText(line, x + 3, height - 3 - 11 * (lines.length - 1 - k)));
 }
 
 function line(context, x0, y0, x1, y1) {

@@ -40,7 +40,7 @@ function draw() {
   const end = frozenAt ?? store.newest;
   plane.draw(store.points, theme.colours);
   axisCurves.draw(theme.colours);
-  for (const chart of charts) chart.draw(store.groups, end, seconds, theme.colours, hover);
+  for (const chart of charts) chart.draw(store.groups, end, seconds, theme.colours, hover, store.marks);
   if (arrivedMs !== null && ageMs !== null) {
     const lag = ageMs + link.rttMs / 2 + (performance.now() - arrivedMs);
     figures.lag = figures.lag === null ? lag : 0.9 * figures.lag + 0.1 * lag;
@@ -106,7 +106,7 @@ const handlers = {
   history: ({ messages }) => messages.forEach((m) => (m.type === "rows" ? addRows(m, false) : handlers[m.type](m))),
   restart: () => { store.clear(); axisCurves.clear(); },
   path(message) {
-    plane.setPath(message.x, message.y, message.z);
+    plane.setPath(message.x, message.y, message.z, message.marks);
     axisCurves.setPath(message.arc, message.extra);
     panel.name = message.name;
     panel.lengthMm = message.length_mm;

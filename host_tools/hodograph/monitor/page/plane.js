@@ -22,6 +22,7 @@ export class Plane {
     this.canvas = canvas;
     this.redraw = redraw;
     this.path = { x: [], y: [], z: [] };
+    this.marks = []; // {x, y, z, text}: where outputs switch
     this.names = ["x", "y", "z"];
     this.azimuth = -Math.PI / 4;
     this.side = "xy";
@@ -35,8 +36,10 @@ export class Plane {
   }
 
   /** A path in the plane has no z: it is drawn at 0. */
-  setPath(x, y, z) {
+  setPath(x, y, z, marks) {
     this.path = { x, y, z: z ?? x.map(() => 0) };
+    this.marks = marks ?? [];
+    this.canvas.dataset.marks = this.marks.map((mark) => mark.text).join("; ");
     this.redraw();
   }
 
@@ -79,6 +82,7 @@ export class Plane {
     this.curve(context, px, py, colours);
     this.trail(context, points, "c", 1, px, py, colours.cmd, 1);
     this.trail(context, points, "a", this.magnify, px, py, colours.act, 1.8);
+    this.outputs(context, px, py, colours);
     this.tool(context, points, px, py, colours);
     this.canvas.dataset.points = String(points.end);
   }
@@ -138,6 +142,24 @@ export class Plane {
     }
     context.stroke();
     context.lineWidth = 1;
+  }
+
+  /** A triangle at each place where outputs switch, and what switches. */
+  outputs(context, px, py, colours) {
+    context.font = "11px system-ui, sans-serif";
+    context.textAlign = "left";
+    context.textBaseline = "middle";
+    context.fillStyle = colours.second;
+    for (const { x, y, z, text } of this.marks) {
+      const [right, up] = this.directions.map((direction) => along(direction, x, y, z ?? 0));
+      const left = px(right), top = py(up);
+      context.beginPath();
+      context.moveTo(left, top);
+      context.lineTo(left - 5, top - 9);
+      context.lineTo(left + 5, top - 9);
+      context.fill();
+      text.split("\n").forEach((line, k) => context.fillText(line, left + 9, top - 6 + 12 * k));
+    }
   }
 
   tool(context, points, px, py, colours) {

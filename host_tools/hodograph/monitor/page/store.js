@@ -3,6 +3,7 @@
 
 const GROUPS = 8192;
 const POINTS = 12288;
+const MARKS = 200; // times at which outputs switched
 
 export class Ring {
   constructor(size, columns) {
@@ -32,6 +33,7 @@ export class Ring {
 
 export class Store {
   constructor() {
+    this.marks = []; // [time, text]
     this.names = ["feed", "acceleration", "jerk", "contour"];
     this.setAxes(2);
   }
@@ -47,11 +49,13 @@ export class Store {
   clear() {
     this.groups.clear();
     this.points.clear();
+    this.marks = [];
     this.changes += 1;
   }
 
   /** Takes a message of type rows. */
   add(message) {
+    this.marks = [...this.marks, ...(message.marks ?? [])].slice(-MARKS);
     message.t.forEach((t, i) => {
       const row = { t };
       for (const name of this.series) {

@@ -15,7 +15,7 @@ from ..knots import KnotSpans, checked_knots, knot_spans
 from ..newton import solved
 from ..nodal import checked_space_points
 from .curve import SpatialPHSpline, embedded
-from .extra import nodal_values, with_extra_axes, without_tail
+from .extra import nodal_values, require_moving, with_extra_axes, without_tail
 from .frame import guide_frame, without_rests
 from .guide import SpaceEnd, SpaceGuide, points_guide, polygon_guide
 from .quality import judge
@@ -33,6 +33,7 @@ def spatial_from_control_polygon(
     `extra`: (n, E), values of extra axes at the points of the polygon; mm, or degrees.
     Raises InputError for bad points and PlanError, naming the span, where there is no decent spline.
     """
+    _check_extra(points, extra, "control point")
     return _with_extra(_of_polygon(points, closed), extra, closed, polygon=True)
 
 
@@ -61,6 +62,7 @@ def spatial_through_points(
     that keep it, give the planar spline, bit for bit. `extra`: (n, E), values of extra axes at the points; mm, or
     degrees. Raises InputError and PlanError as above.
     """
+    _check_extra(points, extra, "through point")
     found = _through(points, closed, ends, start_tangent, end_tangent, knots)
     return _with_extra(found, extra, closed, polygon=False)
 
@@ -142,6 +144,12 @@ def _solved(
         bending_ratio=verdict.bending_ratio,
         notes=notes,
     )
+
+
+def _check_extra(points: object, extra: Real | None, what: str) -> None:
+    given = np.asarray(points)
+    if extra is not None and extra.shape[1] and given.ndim == 2 and len(given) == len(extra):
+        require_moving(given, extra, what)
 
 
 def _with_extra(

@@ -60,6 +60,17 @@ def nodal_values(values: Real, closed: bool) -> Real:
     return np.stack(nodes, axis=1)[:-1] if closed else np.stack(nodes, axis=1)
 
 
+def require_moving(points: Real, values: Real, what: str) -> None:
+    """Raises InputError: extra axes (n, E) differ between two neighbouring points (n, 3) that are the same."""
+    same = ~np.diff(points, axis=0).any(axis=1) & np.diff(values, axis=0).any(axis=1)
+    if same.any():
+        k = int(np.argmax(same))
+        raise InputError(
+            f"{what} {k + 1} has the x, y and z of {what} {k}, while other axes move: end the path there; axes that "
+            "turn alone have a path of their own"
+        )
+
+
 def without_tail(values: Real, count: int, what: str) -> Real:
     """The first `count` rows of extra axes: those of points that a closed path keeps.
 

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: MIT
+"""Outputs of the program on the live page: where they switch on its path, and when its setpoints passed these places.
+
+The times are those of the setpoints on the bus, not of the frames of the I/O module: a feed override or a hold moves
+them, a stop before a place leaves it out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..config.outputs import Outputs, placed_outputs
+from ..events import Events
+from .decoder import Floats
+from .derived import ProgramPath
+
+_BESIDE_MM = 1e-5
+"""The arc length of a setpoint on the bus is known so well: setpoints are rounded to counts."""
+
+
+@dataclass(frozen=True)
+class OutputMark:
+    """What switches at a place of the path: `text` has a line for each output."""
+
+    place_mm: float
+    text: str
+
+
+def output_marks(outputs: Outputs | None, events: Events) -> tuple[OutputMark, ...]:
+    """The marks of a program, by place; none where the outputs of the machine are not known."""
+    placed = placed_outputs(outputs, events)
+    return tuple(
+        OutputMark(place, "\n".join(f"{o.name} {o.words}" for o in placed if o.place_mm == place))
+        for place in sorted({one.place_mm for one in placed})
+    )
+
+
+def drawn_marks(marks: tuple[OutputMark, ...], path: ProgramPath) -> list[dict[str, Any]]:
+    """The marks with their points on the path, for a message."""
+    if not marks:
+        return []
+    points = path.points_mm(np.array([mark.place_mm for mark in marks]))
+    return [
+        dict(zip("xyz", np.round(point, 5).tolist(), strict=False)) | {"text": mark.text}
+        for mark, point in zip(marks, points, strict=True)
+    ]
+
+
+class PassedMarks:
+    """Follows the arc lengths of setpoints, look by look."""
+
+    def __init__(self, marks: tuple[OutputMark, ...] = ()) -> None:
+        self._marks = marks
+        self._last_mm = np.nan
+
+    def anew(self) -> PassedMarks:
+        """The same marks for another source, whose setpoints do not follow those of this one."""
+        return PassedMarks(self._marks)
+
+    def feed(self, t_s: Floats, arc_mm: Floats) -> list[tuple[float, str]]:
+        """Time and text of each mark that these setpoints (n,) came to or passed; NaN: a setpoint off the path."""
+        if not self._marks or not t_s.size:
+            return []
+        before = np.concatenate(([self._last_mm], arc_mm[:-1]))
+        self._last_mm = float(arc_mm[-1])
+        found = []
+        for mark in self._marks:
+            place = max(mark.place_mm - _BESIDE_MM, _BESIDE_MM)
+            with np.errstate(invalid="ignore"):
+                passed = (before < place) & (arc_mm >= place)
+            found += [(float(t_s[row]), mark.text) for row in np.flatnonzero(passed)]
+        return sorted(found)
