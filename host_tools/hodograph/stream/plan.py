@@ -216,6 +216,12 @@ class JobPlan:
         """Motion planned so far."""
         return self._motion_s[-1]
 
+    def is_longer(self, motion_s: float, wait_s: float) -> bool:
+        """Whether the motion of the job takes longer than that; False: no, or not yet known after `wait_s`."""
+        with self._changed:
+            self._changed.wait_for(lambda: self.planned_s > motion_s or self._done, wait_s)
+            return self.planned_s > motion_s
+
     def greatest_rate(self) -> float:
         """Greatest bytes for each second of motion, over about _RATE_S, so far."""
         return self._rate.worst

@@ -50,6 +50,9 @@ _PASSED_Q40 = 1 << 20
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
 """A section starts at the latest when so much motion is sent, or so long after its first chunk."""
 
+_LONG_WAIT_S = 1.0
+"""For the plan, which knows how long a job is."""
+
 _IN_TIME = 0.7
 """A chunk comes in time if its transfer takes this share of the motion that was sent before it."""
 
@@ -265,10 +268,9 @@ class Sender:
         _, chunk, new_s = item
         sent_s = self._motion_s - self._done_s
         transfer_s = chunk.size * self._sending_s / self._bytes
-        if transfer_s < _IN_TIME * sent_s:
-            return True
-        long = self.plan.planned_s - self._done_s > _START_AHEAD_S
-        return long and self.slow is None and transfer_s > new_s
+        if transfer_s < _IN_TIME * sent_s or self.slow is not None or transfer_s <= new_s:
+            return transfer_s < _IN_TIME * sent_s
+        return self.plan.is_longer(self._done_s + _START_AHEAD_S, _LONG_WAIT_S)
 
     def _pass_sections(self, status: StreamStatus) -> None:
         """Goes on to the section in motion, and says what is to be said before it."""

@@ -43,8 +43,8 @@ Int = NDArray[np.int64]
 _Made = TypeVar("_Made")
 
 FIRST_WINDOW_S, WINDOW_S = 0.3, 3.0
-"""Motion that a window keeps: the first one little, so that a job starts soon, and each next one twice as much until it
-is WINDOW_S.
+"""Motion that a window keeps: the first one of a job little, so that it starts soon, each next one twice as much until
+it is WINDOW_S.
 """
 
 _STOPS = 4.0
@@ -59,7 +59,7 @@ RESERVE = 0.01
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
 
-_BRAKE_WAYS = (1.2, 1.35, 1.5, 1.75, 2.1, 2.6)
+_BRAKE_WAYS = (1.1, 1.2, 1.3, 1.4, 1.5)
 """Ways of brakes without a quadratic program, tried first, in times the way that braking takes at least."""
 
 _TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
@@ -165,7 +165,7 @@ class SectionFeed:
         self._carried = (0.0, 0.0)
         self._low_q40 = begin_q40
         self._low_mm = 0.0
-        self._wanted_s = FIRST_WINDOW_S
+        self._wanted_s = FIRST_WINDOW_S if begin_point_q40 is None else WINDOW_S
         self._needed = 0
 
     def windows(self) -> Iterator[Window]:

@@ -125,7 +125,7 @@ def test_rest_of_a_window_is_divided(
         return solved(feed, limits, high, stop_s) if feed._moving is None else None
 
     monkeypatch.setattr(SectionFeed, "_solved", none_in_motion)
-    file, most = tmp_path / "wave.ngc", 9728
+    file, most = tmp_path / "wave.ngc", 7600
     file.write_text(_wave(300))
     (chunks,) = _sections(file, machine, most)
     _verify(chunks, machine, most, FEWEST_SHARED_PIECES)
@@ -139,7 +139,7 @@ def _wave(count: int) -> str:
 
 def test_fewer_pieces_are_shared_where_there_is_no_room(tmp_path: Path, machine: Machine) -> None:
     """Rather than that the job ends with an error."""
-    file, most = tmp_path / "wave.ngc", 9728
+    file, most = tmp_path / "wave.ngc", 7600
     file.write_text(_wave(110))
     (chunks,) = _sections(file, machine, most)
     _verify(chunks, machine, most, FEWEST_SHARED_PIECES)

@@ -363,7 +363,9 @@ def test_motion_starts_when_waiting_is_of_no_use(
 ) -> None:
     """10 kB took 1 s and hold 1 s of motion."""
     item = None if next_bytes is None else (None, SimpleNamespace(size=next_bytes), next_s)
-    plan: Any = SimpleNamespace(item=lambda *_: item, planned_s=planned_s)
+    plan: Any = SimpleNamespace(
+        item=lambda *_: item, is_longer=lambda least_s, _: planned_s > least_s
+    )
     nothing: Any = None
     sender = Sender(nothing, nothing, plan, lambda *_: None, slow=slow)
     sender._bytes, sender._sending_s, sender._motion_s = 10_000, 1.0, 1.0
