@@ -31,6 +31,12 @@ LEAST_PERIODS = 2
 """A part of a piece is not halved below this."""
 MOST_MISSES = 2
 """Halvings without numbers, after which a part is not halved again."""
+LONGEST_PART_S = 0.08
+"""Parts that last longer are halved where the numbers of their halves are better by WORTH_GAIN."""
+MOST_PARTS = 256
+"""Parts of that length; those of a longer program last longer, which bounds the time of the search."""
+WORTH_GAIN = 0.05
+"""Share by which finer numbers have to make the mean of the bounds of a part shorter."""
 
 
 class LongStopError(PlanError):
@@ -62,7 +68,8 @@ class StopTerms:
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     """The program with its stop table. Feed pieces in which no numbers are found are halved, as far as that helps: a
     place where no brake may begin, such as a narrow bend that is passed as fast as its limits allow, need not keep the
-    whole piece from braking. Raises LongStopError: a fault stop may take longer than `stop_time_ms`.
+    whole piece from braking. Long pieces are halved too: such a bend need not make all stops of a piece longer.
+    Raises LongStopError: a fault stop may take longer than `stop_time_ms`.
     """
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
@@ -71,8 +78,10 @@ def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     ]
     tree = _Halves(program)
     codes = _searched(tree, limits)
+    if not terms.quick:
+        codes = _refined(tree, limits, codes)
     for kind in (HOLD, FAULT):
-        codes[_better_without(_with_codes(tree.program, codes), kind, tree.pieces), kind] = 0
+        codes[_better_without(_with_codes(tree.program, codes), kind, tree.groups), kind] = 0
     return _checked(with_bounds(_with_codes(*tree.joined(codes))), terms)
 
 
@@ -124,6 +133,52 @@ def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
         tree.halve(chosen)
 
 
+def _refined(
+    tree: _Halves, limits: Sequence[StopLimits], codes: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Codes (M, 2, 3) of a program whose long parts with numbers are halved, where that makes stops shorter. Parts with
+    the greatest numbers of the program have nothing to gain. A half without numbers of its own keeps those of its part.
+    """
+    whole, parents = codes, np.arange(tree.program.piece_count)
+    longest_s = max(LONGEST_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_PARTS)
+    while True:
+        long = np.ldexp(tree.program.pieces.duration_q32_s.astype(np.float64), -32) > longest_s
+        found = codes[:, :, DECELERATION] != 0
+        below = (found & (codes < codes.max(axis=0)).any(axis=2)).any(axis=1)
+        chosen = long & below & tree.long_enough()
+        if not chosen.any():
+            break
+        before, parents = np.repeat(codes, 1 + chosen, axis=0), np.repeat(parents, 1 + chosen)
+        new = np.repeat(chosen, 1 + chosen)
+        known = ~(new[:, None] & (before[:, :, DECELERATION] != 0))
+        tree.halve(chosen, apart=True)
+        codes = before.copy()
+        _search_round(tree.program, limits, codes, known)
+        lost = (before[:, :, DECELERATION] != 0) & (codes[:, :, DECELERATION] == 0)
+        codes[lost.any(axis=1)] = before[lost.any(axis=1)]
+    without = ~_gains(tree.program, whole[parents], codes, parents)[parents]
+    codes[without] = whole[parents][without]
+    return codes
+
+
+def _gains(
+    program: Program,
+    before: NDArray[np.uint8],
+    after: NDArray[np.uint8],
+    parents: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Which groups of parts (`parents`, (M,): their numbers) have shorter stops `after` than `before` (M, 2, 3)."""
+    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    out: NDArray[np.bool_] = np.zeros(int(parents[-1]) + 1, dtype=np.bool_)
+    for kind in (HOLD, FAULT):
+        old, new = (
+            np.bincount(parents, seconds * own_bounds(_with_codes(program, codes), kind)[0])
+            for codes in (before, after)
+        )
+        out |= new < (1.0 - WORTH_GAIN) * old
+    return out
+
+
 def _search_round(
     program: Program,
     limits: Sequence[StopLimits],
@@ -139,16 +194,16 @@ def _search_round(
     codes[:, FAULT] = search.codes(limits[FAULT], codes[:, FAULT], given, codes[:, HOLD])
 
 
-def _better_without(program: Program, kind: int, pieces: Sequence[int]) -> NDArray[np.bool_]:
+def _better_without(program: Program, kind: int, groups: Sequence[object]) -> NDArray[np.bool_]:
     """Parts (M,) that had better have no numbers of a kind: those whose numbers give a bound that is longer by a tenth
-    than the way on into the next part, and all of a piece (`pieces`, (M,)) where numbers that differ between its parts
+    than the way on into the next part, and all of a group (`groups`, (M,)) where numbers that differ between its parts
     make no bound shorter by that.
     """
     own_s, _, waits = own_bounds(program, kind)
     duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
     out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
     next_s = END_TICKS * program.period_us * 1e-6
-    for _, group in groupby(range(duration_s.size - 1, -1, -1), key=pieces.__getitem__):
+    for _, group in groupby(range(duration_s.size - 1, -1, -1), key=groups.__getitem__):
         parts = list(group)
         whole_s, worst_s = float(duration_s[parts].sum()) + next_s, 0.0
         for i in parts:
@@ -171,18 +226,15 @@ class _Halves:
     """A program some of whose feed pieces are halved, and their halves again.
 
     A part is known by the piece that it is of, and its number as in a binary heap: 1 is the whole piece, 2 n and
-    2 n + 1 are the halves of n.
+    2 n + 1 are the halves of n. A group is the parts of a piece, or of a half that was made `apart`: it is known by the
+    part that it began as.
     """
 
     def __init__(self, program: Program) -> None:
         self._whole = self.program = program
         self._parts = [(piece, 1) for piece in range(program.piece_count)]
+        self.groups = list(self._parts)
         self._new: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-
-    @property
-    def pieces(self) -> list[int]:
-        """The piece (M,) that each part is of."""
-        return [piece for piece, _ in self._parts]
 
     def long_enough(self) -> NDArray[np.bool_]:
         """Which parts may be halved (M,): no two neighbours may last two periods or less
@@ -190,15 +242,17 @@ class _Halves:
         least_q32 = (LEAST_PERIODS * self.program.period_us << 32) // 1_000_000
         return np.asarray(self.program.pieces.duration_q32_s >= 2 * least_q32)
 
-    def halve(self, chosen: NDArray[np.bool_]) -> None:
-        """Halves the chosen parts (M,)."""
+    def halve(self, chosen: NDArray[np.bool_], apart: bool = False) -> None:
+        """Halves the chosen parts (M,). `apart`: a part that is all of its group becomes two groups."""
         self.program = _with_pieces(self.program, chosen)
         self._new = np.flatnonzero(np.repeat(chosen, 1 + chosen))
-        self._parts = [
-            (piece, own)
-            for (piece, number), halves in zip(self._parts, chosen.tolist(), strict=True)
-            for own in ((2 * number, 2 * number + 1) if halves else (number,))
-        ]
+        parts, groups = [], []
+        for part, group, halves in zip(self._parts, self.groups, chosen.tolist(), strict=True):
+            piece, number = part
+            new = [(piece, 2 * number), (piece, 2 * number + 1)] if halves else [part]
+            parts += new
+            groups += new if apart and part == group else [group] * len(new)
+        self._parts, self.groups = parts, groups
 
     def count_misses(self, misses: NDArray[np.int64], found: NDArray[np.bool_]) -> None:
         """Counts in `misses` (M,) the last halvings of each part, one after the other, after which neither half had

@@ -40,8 +40,8 @@ def test_keys(capsys: pytest.CaptureFixture[str]) -> None:
     assert set(found["setpoints"]) == {"fixed", "float", "double"}
     assert found["kept"]
     assert found["stops"]["hold"] == {
-        "pieces": 35,
-        "proved": 35,
+        "pieces": 38,
+        "proved": 38,
         "proved_time_share": 1.0,
         "not_proved_at_mm": [],
     }

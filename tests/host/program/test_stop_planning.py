@@ -2,19 +2,24 @@
 """Stops are planned where a program is hard to stop: narrow bends, and paths of micrometres."""
 
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hodograph.config import load_machine, load_path_file
 from hodograph.native import NativeProgram
 from hodograph.native.stop_search import StopSearch
 from hodograph.native.stop_trial import StopTrials, run_trials
-from hodograph.pipeline import Pipeline
+from hodograph.pipeline import Pipeline, load_pipeline
+from hodograph.program import Program, encode, stop_planning
 from hodograph.program.stop_planning import fault_limits, hold_limits
-from hodograph.program.stops import DECELERATION
+from hodograph.program.stops import DECELERATION, FAULT
+from hodograph.simulate import simulate
 
-MACHINE = Path(__file__).resolve().parents[3] / "examples/machines/paper_alpha.toml"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+MACHINE = EXAMPLES / "machines/paper_alpha.toml"
 CONSTANT = 'profile = "minimax"\nnominal_mm_s = 90\nramp_time_s = 0.3\n'
 ZIG_ZAG = """[[0.0, 0.0], [1.2, 2.7], [1.3, 0.0], [1.9, 2.7], [10.5, 0.0], [5.8, 2.7], [2.3, 0.0], [9.3, 2.7],
 [5.2, 0.0], [17.7, 2.7], [23.0, 0.0], [28.3, 2.7], [10.3, 0.0], [20.7, 2.7], [13.9, 0.0], [25.7, 2.7]]"""
@@ -82,3 +87,40 @@ def test_a_feed_zone_that_is_used_fully_does_not_keep_a_hold_from_braking(tmp_pa
     assert made.program.stops.worst(0).time_s < 0.3
     found = trials(made)
     assert found.within(0.01), found
+
+
+def mean_fault_bound_s(program: Program) -> float:
+    """Over the time of the program."""
+    return float(
+        np.average(program.stops.bound_us[:, FAULT] * 1e-6, weights=program.pieces.duration_q32_s)
+    )
+
+
+def test_long_pieces_are_halved_where_stops_become_shorter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nine pieces of 0.3 s at constant feed; the setpoints are the same."""
+    made = load_pipeline(EXAMPLES / "heart.toml")
+    fine = made.program
+    with monkeypatch.context() as patch:
+        patch.setattr(stop_planning, "LONGEST_PART_S", inf)
+        whole = load_pipeline(EXAMPLES / "heart.toml").program
+    assert whole.piece_count < fine.piece_count < 2 * whole.piece_count
+    assert mean_fault_bound_s(fine) < 0.97 * mean_fault_bound_s(whole)
+    assert fine.stops.worst_us[FAULT] <= whole.stops.worst_us[FAULT]
+    long = fine.pieces.duration_q32_s * 2.0**-32 > stop_planning.LONGEST_PART_S
+    assert long.sum() < (whole.pieces.duration_q32_s * 2.0**-32 > 0.2).sum()
+    drives = made.machine.models(made.machine.path_axes)
+    hashes = {
+        simulate(NativeProgram(encode(program)), drives).setpoints_sha256
+        for program in (fine, whole)
+    }
+    assert len(hashes) == 1
+    found = trials(made)
+    assert found.kept, found
+
+
+def test_long_pieces_that_gain_nothing_stay_whole(tmp_path: Path) -> None:
+    """Almost straight: each part has the same numbers."""
+    points = "control_points = [[0, 0], [30, 0.1], [60, 0], [90, 0.1]]"
+    made = pipeline(tmp_path, points, CONSTANT.replace("90", "40"))
+    assert made.program.piece_count == len(made.plan.pieces)
+    assert (made.program.pieces.duration_q32_s * 2.0**-32).max() > 0.2
