@@ -28,7 +28,7 @@ from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
-from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
+from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, reserve_zones, useful_steps
 from .program.stops import FAULT
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
@@ -126,8 +126,7 @@ class SectionPipeline(Pipeline):
             try:
                 return self._with_stops(plan)
             except LongStopError as error:
-                if late_mostly(error.program, longest_s):
-                    steps = [step for step in steps if isinstance(step, float)]
+                steps = useful_steps(error.program, longest_s, steps)
                 if not steps:
                     raise
                 step = steps.pop(0)
