@@ -28,7 +28,7 @@ from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
-from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, late_mostly, reserve_zones
+from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, reserve_zones, useful_steps
 from .program.stops import FAULT
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
@@ -49,6 +49,7 @@ from .toolpath.moves import (
     Message,
     Spindle,
     ToolChange,
+    ToolOffset,
 )
 
 Real = NDArray[np.float64]
@@ -66,11 +67,13 @@ _THOROUGH_CHORDS = 1000
 _THOROUGH_GAIN = 1.1
 """About how many times as long the bounds of stops are that few trials find."""
 
+_TOOL_OFFSET = "tool offset (G43)"
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
     (Coolant,): "coolant (M7, M8, M9)",
     (ToolChange,): "tool change (M6)",
     (DigitalOutput, AnalogOutput): "outputs (M62 to M65, M67, M68)",
+    (ToolOffset,): _TOOL_OFFSET,
 }
 _LONGEST_NAME = 40
 _ROUNDING_MM = 1e-9
@@ -126,8 +129,7 @@ class SectionPipeline(Pipeline):
             try:
                 return self._with_stops(plan)
             except LongStopError as error:
-                if late_mostly(error.program, longest_s):
-                    steps = [step for step in steps if isinstance(step, float)]
+                steps = useful_steps(error.program, longest_s, steps)
                 if not steps:
                     raise
                 step = steps.pop(0)
@@ -380,7 +382,12 @@ def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
 def ignored_note(file: Path, kind: str, lines: Sequence[int]) -> str:
     """The note on all commands of a kind that the machine does not execute."""
     more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
-    return f"{file}:{min(lines)}: {kind}{more}: the machine has none, it moves as if they were done"
+    effect = "the machine has none, it moves as if they were done"
+    if kind == _TOOL_OFFSET:
+        effect = (
+            "there is no tool table, 0 is added: give the offset with G43.1, or in [work] offset_mm"
+        )
+    return f"{file}:{min(lines)}: {kind}{more}: {effect}"
 
 
 def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> Iterator[str]:

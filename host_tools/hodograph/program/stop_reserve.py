@@ -8,6 +8,7 @@ stretches with a reserve, some tenths of a second apart, cost little and bound t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -39,13 +40,21 @@ class ReserveStep:
     share: float
 
 
-STEPS = (ReserveStep(0.03, 0.25), ReserveStep(0.06, 0.4), ReserveStep(inf, 0.2))
+STEPS = (
+    ReserveStep(0.03, 0.25),
+    ReserveStep(0.06, 0.4),
+    ReserveStep(inf, 0.2),
+    ReserveStep(inf, 0.4),
+)
 """One round after the other, where stops are late in places."""
 
 EVERYWHERE = (0.16, 0.25, 0.4, 0.6)
 """Shares of all limits that are left free, one after the other, where this does not help."""
 
 _MOST_LATE = 0.3
+
+_TOO_LATE = 2.0
+"""Times the longest stop: short zones do not help where a stop may take longer."""
 
 
 def late_pieces(program: Program, stop_time_s: float) -> Flags:
@@ -58,6 +67,17 @@ def late_mostly(program: Program, stop_time_s: float) -> bool:
     seconds = program.pieces.duration_q32_s.astype(np.float64)
     late = late_pieces(program, stop_time_s)
     return bool(seconds[late].sum() > _MOST_LATE * seconds.sum())
+
+
+def useful_steps(
+    program: Program, stop_time_s: float, steps: Sequence[ReserveStep | float]
+) -> list[ReserveStep | float]:
+    """The steps that are worth a round, of those that have not been tried: chosen by how late the stops are."""
+    if late_mostly(program, stop_time_s):
+        return [step for step in steps if isinstance(step, float)]
+    if program.stops.worst(FAULT).time_s > _TOO_LATE * stop_time_s:
+        return [step for step in steps if isinstance(step, float) or step.time_s == inf]
+    return list(steps)
 
 
 def reserve_zones(program: Program, stop_time_s: float, step: ReserveStep) -> list[ReserveZone]:

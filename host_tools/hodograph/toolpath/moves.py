@@ -183,6 +183,14 @@ class ToolChange:
 
 
 @dataclass(frozen=True, slots=True)
+class ToolOffset:
+    """The offset of tool `tool` is added from here on, but there is no table that has it: 0 is added."""
+
+    line: int
+    tool: int
+
+
+@dataclass(frozen=True, slots=True)
 class DigitalOutput:
     """Output number `output` goes on or off: with the start of the next move if `synchronised`, else at once."""
 
@@ -244,6 +252,7 @@ Command = (
     | Coolant
     | ToolSelect
     | ToolChange
+    | ToolOffset
     | DigitalOutput
     | AnalogOutput
     | OverrideSwitch

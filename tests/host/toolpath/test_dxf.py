@@ -27,10 +27,11 @@ from drawings import (
     moves_in,
 )
 from hodograph.errors import InputError, ToolpathError
-from hodograph.toolpath import dxf
+from hodograph.toolpath import dxf_tags
 from hodograph.toolpath.contours import Spline
 from hodograph.toolpath.drawing import DrawingOptions
-from hodograph.toolpath.dxf import clamped, read_dxf
+from hodograph.toolpath.dxf import read_dxf
+from hodograph.toolpath.dxf_curves import clamped
 from hodograph.toolpath.moves import ArcMove, SplineMove, StraightMove
 from marks import every
 
@@ -296,7 +297,7 @@ def test_without_ezdxf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(name: str) -> None:
         raise ImportError(name)
 
-    monkeypatch.setattr(dxf, "import_module", missing)
+    monkeypatch.setattr(dxf_tags, "import_module", missing)
     with pytest.raises(InputError, match=r"pip install 'hodograph\[cad\]'"):
         dxf_commands(write(tmp_path, text_of(LINE)))
 

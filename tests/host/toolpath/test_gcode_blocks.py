@@ -28,6 +28,7 @@ from hodograph.toolpath.moves import (
     Spindle,
     StraightMove,
     ToolChange,
+    ToolOffset,
     ToolSelect,
 )
 
@@ -157,6 +158,8 @@ def test_known_m_codes_outside_are_named(code: str) -> None:
         ("M4", [Spindle(1, Rotation.COUNTERCLOCKWISE, 0.0)]),
         ("S500", [Spindle(1, Rotation.STOPPED, 500.0)]),
         ("T3 M6", [ToolSelect(1, 3), ToolChange(1, 3)]),
+        ("G43 H2", [ToolOffset(1, 2)]),
+        ("G43 H0", []),
         ("M7\nM8\nM9", [Coolant(1, True, False), Coolant(2, True, True), Coolant(3, False, False)]),
         ("M62 P3", [DigitalOutput(1, 3, True, True)]),
         ("M63 P3", [DigitalOutput(1, 3, False, True)]),

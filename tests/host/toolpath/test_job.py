@@ -145,6 +145,16 @@ def test_messages_name_the_line(tmp_path: Path, mill: Machine, text: str, words:
         load_job(program(tmp_path, text), mill)
 
 
+def test_tool_offsets_without_a_table_have_one_note(tmp_path: Path, mill: Machine) -> None:
+    job = load_job(program(tmp_path, "F600\nG43 H1 G0 Z5\nG1 X5\nG43 H2\nG1 X9\nM2\n"), mill)
+    (note,) = job.notes
+    assert note.endswith(
+        ":2: tool offset (G43) and 1 more: there is no tool table, 0 is added: "
+        "give the offset with G43.1, or in [work] offset_mm"
+    )
+    assert len(job.sections) == 1
+
+
 def test_simulate_joins_the_sections(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = program(tmp_path, "G21\nF12000\nG1 X4\nG1 Y3\nG4 P0.25\nG0 X0 Y0\nM2\n")
     trace = tmp_path / "out.csv"

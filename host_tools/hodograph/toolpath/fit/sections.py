@@ -34,6 +34,7 @@ from ..moves import (
     SplineMove,
     StraightMove,
     ToolChange,
+    ToolOffset,
     ToolSelect,
 )
 from .corners import SHARPEST_RAD
@@ -122,7 +123,7 @@ class Divider:
             self.before.append(command)
         elif isinstance(command, DigitalOutput | AnalogOutput):
             self._output(command)
-        elif isinstance(command, ToolSelect | OverrideSwitch | Message):
+        elif isinstance(command, ToolSelect | ToolOffset | OverrideSwitch | Message):
             self.before.append(command) if not self.moved else self._on_the_way(command)
         elif isinstance(command, ProgramEnd):
             self.stop()

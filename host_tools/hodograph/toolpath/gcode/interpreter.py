@@ -30,6 +30,7 @@ from ..moves import (
     Spindle,
     StraightMove,
     ToolChange,
+    ToolOffset,
     ToolSelect,
 )
 from .arcs import arc
@@ -191,7 +192,7 @@ class Interpreter:
         if Group.UNITS in g:
             modes.unit_mm = MM_PER_INCH if g[Group.UNITS] == 200 else 1.0
         if Group.TOOL_LENGTH in g:
-            self._set_tool_length(block, g[Group.TOOL_LENGTH])
+            self._set_tool_length(block, g[Group.TOOL_LENGTH], commands)
         if Group.COORDINATES in g:
             system = _SYSTEM_CODES.index(g[Group.COORDINATES]) + 1
             if system != self.coordinates.system:
@@ -206,7 +207,7 @@ class Interpreter:
         if Group.RETRACT in g:
             modes.retract_to_r = g[Group.RETRACT] == 990
 
-    def _set_tool_length(self, block: Block, code: int) -> None:
+    def _set_tool_length(self, block: Block, code: int, commands: list[Command]) -> None:
         offset = list(position_of([0.0] * len(AXES)))
         if code == 430:
             tool = self.modes.tool
@@ -214,6 +215,8 @@ class Interpreter:
                 tool = block.integer("h", "H", 0, MOST_TOOLS)
             word = "h" if "h" in block.values else "g430"
             offset = list(self.options.tool_offset(block, word, tool))
+            if self.options.tools is None and tool:
+                commands.append(ToolOffset(block.line.number, tool))
         elif code == 431:
             offset = list(self.coordinates.tool)
             for axis, number in self._axis_words(block).items():
