@@ -49,9 +49,7 @@ class CheckedBuild(build):
         """Builds; raises a PlatformError that says what is missing. Other systems than POSIX find their compilers."""
         missing = what_is_missing() if os.name == "posix" and not BY_MAKE else None
         if missing is not None:
-            raise PlatformError(
-                f"{missing}, or install the wheel of hodograph, which is compiled"
-            )
+            raise PlatformError(f"{missing}, or install the wheel of hodograph, which is compiled")
         super().run()
 
 

@@ -70,6 +70,8 @@ def _start(options: argparse.Namespace, part: int, file: Path) -> subprocess.Pop
         "--json",
     ]
     command += ["--part", f"{part}/{options.jobs}"]
+    if part > 1:  # the first shows how far all are
+        command.append("--no-progress")
     cores = sorted(os.sched_getaffinity(0))
     core = cores[part % len(cores)]
 

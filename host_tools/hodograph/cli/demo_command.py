@@ -21,6 +21,7 @@ from ..pipeline import load_pipeline
 from ..report import write_report
 from .motion_commands import print_run
 from .output import note, print_json, progress, require_places
+from .waiting import held
 
 _PROGRAM = EXAMPLES / "alpha.toml"
 _WAIT_S = 10.0
@@ -49,7 +50,8 @@ def demo(options: Namespace) -> None:
             print_run("alpha, the first example of the paper", result)
         sys.stdout.flush()
         if opened and sys.stdin.isatty():
-            input("Enter ends the live page. ")
+            with held():
+                input("Enter ends the live page. ")
 
 
 @contextmanager

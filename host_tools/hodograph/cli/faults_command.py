@@ -12,7 +12,7 @@ from ..faults.campaign import run_campaign
 from ..faults.case_table import text
 from ..faults.run_case import Buses
 from ..faults.scenario import find_scenarios
-from .output import note, print_json
+from .output import note, print_json, progress
 
 SCENARIOS = EXAMPLES / "faults"
 
@@ -24,16 +24,16 @@ def faults(options: Namespace) -> None:
         raise InputError("--seeds: must be at least 1, or nothing is tried")
     first = 0 if options.seed is None else options.seed
     seeds = range(first, first + (options.seeds if options.seed is None else 1))
+    buses = None if options.buses is None else _two(options.buses)
+    part, parts = options.part
+    total = len(range(part - 1, len(scenarios) * len(seeds), parts))
     verdicts = []
-    for verdict in run_campaign(
-        scenarios,
-        seeds,
-        None if options.buses is None else _two(options.buses),
-        options.part,
-    ):
-        verdicts.append(verdict)
-        if options.verbose:
-            note(f"{verdict.summary()}")
+    with progress("faults", "case", total) as bar:
+        for verdict in run_campaign(scenarios, seeds, buses, options.part):
+            verdicts.append(verdict)
+            if options.verbose:
+                note(f"{verdict.summary()}")
+            bar(len(verdicts))
     violations = sum(len(verdict.violations) for verdict in verdicts)
     if options.json:
         print_json({"cases": [verdict.summary() for verdict in verdicts], "violations": violations})

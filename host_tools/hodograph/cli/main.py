@@ -55,7 +55,7 @@ _MODULES = {
 """Where each command is; only its module is imported, since some take a second to load."""
 
 
-_COMPUTING = frozenset(
+_AWAITED = frozenset(
     (
         *(
             "spline",
@@ -68,10 +68,11 @@ _COMPUTING = frozenset(
             "replay",
             "report",
         ),
-        *("paper", "tune", "identify", "upload", "goto", "run", "stream", "campaign"),
+        *("paper", "tune", "identify", "upload", "goto", "run", "stream", "campaign", "faults"),
+        *("demo", "latency", "scan", "check", "configure", "home", "start", "hold", "stop"),
     )
 )
-"""Commands that a terminal shows the time of, while they compute."""
+"""Commands that a terminal shows the time of, until they end; the others end at once, or at Ctrl-C."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -145,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
     WANTED.progress = not (options.quiet or options.no_progress)
     # Matplotlib warns where a user has no folder for its cache, which is no concern of who wants a report.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    shown = WANTED.progress and command in _COMPUTING
+    shown = WANTED.progress and command in _AWAITED
     with waiting(command) if shown else nullcontext():
         module = import_module(f"{__package__}.{_MODULES[command]}")
         module.COMMANDS[command](options)

@@ -33,7 +33,7 @@ from ..native.program import NativeLimits
 from ..pipeline import Pipeline, program_limits
 from ..program.inspection import RING_BYTES
 from ..stream.chunks import CHUNK_BYTES
-from ..stream.journal import Entry, Journal, journal_lock, load, mark
+from ..stream.journal import JOURNAL_ELSEWHERE, Entry, Journal, journal_lock, load, mark
 from ..stream.output_check import require_outputs
 from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place
 from ..stream.resuming import nearest_place
@@ -137,11 +137,16 @@ def _require_outputs(job: JobFiles) -> None:
 
 
 def journal_file(options: Namespace) -> Path:
-    """Where the journal is."""
+    """Where the journal is. Raises InputError: no place is named, and the user has no home folder."""
     given = getattr(options, "journal", None)
     if given is not None:
         return Path(given)
-    home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    try:
+        home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    except RuntimeError:  # no HOME, and no entry of this user, as in a container
+        raise InputError(
+            f"the journal has no place: this user has no home folder: {JOURNAL_ELSEWHERE}"
+        ) from None
     return Path(home) / "hodograph" / "stream.json"
 
 

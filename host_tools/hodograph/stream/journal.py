@@ -81,6 +81,10 @@ def mark(file: Path) -> FileMark:
     return FileMark(str(file.resolve()), found.st_size, found.st_mtime_ns)
 
 
+JOURNAL_ELSEWHERE = "name another with hodograph stream --journal FILE, or set XDG_STATE_HOME"
+"""What to do where the usual journal cannot be written."""
+
+
 @contextmanager
 def journal_lock(file: Path) -> Iterator[None]:
     """Keeps a journal for this process. Raises InputError: another one has it, or its folder cannot be written."""
@@ -88,7 +92,7 @@ def journal_lock(file: Path) -> Iterator[None]:
         file.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(file.with_name(file.name + ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
-        raise _cannot_be_written(file, error) from None
+        raise InputError(f"{_cannot_be_written(file, error)}: {JOURNAL_ELSEWHERE}") from None
     try:
         if not lock_descriptor(descriptor, blocking=False):
             raise InputError(

@@ -23,7 +23,7 @@ from hodograph.cli import (
     toolpath_commands,
 )
 from hodograph.cli import waiting as waiting_module
-from hodograph.cli.main import main
+from hodograph.cli.main import _AWAITED, _MODULES, main
 from hodograph.cli.output import (
     WANTED,
     duration_text,
@@ -259,6 +259,13 @@ def test_a_full_disk_behind_stdout_is_one_message() -> None:
 def test_closed_streams_change_nothing(stream: str) -> None:
     done = command("schema", "path", after=stream)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_each_command_that_takes_long_shows_its_time() -> None:
+    """The others end at once, or go on until Ctrl-C with lines of their own."""
+    at_once = {"init", "schema", "completion", "dbc", "resume", "override", "quick-stop", "reset"}
+    until_interrupted = {"rig", "monitor", "record", "status"}
+    assert _MODULES.keys() - _AWAITED == at_once | until_interrupted
 
 
 # -- files that are written ------------------------------------------------------------------------

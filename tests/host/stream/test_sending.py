@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import errno
 import json
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +27,7 @@ from hodograph.bus.sdo.stream_channel import (
     stream_status,
 )
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
-from hodograph.cli.stream_command import _free_rate
+from hodograph.cli.stream_command import _free_rate, journal_file
 from hodograph.config import load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError
 from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
@@ -235,6 +236,29 @@ def test_a_disk_that_is_full_keeps_the_old_journal(
     with pytest.raises(InputError, match="the journal cannot be written: No space left"):
         journal.update(section=3)
     assert load(journal.file).section == 0
+
+
+def test_a_user_without_a_place_for_the_journal_is_told_what_to_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in a container with a user of its own: no home folder, or none that can be written."""
+
+    def no_home() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    (tmp_path / "home").touch()
+    with (
+        pytest.raises(InputError, match=r"Not a directory: name another with .* --journal FILE"),
+        journal_lock(tmp_path / "home/hodograph/stream.json"),
+    ):
+        pass
+    monkeypatch.setattr(Path, "home", no_home)
+    monkeypatch.delenv("XDG_STATE_HOME", raising=False)
+    with pytest.raises(InputError, match=r"no home folder: name another with .* --journal FILE"):
+        journal_file(Namespace())
+    assert journal_file(Namespace(journal=tmp_path / "own.json")) == tmp_path / "own.json"
+    monkeypatch.setenv("XDG_STATE_HOME", "/state")
+    assert journal_file(Namespace()) == Path("/state/hodograph/stream.json")
 
 
 def test_a_journal_has_one_writer(tmp_path: Path) -> None:
