@@ -16,19 +16,21 @@
 #include "fuzz.h"
 #include "golden.h"
 
-#define SEEDS      6u
-#define RAW        255u /* no seed: the bytes themselves */
-#define IMAGE_MAX  16384u
-#define TICKS_MAX  1500u
-#define COMMANDS   16u
-#define TRAVEL_MM  300
-#define NOISE_MM   1e-9 /* of the double kernel, docs/theory/numerics.md section 10 */
-#define Q40        1099511627776.0
-#define SEGMENT_AT PROGRAM_HEADER_SIZE
+#define SEEDS     9u
+#define RAW       255u /* no seed: the bytes themselves */
+#define IMAGE_MAX 16384u
+#define TICKS_MAX 1500u
+#define COMMANDS  16u
+#define TRAVEL_MM 300
+#define AXES_AT   30u  /* in the header */
+#define NOISE_MM  1e-9 /* of the double kernel, docs/theory/numerics.md section 10 */
+#define Q40       1099511627776.0
 
-static const char *const seed_names[SEEDS] = {"line.hdgp",          "line_tiny.hdgp",
-                                              "line_slow.hdgp",     "alpha_minimax.hdgp",
-                                              "alpha_quintic.hdgp", "star_minimax.hdgp"};
+/* In the plane, with events, in space, with six axes. */
+static const char *const seed_names[SEEDS] = {
+    "line.hdgp",          "line_tiny.hdgp",     "line_slow.hdgp",
+    "alpha_minimax.hdgp", "alpha_quintic.hdgp", "star_minimax.hdgp",
+    "alpha_events.hdgp",  "space3.hdgp",        "space6.hdgp"};
 
 /* --- Program time: all that this harness knows of holds and overrides --- */
 
@@ -109,17 +111,30 @@ static void put(struct image *image, uint32_t at, uint64_t value, uint32_t bytes
     }
 }
 
-static uint32_t piece_at(const struct image *image, uint32_t i)
+/* Any number may be there. */
+static uint32_t axes_of(const struct image *image)
 {
-    return SEGMENT_AT + PROGRAM_SEGMENT_SIZE * (uint32_t)get(image, 20, 2) + PROGRAM_PIECE_SIZE * i;
+    const uint32_t axes = (uint32_t)get(image, AXES_AT, 2);
+    return axes < 2u ? 2u : axes > PROGRAM_AXES ? PROGRAM_AXES : axes;
 }
 
-/* Changes that keep a program whole: it is moved, mirrored, or all of its time is doubled or halved. */
+static uint32_t segment_at(const struct image *image, uint32_t i)
+{
+    const uint32_t axes = axes_of(image);
+    return program_header_size(axes) + program_segment_size(axes) * i;
+}
+
+static uint32_t piece_at(const struct image *image, uint32_t i)
+{
+    return segment_at(image, (uint32_t)get(image, 20, 2)) + PROGRAM_PIECE_SIZE * i;
+}
+
+/* Changes that keep a program whole: it is moved, mirrored (in the plane), or all of its time is doubled or halved. */
 static void move_path(struct image *image, uint32_t axis, uint64_t by)
 {
     const uint32_t count = (uint32_t)get(image, 20, 2);
     for (uint32_t i = 0; i < count; ++i) {
-        const uint32_t at = SEGMENT_AT + PROGRAM_SEGMENT_SIZE * i + 8u + 8u * axis;
+        const uint32_t at = segment_at(image, i) + 8u + 8u * axis;
         put(image, at, get(image, at, 8) + by, 8);
     }
 }
@@ -128,7 +143,7 @@ static void mirror_path(struct image *image)
 {
     const uint32_t count = (uint32_t)get(image, 20, 2);
     for (uint32_t i = 0; i < count; ++i) {
-        const uint32_t at = SEGMENT_AT + PROGRAM_SEGMENT_SIZE * i;
+        const uint32_t at = segment_at(image, i);
         put(image, at + 16u, UINT64_C(0) - get(image, at + 16u, 8), 8);
         for (uint32_t k = 0; k < 3u; ++k) {
             put(image, at + 48u + 8u * k, UINT64_C(0) - get(image, at + 48u + 8u * k, 8), 8);
@@ -240,7 +255,7 @@ static void make_image(struct image *image, struct fuzz_input *in, uint8_t kind)
 static struct program_limits no_axis_limits(void)
 {
     struct program_limits limits = golden_no_limits();
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
         limits.min_q40_mm[axis] = -((int64_t)TRAVEL_MM << 40);
         limits.max_q40_mm[axis] = (int64_t)TRAVEL_MM << 40;
     }
@@ -249,24 +264,26 @@ static struct program_limits no_axis_limits(void)
 
 /* Positions of the last four ticks, the newest first; before the program and after it the axes stand. */
 struct trail {
-    double mm[4][2];
+    double mm[4][PROGRAM_AXES];
     double period_s;
+    uint32_t axes;
 };
 
 static void trail_push(struct trail *trail, const struct interpolator_point *point)
 {
     memmove(trail->mm[1], trail->mm[0], 3 * sizeof trail->mm[0]);
-    trail->mm[0][0] = (double)point->position_q40[0] / Q40;
-    trail->mm[0][1] = (double)point->position_q40[1] / Q40;
+    for (uint32_t axis = 0; axis < trail->axes; axis++) {
+        trail->mm[0][axis] = (double)point->position_q40[axis] / Q40;
+    }
 }
 
 static void trail_begin(struct trail *trail, const struct program *p)
 {
-    struct program_segment first;
-    program_segment_get(p, 0, &first);
-    const struct interpolator_point point = {
-        .position_q40 = {first.point_q40_mm[0], first.point_q40_mm[1]}};
+    static struct interpolator it;
+    struct interpolator_point point = {0};
+    FUZZ_CHECK(interpolator_begin(&it, p) == 0 && interpolator_at_q42(&it, 0, &point) >= 0);
     memset(trail, 0, sizeof *trail);
+    trail->axes = p->header.axis_count;
     trail->period_s = 1e-6 * p->header.period_us;
     for (int i = 0; i < 4; i++) {
         trail_push(trail, &point);
@@ -274,9 +291,9 @@ static void trail_begin(struct trail *trail, const struct program *p)
 }
 
 /* What a drive sees: differences over period, its square and its cube. */
-static void trail_rates(const struct trail *trail, int axis, double rate[3])
+static void trail_rates(const struct trail *trail, uint32_t axis, double rate[3])
 {
-    const double (*mm)[2] = trail->mm;
+    const double (*mm)[PROGRAM_AXES] = trail->mm;
     const double one = mm[0][axis] - mm[1][axis];
     const double two = one - (mm[1][axis] - mm[2][axis]);
     const double three = two - (mm[1][axis] - 2.0 * mm[2][axis] + mm[3][axis]);
@@ -291,7 +308,7 @@ static double greater(double a, double b)
 }
 
 /* At rate 1, up to TICKS_MAX. */
-static void find_peaks(const struct program *p, double peak[2][3])
+static void find_peaks(const struct program *p, double peak[PROGRAM_AXES][3])
 {
     static struct interpolator it;
     struct trail trail;
@@ -304,7 +321,7 @@ static void find_peaks(const struct program *p, double peak[2][3])
         result = interpolator_at_q42(&it, k * period, &point);
         FUZZ_CHECK(result >= 0);
         trail_push(&trail, &point);
-        for (int axis = 0; axis < 2; axis++) {
+        for (uint32_t axis = 0; axis < trail.axes; axis++) {
             double rate[3];
             trail_rates(&trail, axis, rate);
             for (int i = 0; i < 3; i++) {
@@ -321,13 +338,14 @@ static uint32_t limit_of(double peak, double unit, uint8_t scale)
     return limit < 4e9 ? (uint32_t)limit + 1u : 4000000000u;
 }
 
+/* The axes after y take the scales of x and y again. */
 static void set_limits(struct program_limits *limits, const struct program *p,
                        const uint8_t scale[6])
 {
-    double peak[2][3] = {{0}};
+    double peak[PROGRAM_AXES][3] = {{0}};
     find_peaks(p, peak);
-    for (int axis = 0; axis < 2; axis++) {
-        const uint8_t *by = scale + 3 * axis;
+    for (uint32_t axis = 0; axis < p->header.axis_count; axis++) {
+        const uint8_t *by = scale + 3u * (axis % 2u);
         limits->axis_velocity_um_s[axis] = limit_of(peak[axis][0], 1000.0, by[0]);
         limits->axis_acceleration_um_s2[axis] = limit_of(peak[axis][1], 1000.0, by[1]);
         limits->axis_jerk_mm_s3[axis] = limit_of(peak[axis][2], 1.0, by[2]);
@@ -337,7 +355,7 @@ static void set_limits(struct program_limits *limits, const struct program *p,
 /* Steps at joints may use 0.5 % of a limit (docs/guides/limits.md); a difference is a mean. */
 static void keeps_limits(const struct trail *trail, const struct program_limits *limits)
 {
-    for (int axis = 0; axis < 2; axis++) {
+    for (uint32_t axis = 0; axis < trail->axes; axis++) {
         double rate[3];
         const double noise = NOISE_MM / trail->period_s;
         const int64_t at_q40 = (int64_t)(trail->mm[0][axis] * Q40);
