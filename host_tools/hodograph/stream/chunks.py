@@ -17,6 +17,7 @@ from ..feed import FeedZone
 from ..feed.pieces import FeedPieces
 from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
+from ..program.check import REACH_Q40, brief_pairs
 from ..program.codes import ProgramError
 from ..program.image import Program, encode, segment_size
 from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
@@ -65,6 +66,9 @@ _MOVING_FAULTS = frozenset(
     )
 )
 """What a slower feed at a piece avoids."""
+
+_REFUSED_TAILS = _MOVING_FAULTS | {ProgramError.SEGMENT_SHORT, ProgramError.PIECE_SHORT}
+"""What another tail avoids."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -373,7 +377,7 @@ class SectionChunks:
                 fault = self._fault(program)
             if fault is None:
                 break
-            if fault.code in _MOVING_FAULTS:
+            if fault.code in _REFUSED_TAILS:
                 tails.refuse(tail)
             if fault.code == ProgramError.EVENT_DENSE:
                 break
@@ -421,9 +425,12 @@ class SectionChunks:
         codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
         bad = np.asarray((codes == 0).any(axis=1))
         if not bad.any():
-            fault = self._fault(self._program(stretch, _no_codes(len(pieces))))
+            program = self._program(stretch, _no_codes(len(pieces)))
+            fault = self._fault(program)
             if fault is not None and fault.code in _MOVING_FAULTS:
                 bad[fault.index] = True
+            elif fault is not None and fault.code == ProgramError.SEGMENT_SHORT:
+                bad = _on_short_segments(program)
         return bad
 
     def _searched_in(self, window: Window) -> _Searched:
@@ -483,6 +490,19 @@ class SectionChunks:
         plan = replace(window.plan, limits=replace(limits, zones=zones))
         terms = replace(stop_terms(self.machine, limits), quick=not thorough)
         return stop_codes(program, plan, terms, wanted)
+
+
+def _on_short_segments(program: Program) -> NDArray[np.bool_]:
+    """The pieces (M,) that reach into two neighbouring segments which a tick at 200 % could pass."""
+    ends = np.append(program.start_q40, program.length_q40)
+    pairs, _, _ = brief_pairs(ends, program.pieces, program.period_us)
+    starts = program.pieces.start_q40
+    bad = np.zeros(len(starts), dtype=np.bool_)
+    for pair in pairs.tolist():
+        first = int(np.searchsorted(starts, ends[pair] - REACH_Q40, side="left")) - 1
+        last = int(np.searchsorted(starts, ends[pair + 2] + REACH_Q40, side="right"))
+        bad[max(first, 0) : last] = True
+    return bad
 
 
 def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:

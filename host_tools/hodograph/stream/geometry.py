@@ -36,6 +36,9 @@ _SPEED_RATIO = 2.0
 _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
+_PAIR_BESIDE_MM = 1e-4
+"""How far the zone of short segments reaches beyond them: so that it touches the pieces beside it."""
+
 _BESIDE_MM = 1e-6
 LEAST_REST_MM = 0.002
 """A section of which less is left is done."""
@@ -302,19 +305,27 @@ class StreamPath:
         return int(self.line[self.segment_at(s_q40)])
 
     def feeds(self, most_mm_s: float) -> tuple[float, tuple[FeedZone, ...]]:
-        """The greatest feed, and zones where it is less: the programmed one, and what short segments allow."""
+        """The greatest feed, and zones where it is less: the programmed one, and what short segments allow.
+
+        The controller counts a piece that ends where short segments begin as one on them: their zones reach a little
+        beyond them.
+        """
         starts = self.curve.segment_starts_mm
         pair = (starts[2:] - starts[:-2]) * (_PAIR_SHARE / (2.0 * self._period_s))
-        feed = np.minimum(self.feed_mm_s, most_mm_s)
+        asked = np.minimum(self.feed_mm_s, most_mm_s)
+        feed = asked.copy()
         if pair.size:
             feed[:-1] = np.minimum(feed[:-1], pair)
             feed[1:] = np.minimum(feed[1:], pair)
         self._slow_for_events(feed)
+        short = feed < asked
         feed = np.clip(feed, LEAST_FEED_MM_S, GREATEST_FEED_MM_S)
         nominal = float(feed.max())
         edges = [0, *(np.flatnonzero(np.diff(feed)) + 1).tolist(), feed.size]
-        return nominal, tuple(
-            FeedZone(float(starts[first]), float(starts[last]), float(feed[first]))
-            for first, last in itertools.pairwise(edges)
-            if feed[first] < nominal
-        )
+        zones = []
+        for first, last in itertools.pairwise(edges):
+            if feed[first] < nominal:
+                beside = _PAIR_BESIDE_MM if short[first:last].any() else 0.0
+                low = max(float(starts[first]) - beside, 0.0)
+                zones.append(FeedZone(low, float(starts[last]) + beside, float(feed[first])))
+        return nominal, tuple(zones)

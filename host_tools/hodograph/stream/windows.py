@@ -162,7 +162,7 @@ class SectionFeed:
         self._held: Solution | None = None
         self._last: Window | None = None
         self._moving: State | None = None
-        self._carried = (0.0, 0.0)
+        self._before_s = LONGEST_S
         self._low_q40 = begin_q40
         self._low_mm = 0.0
         self._wanted_s = FIRST_WINDOW_S if begin_point_q40 is None else WINDOW_S
@@ -187,6 +187,7 @@ class SectionFeed:
         self._last, self._wanted_s = window, min(2.0 * self._wanted_s, WINDOW_S)
         self._low_mm = window.end_mm
         self._low_q40 = window.joint_q40(count)
+        self._before_s = _last_s(window.stretch.pieces, count)
         if window.rests:
             self._held, self._moving = None, None
             return
@@ -358,7 +359,17 @@ class SectionFeed:
         for share in (0.0, *_EASED):
             tried = limits if share == 0.0 else limits.eased(max(self._period_s, share * stop_s))
             with suppress(FloatingPointError):
-                found = plan_window(curve, tried, low, high, moving, self._period_s, held, known_to)
+                found = plan_window(
+                    curve,
+                    tried,
+                    low,
+                    high,
+                    moving,
+                    self._period_s,
+                    held,
+                    known_to,
+                    before_s=self._before_s,
+                )
                 if found is not None:
                     return measured(curve, found)
         if moving is None:
@@ -414,6 +425,7 @@ class SectionFeed:
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
         yield from self._brakes(window, joint, state, low, least)
+        before_s = _last_s(window.stretch.pieces, joint)
         tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
@@ -423,7 +435,9 @@ class SectionFeed:
             tried.add(at)
             high = float(ends[at])
             limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
-            one = plan_window(curve, limits, low, high, state, self._period_s, hurried=True)
+            one = plan_window(
+                curve, limits, low, high, state, self._period_s, hurried=True, before_s=before_s
+            )
             one = None if one is None else measured(curve, one)
             if one is None or one.excess > _TAIL_EXCESS - 1.0:
                 continue
@@ -459,6 +473,11 @@ class SectionFeed:
             if piece_usage(curve, limits, track).max() <= 1.0:
                 yield self._stretch(track, window.plan, window.joint_q40(joint))
                 return
+
+
+def _last_s(pieces: FeedPieces, count: int) -> float:
+    """How long the last of the first pieces lasts."""
+    return float(pieces.duration_q32_s[count - 1]) * 2.0**-32
 
 
 def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:

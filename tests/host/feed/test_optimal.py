@@ -24,6 +24,7 @@ from hodograph.feed.optimal import plan_optimal, plan_peaks, replan_optimal, sol
 from hodograph.feed.optimal.plan_limits import gather
 from hodograph.feed.optimal.sequence import plan_windows
 from hodograph.feed.optimal.track import Track, joined
+from hodograph.feed.optimal.window import _long_enough
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify import verify_program
@@ -244,3 +245,12 @@ def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch)
     for counts in (work, pieces):
         assert 3.0 < counts[1] / counts[0] < 5.5
     assert seconds[1] < 8.0 * seconds[0] + 0.5
+
+
+def test_an_interval_that_is_too_brief_with_its_neighbour_is_joined_to_it() -> None:
+    times = np.array([3.0, 3.0, 0.5, 1.0, 3.0, 0.5])
+    assert _long_enough(times, None, 2.01).tolist() == [True, True, True, False, True, True, True]
+    # Where other pieces come before and behind the window, its own ends count too.
+    times = np.array([0.5, 3.0, 3.0, 3.0, 0.5, 0.5])
+    kept = _long_enough(times, 1.0, 2.01)
+    assert kept.tolist() == [True, False, True, True, True, False, True]

@@ -26,10 +26,10 @@ from hodograph.native.stream import OfflineStream
 from hodograph.pipeline import program_limits
 from hodograph.program import encode
 from hodograph.program.check import check, check_image
-from hodograph.spline import from_control_polygon
+from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
 from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
-from hodograph.stream.geometry import blocks_from, with_joints
+from hodograph.stream.geometry import Block, StreamPath, blocks_from, with_joints
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.stream.windows import SectionFeed
@@ -110,6 +110,21 @@ def test_random_paths(
     file.write_text(_walk(seed, count, step_mm, turn_rad))
     for chunks in _sections(file, machine):
         _verify(chunks, machine)
+
+
+def test_pieces_beside_short_segments_are_as_slow(machine: Machine) -> None:
+    """The controller counts a piece that ends where a pair of short segments begins as one on them."""
+    path = StreamPath(machine.offset_mm, machine.period_us)
+    x = np.array([0.0, 8.0, 8.01, 8.02, 16.0])
+    w = np.sqrt(np.diff(x))[:, None] * np.ones(3)
+    path.append(
+        Block(PHSpline(x.astype(complex), w.astype(complex), False), np.full(4, 50.0), np.arange(4))
+    )
+    nominal, zones = path.feeds(machine.feed_mm_s)
+    slowest = min(zones, key=lambda zone: zone.feed_mm_s)
+    assert slowest.feed_mm_s < 0.02 / (2e-6 * machine.period_us) < nominal
+    assert slowest.from_mm < 8.0
+    assert slowest.to_mm > 8.02
 
 
 @pytest.mark.long

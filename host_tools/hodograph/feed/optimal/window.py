@@ -40,6 +40,9 @@ _MOST_TRIALS = 3
 _TRUSTED = 2
 _TOLERABLE = 5e-3
 _LEAST_ESTIMATED = 1e-3
+_BRIEF = 2.01
+"""Periods that two neighbouring intervals last at least, a little more than a program asks for."""
+_MOST_JOINED, _LEAST_KNOTS = 4, 4
 _PENALTY = 30.0
 """What it costs to be above limits by their own size on one interval, in times that the window takes."""
 
@@ -109,12 +112,15 @@ def plan_window(
     known_to: float = 0.0,
     *,
     hurried: bool = False,
+    before_s: float | None = None,
 ) -> Solution | None:
     """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
 
-    known    an earlier solution that is good up to arc length known_to
-    hurried  the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
-             hundred slower
+    known     an earlier solution that is good up to arc length known_to
+    hurried   the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
+              hundred slower
+    before_s  how long the interval before `low` lasts, where intervals follow at the end too; None: the window is a
+              whole program
     """
     guess = first_estimate(spline, limits, low, high, None if start is None else start.q, period_s)
     s, t, step = guess.s, guess.t, guess.step_s
@@ -136,7 +142,40 @@ def plan_window(
         about = best.squared_feed
         guess = _refined(guess, best)
         s, t, step = _retimed(best, guess, period_s)
-    return best
+    return best if best is None else _without_brief(spline, best, before_s, period_s, gain)
+
+
+def _without_brief(
+    spline: Curve, found: Solution, before_s: float | None, period_s: float, gain: float
+) -> Solution:
+    """A solution whose brief intervals are joined to a neighbour: no knots were found at which all last long enough."""
+    for _ in range(_MOST_JOINED):
+        keep = _long_enough(found.times, before_s, _BRIEF * period_s)
+        if keep.all():
+            break
+        setting = found.setting
+        joined = _setting(spline, setting.limits, found.grid.s[keep], setting.start)
+        again = _Rounds(joined, found.squared_feed).run(None, gain)
+        if again is None:
+            break
+        found = again
+    return found
+
+
+def _long_enough(times: Real, before_s: float | None, least_s: float) -> NDArray[np.bool_]:
+    """Knots (n + 1,) that stay: one between two intervals that last less together goes, the last one of two in turn."""
+    pairs = times[1:] + times[:-1]
+    if not pairs.size:
+        return np.ones(times.size + 1, dtype=np.bool_)
+    if before_s is None:
+        pairs[[0, -1]] = np.inf
+    elif before_s + times[0] < least_s:
+        pairs[0] = 0.0
+    keep = np.ones(times.size + 1, dtype=np.bool_)
+    for k in np.flatnonzero(pairs < least_s).tolist():
+        if keep[k] and np.count_nonzero(keep) > _LEAST_KNOTS:
+            keep[k + 1] = False
+    return keep
 
 
 def tightened(found: Solution, tight: Real) -> Solution | None:
