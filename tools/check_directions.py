@@ -104,7 +104,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "spline": {"errors"},
     "feed": {"errors", "names", "spline"},
     "config": {"errors", "names", "events", "feed", "spline"},
-    "toolpath": {"errors", "names", "spline"},
+    "toolpath": {"errors", "names", "spline", "native"},
     "native": {"errors", "names", "events", "config"},
     "program": {"errors", "names", "events", "spline", "feed", "native"},
     "simulate": {"errors", "names", "events", "config", "native", "program"},
