@@ -8,13 +8,13 @@
 #define STEPS 16 /* of a brake, about */
 #define MOST_STEPS                                                                                 \
     160 /* of a brake, until the remaining states must be within the limits as a whole */
-#define MOST_HALVINGS 3     /* of a step */
-#define MOST_PARTS    14    /* of a piece at a time */
-#define MOST_LOOKS    3000  /* at a stretch of a brake, for a piece and kind, */
-#define LOOKS_PER_S   30000 /* and more for a long piece */
-#define LOW_RATES     4     /* halvings of the rate of the lowest level, each by itself */
-#define WAY_SLACK_Q40 ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
-#define Q40_BITS      62
+#define MOST_HALVINGS   3     /* of a step */
+#define MOST_PARTS      14    /* of a piece at a time */
+#define MOST_LOOKS      3000  /* at a stretch of a brake, for a piece and kind, */
+#define LOOKS_PER_S     30000 /* and more for a long piece */
+#define LOW_RATES       4     /* halvings of the rate of the lowest level, each by itself */
+#define PIECE_SLACK_Q40 ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
+#define Q40_BITS        62
 
 static const struct real zero = {0, 0};
 
@@ -384,21 +384,21 @@ static int step_keeps(struct brake_check *check, const struct flow *flow,
     return real_less(last.v.high, swept->v.low) != 0 || keeps_on(check, &path, &last, up) != 0;
 }
 
-/* Bounds of time and way from here to rest (core/stop_check). */
+/* Bounds of time and distance from here to rest (core/stop_check). */
 static int to_rest(const struct flow *flow, const struct program_stop *stop, uint32_t period_us,
-                   struct real *time_s, int64_t *way_q40)
+                   struct real *time_s, int64_t *distance_q40)
 {
     struct stop_start from = {.speed_um = thousandths(flow->at.v.high),
                               .rising_um = thousandths(flow->at.a.high)};
     const struct stop_bound bound = stop_curve(&from, stop);
     const uint64_t more_us = (uint64_t)STOP_TICKS * period_us;
-    if (bound.way_um == UINT32_MAX || bound.time_us == UINT32_MAX) {
+    if (bound.distance_um == UINT32_MAX || bound.time_us == UINT32_MAX) {
         return 0;
     }
     const uint64_t more_um = qmath_div_up_u64(from.speed_um * more_us, 1000000u);
     *time_s = real_div(real_make((int64_t)(bound.time_us + more_us), 0), real_make(1000000, 0));
     /* 2^40 / 1000, up */
-    *way_q40 = (int64_t)((bound.way_um + more_um) * 1099511628u);
+    *distance_q40 = (int64_t)((bound.distance_um + more_um) * 1099511628u);
     return 1;
 }
 
@@ -412,7 +412,7 @@ static struct real greatest_speed(const struct flow *flow)
 }
 
 /* All that is left of the brakes at once. */
-static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_t way_q40)
+static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
 {
     struct states left = flow->at;
     struct path_stretch path;
@@ -425,7 +425,7 @@ static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_
     left.v.low = zero;
     left.a.low = real_max(flow->least, release(flow->own->up, real_root(left.v.high)));
     left.a.high = rise;
-    left.high_q40_mm += way_q40;
+    left.high_q40_mm += distance_q40;
     path_of(check, &left, &path);
     return keeps_on(check, &path, &left, jerk);
 }
@@ -438,13 +438,13 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
     struct flow flow;
     struct real time_s = zero;
     struct real tried = zero;
-    int64_t way_q40 = 0;
+    int64_t distance_q40 = 0;
     int kept = 0;
     flow_begin(&flow, check, own, from);
-    if (to_rest(&flow, stop, period_us, &time_s, &way_q40) == 0) {
+    if (to_rest(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
         return 0;
     }
-    if (rest_keeps(check, &flow, way_q40) != 0) {
+    if (rest_keeps(check, &flow, distance_q40) != 0) {
         return 1;
     }
     if (flow.slow.m == 0) {
@@ -470,8 +470,8 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
         /* again when the speed is a quarter less */
         if (real_less(flow.at.v.high, real_mul(tried, real_make(3, -2))) != 0) {
             tried = flow.at.v.high;
-            kept = to_rest(&flow, stop, period_us, &time_s, &way_q40) != 0 &&
-                   rest_keeps(check, &flow, way_q40) != 0;
+            kept = to_rest(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
+                   rest_keeps(check, &flow, distance_q40) != 0;
         }
     }
     return kept;
@@ -479,26 +479,26 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
 
 /* --- The parts of a piece --- */
 
-/* Value between bounds on a part of the piece of a polynomial: the way's derivative of that order. */
-static struct span derivative(const struct way *way, const struct span *u, int order)
+/* Value between bounds on a part of the piece of a feed polynomial's derivative of that order. */
+static struct span derivative(const struct feed_polynomial *poly, const struct span *u, int order)
 {
     const struct real middle = mean(u->low, u->high);
     const struct real half = real_sub(u->high, middle);
-    struct real c[WAY_DEGREE + 1];
+    struct real c[FEED_DEGREE + 1];
     struct real aside = zero;
     struct real unit = real_make(1, 0);
-    for (int k = 0; k <= WAY_DEGREE; k++) {
-        c[k] = way->c[k];
+    for (int k = 0; k <= FEED_DEGREE; k++) {
+        c[k] = poly->c[k];
     }
     for (int n = 1; n <= order; n++) {
-        for (int k = 0; k <= WAY_DEGREE - n; k++) {
+        for (int k = 0; k <= FEED_DEGREE - n; k++) {
             c[k] = real_times(c[k + 1], k + 1);
         }
-        unit = real_mul(unit, way->per_s);
+        unit = real_mul(unit, poly->per_s);
     }
-    path_motion_shift(c, WAY_DEGREE - order, middle);
-    path_motion_stretch(c, WAY_DEGREE - order, half);
-    for (int k = 1; k <= WAY_DEGREE - order; k++) {
+    path_motion_shift(c, FEED_DEGREE - order, middle);
+    path_motion_stretch(c, FEED_DEGREE - order, half);
+    for (int k = 1; k <= FEED_DEGREE - order; k++) {
         aside = real_add(aside, real_abs(c[k]));
     }
     const struct span out = {real_mul(real_sub(c[0], aside), unit),
@@ -507,21 +507,21 @@ static struct span derivative(const struct way *way, const struct span *u, int o
 }
 
 /* Speed lambda F', acceleration lambda^2 F'' + lambda' F'; of a hold lambda' F' is at most a quarter of the deceleration. */
-static void states_of(const struct way *way, const struct part *part, struct real most_turned,
-                      struct states *out)
+static void states_of(const struct feed_polynomial *poly, const struct part *part,
+                      struct real most_turned, struct states *out)
 {
-    struct span feed = derivative(way, &part->u, 1);
-    const struct span bend = derivative(way, &part->u, 2);
+    struct span feed = derivative(poly, &part->u, 1);
+    const struct span bend = derivative(poly, &part->u, 2);
     const struct span rate2 = {square(part->rate.low), square(part->rate.high)};
     feed.low = real_max(feed.low, zero);
     feed.high = real_max(feed.high, zero);
     struct span turned = product(&feed, &part->slope);
     turned.high = real_min(turned.high, most_turned);
     turned.low = real_min(turned.low, turned.high);
-    out->low_q40_mm = way->start_q40_mm - WAY_SLACK_Q40 +
-                      q40_of(path_motion_horner(way->c, WAY_DEGREE, part->u.low));
-    out->high_q40_mm = way->start_q40_mm + WAY_SLACK_Q40 +
-                       q40_of(path_motion_horner(way->c, WAY_DEGREE, part->u.high));
+    out->low_q40_mm = poly->start_q40_mm - PIECE_SLACK_Q40 +
+                      q40_of(path_motion_horner(poly->c, FEED_DEGREE, part->u.low));
+    out->high_q40_mm = poly->start_q40_mm + PIECE_SLACK_Q40 +
+                       q40_of(path_motion_horner(poly->c, FEED_DEGREE, part->u.high));
     out->v.low = real_mul(feed.low, part->rate.low);
     out->v.high = real_mul(feed.high, part->rate.high);
     out->a = sum(product(&bend, &rate2), turned);
@@ -540,14 +540,14 @@ static struct real width(const struct span *a)
 }
 
 /* Halves a part where its states differ most: by the speed that they make different. */
-static void split(const struct way *way, const struct states *at, const struct numbers *own,
-                  struct part *low, struct part *high)
+static void split(const struct feed_polynomial *poly, const struct states *at,
+                  const struct numbers *own, struct part *low, struct part *high)
 {
     const struct real time_s =
         real_add(real_div(at->v.high, own->deep), real_div(own->deep, own->down));
-    const struct span feed = derivative(way, &low->u, 1);
-    const struct span bend = derivative(way, &low->u, 2);
-    const struct real instants = real_div(width(&low->u), way->per_s);
+    const struct span feed = derivative(poly, &low->u, 1);
+    const struct span bend = derivative(poly, &low->u, 2);
+    const struct real instants = real_div(width(&low->u), poly->per_s);
     const struct real by_time =
         real_add(real_mul(instants, real_max(real_abs(bend.low), real_abs(bend.high))),
                  real_div(real_mul(instants, at->v.high), time_s));
@@ -569,28 +569,28 @@ struct stops {
     const struct program_stop *own;
     struct numbers numbers;
     struct real most_turned;
-    const struct way *way;
+    const struct feed_polynomial *poly;
 };
 
 /* All of a part, which is halved where need be; depth first. */
 static int parts_keep(struct brake_check *check, const struct stops *stops,
                       const struct part *whole)
 {
-    const struct way *way = stops->way;
+    const struct feed_polynomial *poly = stops->poly;
     struct part parts[MOST_PARTS];
     uint32_t count = 1;
     parts[0] = *whole;
     while (count > 0u) {
         struct states from;
         struct part *last = &parts[count - 1u];
-        states_of(way, last, stops->most_turned, &from);
+        states_of(poly, last, stops->most_turned, &from);
         program_check_attend(check->limits);
         if (brakes_keep(check, stops->own, &stops->numbers, &from) != 0) {
             count--;
         } else if (count == MOST_PARTS || check->looks > check->most_looks) {
             return 0;
         } else {
-            split(way, &from, &stops->numbers, last, last + 1);
+            split(poly, &from, &stops->numbers, last, last + 1);
             count++;
         }
     }
@@ -615,13 +615,13 @@ static struct real greatest_slope(const struct program_override *bounds, uint32_
 
 static int levels_keep(struct brake_check *check, const struct stops *stops)
 {
-    const struct way *way = stops->way;
+    const struct feed_polynomial *poly = stops->poly;
     struct part part = {{zero, real_make(1, 0)}, {zero, zero}, {zero, zero}};
     int kept = 1;
     for (uint32_t level = 0; level < PROGRAM_LEVELS && kept != 0; level++) {
         for (int i = level == 0u ? LOW_RATES : 0; i >= 0 && kept != 0; i--) {
-            part.rate.high = real_scale(level_rate(&way->override, level), -i);
-            part.slope.high = greatest_slope(&way->override, level, part.rate.high);
+            part.rate.high = real_scale(level_rate(&poly->override, level), -i);
+            part.slope.high = greatest_slope(&poly->override, level, part.rate.high);
             part.slope.low = real_negative(part.slope.high);
             kept = parts_keep(check, stops, &part);
             part.rate.low = part.rate.high;
@@ -656,19 +656,19 @@ int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_st
 {
     const struct program *p = check->bounds.program;
     const int fault = kind == PROGRAM_STOP_FAULT;
-    struct way way;
-    struct stops stops = {.own = stop, .way = &way};
+    struct feed_polynomial poly;
+    struct stops stops = {.own = stop, .poly = &poly};
     check->looks = 0;
     if (check->any == 0 || stop->deceleration == 0u) {
         return 1;
     }
-    path_motion_read_way(&way, p, piece);
+    path_motion_read_piece(&poly, p, piece);
     check->most_looks = MOST_LOOKS + (uint32_t)(piece_ms(p, piece) * LOOKS_PER_S / 1000u);
-    while (check->hint > 0u && program_segment_start(p, check->hint) > way.start_q40_mm) {
+    while (check->hint > 0u && program_segment_start(p, check->hint) > poly.start_q40_mm) {
         check->hint--;
     }
     while (check->hint + 1u < p->header.segment_count &&
-           program_segment_start(p, check->hint + 1u) <= way.start_q40_mm) {
+           program_segment_start(p, check->hint + 1u) <= poly.start_q40_mm) {
         check->hint++;
     }
     read_numbers(&stops.numbers, stop);

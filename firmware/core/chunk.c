@@ -148,9 +148,9 @@ static int check_segments(const struct chunk *next, const struct chunk *previous
 {
     for (*index = 0; *index < next->shared_segments; (*index)++) {
         const uint32_t k = next->segment_shift + *index;
-        const int64_t way_q40 =
+        const int64_t arc_q40 =
             program_segment_start(&previous->program, k) - next->arc_shift_q40_mm;
-        if (program_segment_start(&next->program, *index) != way_q40 ||
+        if (program_segment_start(&next->program, *index) != arc_q40 ||
             !program_segment_alike(&next->program, *index, &previous->program, k)) {
             return PROGRAM_ERR_CHUNK_SEGMENT;
         }
@@ -163,8 +163,8 @@ static int check_pieces(const struct chunk *next, const struct chunk *previous, 
 {
     for (*index = 0; *index < next->shared_pieces; (*index)++) {
         const uint32_t k = next->piece_shift + *index;
-        const int64_t way_q40 = program_piece_start(&previous->program, k) - next->arc_shift_q40_mm;
-        if (program_piece_start(&next->program, *index) != way_q40 ||
+        const int64_t arc_q40 = program_piece_start(&previous->program, k) - next->arc_shift_q40_mm;
+        if (program_piece_start(&next->program, *index) != arc_q40 ||
             !program_piece_alike(&next->program, *index, &previous->program, k)) {
             return PROGRAM_ERR_CHUNK_PIECE;
         }

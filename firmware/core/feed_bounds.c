@@ -110,7 +110,7 @@ int feed_bounds_contained(const struct program_piece *piece)
     int64_t b[8];
     int degree = 0;
     int64_t scale = bernstein_of(piece, 0, b, &degree);
-    int64_t slack = scale * FEED_WAY_SLACK_Q36;
+    int64_t slack = scale * FEED_PIECE_SLACK_Q36;
     int64_t low = b[degree] < 0 ? b[degree] : 0;
     int64_t high = b[degree] < 0 ? 0 : b[degree];
     return bernstein_within(b, degree, low - slack, high + slack);

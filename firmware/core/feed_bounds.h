@@ -43,10 +43,10 @@ void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative d
 
 /* The distance that a piece may go back before its start or beyond its end: 2^-14 mm. The exponential ramp begins with
  * a step back of some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
-#define FEED_WAY_SLACK_Q36 ((int64_t)1 << 22)
+#define FEED_PIECE_SLACK_Q36 ((int64_t)1 << 22)
 
 /* 1 when F stays between its values at both ends of the piece, to that slack: a feed that is nowhere far below 0 may
- * still creep back for long. For a piece whose way is at most 32 mm. */
+ * still creep back for long. For a piece of at most 32 mm. */
 int feed_bounds_contained(const struct program_piece *piece);
 
 #endif

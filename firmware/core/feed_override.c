@@ -283,12 +283,13 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
-    const uint32_t way_um = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
+    const uint32_t distance_um =
+        f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_um : h->fault_worst_um;
     const uint32_t time_us = f->kind == PROGRAM_STOP_HOLD ? h->hold_worst_us : h->fault_worst_us;
     const int64_t left_q40_mm = h->length_q40_mm - from->arc_length_q40_mm;
     const int64_t left_q32_s =
         (int64_t)qmath_q32_of_q42(f->clock.duration_q42_s - f->clock.time_q42_s);
-    return qmath_mul_unsigned(left_q40_mm, UM_PER_MM) >> 8 >= (int64_t)way_um &&
+    return qmath_mul_unsigned(left_q40_mm, UM_PER_MM) >> 8 >= (int64_t)distance_um &&
            qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 

@@ -7,8 +7,8 @@
 
 /* Way of one period, and its change, beyond which no machine goes: 32 mm and 1 mm. They keep the
  * products below inside 62 bits. */
-#define WAY_MAX_Q40_MM    (INT64_C(1) << 45)
-#define CHANGE_MAX_Q40_MM (INT64_C(1) << 40)
+#define DISTANCE_MAX_Q40_MM (INT64_C(1) << 45)
+#define CHANGE_MAX_Q40_MM   (INT64_C(1) << 40)
 
 static int64_t clamp(int64_t value, int64_t most)
 {
@@ -45,7 +45,7 @@ static int16_t torque_offset(const struct feedforward_gains *gains, int64_t dist
 struct feedforward_offset feedforward_offset(const struct feedforward_gains *gains,
                                              int64_t first_q40_mm, int64_t second_q40_mm)
 {
-    const int64_t distance_q40_mm = clamp(first_q40_mm, WAY_MAX_Q40_MM);
+    const int64_t distance_q40_mm = clamp(first_q40_mm, DISTANCE_MAX_Q40_MM);
     const int64_t change_q40_mm = clamp(second_q40_mm, CHANGE_MAX_Q40_MM);
     const struct feedforward_offset offset = {
         .velocity_counts_s = velocity_offset(gains, distance_q40_mm),

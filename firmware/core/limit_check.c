@@ -15,12 +15,12 @@ static const struct real zero = {0, 0};
 
 /* A stretch of a piece on a segment, u from middle - half to middle + half. */
 struct cell {
-    const struct way *way;
+    const struct feed_polynomial *poly;
     const struct path *path;
     struct real
-        c[WAY_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
-    struct real per_s;     /* d x / d t */
-    struct real offset_mm; /* start of the piece from the start of the segment */
+        c[FEED_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
+    struct real per_s;      /* d x / d t */
+    struct real offset_mm;  /* start of the piece from the start of the segment */
 };
 
 struct check {
@@ -38,12 +38,12 @@ struct check {
 static void feed_at(const struct cell *cell, struct real x, struct real f[QUANTITIES])
 {
     struct real per_s = cell->per_s;
-    struct real c[WAY_DEGREE + 1];
-    for (int k = 0; k <= WAY_DEGREE; k++) {
+    struct real c[FEED_DEGREE + 1];
+    for (int k = 0; k <= FEED_DEGREE; k++) {
         c[k] = cell->c[k];
     }
     for (int order = 0; order < QUANTITIES; order++) {
-        const int degree = WAY_DEGREE - 1 - order;
+        const int degree = FEED_DEGREE - 1 - order;
         for (int k = 0; k <= degree; k++) {
             c[k] = real_times(c[k + 1], k + 1);
         }
@@ -57,7 +57,7 @@ static void motion_at(const struct cell *cell, struct real x, struct motion *out
     struct real f[QUANTITIES];
     feed_at(cell, x, f);
     path_motion_at(cell->path,
-                   real_add(path_motion_horner(cell->c, WAY_DEGREE, x), cell->offset_mm), f, out);
+                   real_add(path_motion_horner(cell->c, FEED_DEGREE, x), cell->offset_mm), f, out);
 }
 
 /* --- Against the limits --- */
@@ -84,8 +84,8 @@ static void in_level(const struct program_override *own, uint32_t level,
 /* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
  * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out.
  * docs/theory/numerics.md section 7. */
-static void at_all_overrides(const struct way *way, const struct real at_one[QUANTITIES],
-                             struct real out[QUANTITIES])
+static void at_all_overrides(const struct feed_polynomial *poly,
+                             const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
 {
     struct real magnitude[QUANTITIES];
     struct real own[QUANTITIES];
@@ -94,7 +94,7 @@ static void at_all_overrides(const struct way *way, const struct real at_one[QUA
         out[k] = zero;
     }
     for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
-        in_level(&way->override, level, magnitude, own);
+        in_level(&poly->override, level, magnitude, own);
         for (int k = 0; k < QUANTITIES; k++) {
             out[k] = real_max(out[k], own[k]);
         }
@@ -118,7 +118,7 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
     motion_at(cell, x, &found);
     for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
-        at_all_overrides(cell->way, found.of[axis], values);
+        at_all_overrides(cell->poly, found.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
             if (passes(values[k], check->limit.of[axis][k])) {
                 return codes[k];
@@ -156,7 +156,7 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
     path_motion_bend(cell->path, cell->c, cell->per_s, cell->offset_mm, &bend);
     for (uint32_t axis = 0; axis < check->axis_count; axis++) {
         struct real values[QUANTITIES];
-        at_all_overrides(cell->way, bend.of[axis], values);
+        at_all_overrides(cell->poly, bend.of[axis], values);
         for (int k = 0; k < QUANTITIES; k++) {
             bend.of[axis][k] = values[k];
         }
@@ -182,19 +182,19 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
     return code;
 }
 
-static void set_cell(struct cell *cell, const struct way *way, const struct path *path,
+static void set_cell(struct cell *cell, const struct feed_polynomial *poly, const struct path *path,
                      struct real low, struct real high)
 {
     const struct real half = real_scale(real_sub(high, low), -1);
-    cell->way = way;
+    cell->poly = poly;
     cell->path = path;
-    for (int k = 0; k <= WAY_DEGREE; k++) {
-        cell->c[k] = way->c[k];
+    for (int k = 0; k <= FEED_DEGREE; k++) {
+        cell->c[k] = poly->c[k];
     }
-    path_motion_shift(cell->c, WAY_DEGREE, real_scale(real_add(low, high), -1));
-    path_motion_stretch(cell->c, WAY_DEGREE, half);
-    cell->per_s = real_div(way->per_s, half);
-    cell->offset_mm = real_make(way->start_q40_mm - path->start_q40_mm, -40);
+    path_motion_shift(cell->c, FEED_DEGREE, real_scale(real_add(low, high), -1));
+    path_motion_stretch(cell->c, FEED_DEGREE, half);
+    cell->per_s = real_div(poly->per_s, half);
+    cell->offset_mm = real_make(poly->start_q40_mm - path->start_q40_mm, -40);
 }
 
 /* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of step / period, and
@@ -218,8 +218,8 @@ static int check_step(const struct check *check, const struct motion *now)
 }
 
 /* The stretch of a piece on one segment, halved where need be. */
-static int check_stretch(struct check *check, const struct way *way, const struct path *path,
-                         struct real low, struct real high)
+static int check_stretch(struct check *check, const struct feed_polynomial *poly,
+                         const struct path *path, struct real low, struct real high)
 {
     struct cell cell;
     struct motion now;
@@ -227,7 +227,7 @@ static int check_stretch(struct check *check, const struct way *way, const struc
     path_motion_clear(&now);
     uint32_t at = 0; /* the cell from at to at + 1 of 2^halvings */
     int32_t halvings = 0;
-    set_cell(&cell, way, path, low, high);
+    set_cell(&cell, poly, path, low, high);
     motion_at(&cell, real_make(-1, 0), &now);
     int code = check->unknown != 0 ? 0 : check_step(check, &now);
     check->unknown = 0;
@@ -236,7 +236,7 @@ static int check_stretch(struct check *check, const struct way *way, const struc
         int certain = 0;
         const struct real part = real_scale(width, -halvings);
         const struct real from = real_add(low, real_times(part, (int32_t)at));
-        set_cell(&cell, way, path, from, real_add(from, part));
+        set_cell(&cell, poly, path, from, real_add(from, part));
         code = check_cell(check, &cell, &certain);
         if (code == 0) {
             at++;
@@ -253,13 +253,13 @@ static int check_stretch(struct check *check, const struct way *way, const struc
     return code;
 }
 
-/* u at which the piece comes to this way from its start, between `low` and 1. */
-static struct real time_of(const struct way *way, struct real mm, struct real low)
+/* u at which the piece has come this far from its start, between `low` and 1. */
+static struct real time_of(const struct feed_polynomial *poly, struct real mm, struct real low)
 {
     struct real high = real_make(1, 0);
     for (int step = 0; step < CUT_STEPS; step++) {
         const struct real middle = real_scale(real_add(low, high), -1);
-        if (real_less(path_motion_horner(way->c, WAY_DEGREE, middle), mm) != 0) {
+        if (real_less(path_motion_horner(poly->c, FEED_DEGREE, middle), mm) != 0) {
             low = middle;
         } else {
             high = middle;
@@ -280,29 +280,29 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
     const struct program *p = check->program;
     const struct real brief = real_make(1, -26);
     struct real low = zero;
-    struct way way;
+    struct feed_polynomial poly;
     struct path path;
     int code = 0;
-    path_motion_read_way(&way, p, piece);
-    while (next_start(p, *segment) <= way.start_q40_mm) {
+    path_motion_read_piece(&poly, p, piece);
+    while (next_start(p, *segment) <= poly.start_q40_mm) {
         (*segment)++;
     }
     path_motion_read(&path, p, *segment);
     while (code == 0 && next_start(p, *segment) != INT64_MAX) {
-        const struct real mm = real_make(next_start(p, *segment) - way.start_q40_mm, -40);
-        if (real_less(mm, way.end_mm) == 0) {
+        const struct real mm = real_make(next_start(p, *segment) - poly.start_q40_mm, -40);
+        if (real_less(mm, poly.end_mm) == 0) {
             break;
         }
-        const struct real cut = time_of(&way, mm, low);
+        const struct real cut = time_of(&poly, mm, low);
         if (real_less(brief, real_sub(cut, low)) != 0) {
-            code = check_stretch(check, &way, &path, low, cut);
+            code = check_stretch(check, &poly, &path, low, cut);
             low = cut;
         }
         (*segment)++;
         path_motion_read(&path, p, *segment);
     }
     if (code == 0 && real_less(brief, real_sub(real_make(1, 0), low)) != 0) {
-        code = check_stretch(check, &way, &path, low, real_make(1, 0));
+        code = check_stretch(check, &poly, &path, low, real_make(1, 0));
     }
     return code;
 }

@@ -81,13 +81,13 @@ static void set_aside(struct motion *out, const struct motion *begin, const stru
     }
 }
 
-/* The way x half from the middle of the part, x from -1 to 1; |q''| <= M makes M / 2 between its ends. */
+/* The feed polynomial x half from the middle of the part, x from -1 to 1; |q''| <= M makes M / 2 between its ends. */
 static void fill(struct path_bounds *bounds, struct path_bounds_number *numbers,
                  const struct part *part)
 {
     const uint32_t axes = bounds->program->header.axis_count;
     const int32_t begin = 2 * (int32_t)part->number; /* in halves of parts */
-    struct real way[WAY_DEGREE + 1];
+    struct real poly[FEED_DEGREE + 1];
     struct motion ends[2];
     struct motion aside;
     if (part->segment != bounds->segment) {
@@ -95,14 +95,14 @@ static void fill(struct path_bounds *bounds, struct path_bounds_number *numbers,
         bounds->segment = part->segment;
     }
     const struct real half = real_scale(bounds->path.length_mm, -1 - part->log2);
-    way[0] = real_times(half, begin + 1);
-    way[1] = half;
-    for (int k = 2; k <= WAY_DEGREE; k++) {
-        way[k] = real_make(0, 0);
+    poly[0] = real_times(half, begin + 1);
+    poly[1] = half;
+    for (int k = 2; k <= FEED_DEGREE; k++) {
+        poly[k] = real_make(0, 0);
     }
     derivatives_at(bounds, real_times(half, begin), &ends[0]);
     derivatives_at(bounds, real_times(half, begin + 2), &ends[1]);
-    path_motion_bend(&bounds->path, way, real_div(real_make(1, 0), half), real_make(0, 0), &aside);
+    path_motion_bend(&bounds->path, poly, real_div(real_make(1, 0), half), real_make(0, 0), &aside);
     set_aside(&aside, &ends[0], &ends[1], axes);
     take(numbers, BEGIN, axes, &ends[0]);
     take(numbers, END, axes, &ends[1]);

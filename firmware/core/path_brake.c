@@ -162,7 +162,7 @@ static int64_t depth(int64_t w_q56, int64_t jerk_q56)
     return qmath_mul_unsigned(jerk_q56, depth_root_q16(w_q56, jerk_q56) - THREE_HALVES_Q16) * 65536;
 }
 
-/* --- A bound of the way --- */
+/* --- A bound of the distance --- */
 
 /* The time in which a jerk makes an acceleration, at least a / j in 2^-16 ticks; held at 2^32 - 1. */
 static uint32_t ramp_ticks_q16(int64_t a_q56, int64_t jerk_q56)
@@ -180,15 +180,15 @@ static int64_t over_ticks(int64_t a_q56, uint32_t ticks_q16)
     return qmath_shift_clamp(qmath_mul_unsigned(a_q56, ticks_q16), 16);
 }
 
-/* x^2 + 3/8 y^2 <= 2 a way */
-static int squares_within(int64_t x, int64_t y, int64_t a_q56, int64_t way_q40_mm)
+/* x^2 + 3/8 y^2 <= 2 a distance */
+static int squares_within(int64_t x, int64_t y, int64_t a_q56, int64_t distance_q40_mm)
 {
     const int up = qmath_clz64((uint64_t)qmath_greater(x, y));
     const uint32_t first = (uint32_t)((uint64_t)x << up >> 33) + 1u;
     const uint32_t second = (uint32_t)((uint64_t)y << up >> 33) + 1u;
     const uint64_t part = qmath_product_unsigned(second, second) >> 3;
     const uint64_t need = qmath_product_unsigned(first, first) + 3u * part + 3u;
-    return within(need, rough_of(a_q56), rough_of(way_q40_mm), FINE_BITS - 2 * (33 - up));
+    return within(need, rough_of(a_q56), rough_of(distance_q40_mm), FINE_BITS - 2 * (33 - up));
 }
 
 /* a^2 / (2 j): the speed that an acceleration makes while it goes to 0. */
@@ -197,11 +197,11 @@ static int64_t speed_of_rise(int64_t a_q56, int64_t jerk_q56)
     return over_ticks(a_q56, ramp_ticks_q16(a_q56, jerk_q56)) / 2;
 }
 
-/* x^2 + 3/8 y^2 <= 2 a way, for the way to rest from an onset `fall` that is behind a speed. */
+/* x^2 + 3/8 y^2 <= 2 a distance, for the distance to rest from an onset `fall` that is behind a speed. */
 static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
-                        int64_t fall_q56, int64_t most_q56, int64_t way_q40_mm)
+                        int64_t fall_q56, int64_t most_q56, int64_t distance_q40_mm)
 {
-    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the way, a t^2 / 6 */
+    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the distance, a t^2 / 6 */
     const uint32_t exact_q16 = ramp_ticks_q16(fall_q56, numbers->jerk_down_q56);
     const uint32_t first_q16 = exact_q16 > ONE_TICK_Q16 ? exact_q16 : ONE_TICK_Q16;
     const int64_t early = over_ticks(fall_q56, first_q16) / 2;
@@ -210,13 +210,14 @@ static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_
     if ((early | late) >> 60 != 0) {
         return 0;
     }
-    return squares_within(speed_q56 + early, late, most_q56, way_q40_mm + (saved >> FINE_BITS));
+    return squares_within(speed_q56 + early, late, most_q56,
+                          distance_q40_mm + (saved >> FINE_BITS));
 }
 
-/* The way is at most that with the deceleration alone from a higher speed, and what the last jerk takes
+/* The distance is at most that with the deceleration alone from a higher speed, and what the last jerk takes
  * (docs/theory/numerics.md section 12); the deceleration is one that is about reached. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
-                    int64_t way_q40_mm)
+                    int64_t distance_q40_mm)
 {
     const int64_t a = from->acceleration_q56;
     if (!in_range(from, numbers) || a >> FITS_BITS > 0 || -a >> FITS_BITS > 0) {
@@ -229,15 +230,15 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
     }
     const int64_t speed = from->speed_q56 + rise / 2;
     const int64_t greatest = speed + (a > 0 ? turned : 0);
-    const int64_t way_left = way_q40_mm - (SPARE_HALVES * greatest >> (FINE_BITS + 1));
+    const int64_t left_q40_mm = distance_q40_mm - (SPARE_HALVES * greatest >> (FINE_BITS + 1));
     const int64_t jerk = qmath_lesser(numbers->jerk_down_q56, numbers->jerk_up_q56);
     const int64_t reached =
         qmath_greater(depth((from->speed_q56 + turned) >> 1, jerk), from->speed_q56 >> MOST_BITS);
     const int64_t most = qmath_lesser(numbers->deceleration_q56, reached);
-    if (way_left <= 0 || most >> FITS_BITS != 0) {
+    if (left_q40_mm <= 0 || most >> FITS_BITS != 0) {
         return 0;
     }
-    return rests_within(numbers, speed, qmath_greater(most + a, 0), most, way_left);
+    return rests_within(numbers, speed, qmath_greater(most + a, 0), most, left_q40_mm);
 }
 
 /* --- Tick --- */
@@ -246,9 +247,9 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
 static void move(struct path_state *at, int64_t sixth_q56)
 {
     const int64_t a = at->acceleration_q56;
-    const int64_t way = at->speed_q56 + (a >> 1) + sixth_q56 + (int64_t)at->fine_q56_mm;
-    at->arc_length_q40_mm += way >> FINE_BITS;
-    at->fine_q56_mm = (uint32_t)way & ((1u << FINE_BITS) - 1u);
+    const int64_t step_q56 = at->speed_q56 + (a >> 1) + sixth_q56 + (int64_t)at->fine_q56_mm;
+    at->arc_length_q40_mm += step_q56 >> FINE_BITS;
+    at->fine_q56_mm = (uint32_t)step_q56 & ((1u << FINE_BITS) - 1u);
     at->speed_q56 += a + 3 * sixth_q56;
     at->acceleration_q56 = a + 6 * sixth_q56;
 }

@@ -65,7 +65,7 @@ int path_brake_begin(struct path_brake *brake, const struct path_state *from,
  * an upper bound of the stopping distance, one tick of the speed above it on the mean, so the result may be 0 although the
  * brake would just fit. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
-                    int64_t way_q40_mm);
+                    int64_t distance_q40_mm);
 
 /* The first tick of a brake may be this one, in place of a step: an acceleration above 0 falls, as far as 0, and one
  * below stays. Cheap, for a tick that had to determine the state. */

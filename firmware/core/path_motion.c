@@ -178,21 +178,21 @@ void path_motion_read(struct path *path, const struct program *p, uint32_t i)
     read_speed(path, &segment);
 }
 
-void path_motion_read_way(struct way *way, const struct program *p, uint32_t i)
+void path_motion_read_piece(struct feed_polynomial *poly, const struct program *p, uint32_t i)
 {
     struct program_piece piece;
     program_piece_get(p, i, &piece);
     const int e = program_piece_exponent(piece.duration_q32_s);
     const struct real duration_s = real_make((int64_t)piece.duration_q32_s, -32);
-    way->c[0] = zero;
-    for (int k = 1; k <= WAY_DEGREE; k++) {
-        way->c[k] = real_make(piece.c_q40_mm[k - 1], -40);
+    poly->c[0] = zero;
+    for (int k = 1; k <= FEED_DEGREE; k++) {
+        poly->c[k] = real_make(piece.c_q40_mm[k - 1], -40);
     }
-    path_motion_stretch(way->c, WAY_DEGREE, real_scale(duration_s, -e));
-    way->per_s = real_div(real_make(1, 0), duration_s);
-    way->override = piece.override;
-    way->start_q40_mm = piece.start_q40_mm;
-    way->end_mm = path_motion_horner(way->c, WAY_DEGREE, real_make(1, 0));
+    path_motion_stretch(poly->c, FEED_DEGREE, real_scale(duration_s, -e));
+    poly->per_s = real_div(real_make(1, 0), duration_s);
+    poly->override = piece.override;
+    poly->start_q40_mm = piece.start_q40_mm;
+    poly->end_mm = path_motion_horner(poly->c, FEED_DEGREE, real_make(1, 0));
 }
 
 /* --- The motion at an instant --- */
@@ -343,7 +343,7 @@ static void compose(struct real out[ORDERS + 1], const struct real polynomial[PA
 }
 
 /* Of xi(x), counted from the instant: sigma(xi) xi' = F'. */
-static void parameter_majorant(struct real xi[ORDERS + 1], const struct real way[WAY_DEGREE + 1],
+static void parameter_majorant(struct real xi[ORDERS + 1], const struct real poly[FEED_DEGREE + 1],
                                const struct real sigma[PATH_DEGREE + 1], struct real per_sigma)
 {
     struct real inverse[ORDERS];
@@ -361,7 +361,7 @@ static void parameter_majorant(struct real xi[ORDERS + 1], const struct real way
         }
         struct real sum = zero;
         for (int k = 0; k <= order; k++) {
-            sum = real_add(sum, real_mul(real_times(way[k + 1], k + 1), inverse[order - k]));
+            sum = real_add(sum, real_mul(real_times(poly[k + 1], k + 1), inverse[order - k]));
         }
         xi[order + 1] = real_div(sum, real_make(order + 1, 0));
     }
@@ -383,25 +383,25 @@ static struct real least_sigma(const struct path *path, struct real middle, stru
     return real_max(real_mul(least, real_make(1023, -10)), path->least_sigma);
 }
 
-void path_motion_bend(const struct path *path, const struct real c[WAY_DEGREE + 1],
+void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE + 1],
                       struct real per_s, struct real offset_mm, struct motion *out)
 {
     const struct real one = real_make(1, 0);
-    struct real way[WAY_DEGREE + 1];
+    struct real poly[FEED_DEGREE + 1];
     struct real polynomial[PATH_DEGREE + 1];
     struct real xi[ORDERS + 1];
     struct real slope[ORDERS];
-    majorant(way, c, WAY_DEGREE, zero, one);
+    majorant(poly, c, FEED_DEGREE, zero, one);
     const struct real low =
-        parameter(path, real_add(path_motion_horner(c, WAY_DEGREE, real_make(-1, 0)), offset_mm));
+        parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, real_make(-1, 0)), offset_mm));
     const struct real high =
-        parameter(path, real_add(path_motion_horner(c, WAY_DEGREE, one), offset_mm));
+        parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, one), offset_mm));
     const struct real middle = real_scale(real_add(low, high), -1);
     /* 2^-10 of it more, and 2^-20 of the segment: a feed may creep back by its slack */
     struct real half = real_abs(real_scale(real_sub(high, low), -1));
     half = real_add(real_mul(half, real_make(1025, -10)), real_make(1, -20));
     majorant(polynomial, path->sigma, PATH_DEGREE, middle, half);
-    parameter_majorant(xi, way, polynomial, real_div(one, least_sigma(path, middle, half)));
+    parameter_majorant(xi, poly, polynomial, real_div(one, least_sigma(path, middle, half)));
     for (int k = 0; k < ORDERS; k++) {
         slope[k] = real_times(xi[k + 1], k + 1);
     }

@@ -4,7 +4,7 @@
  * each axis at an instant, and a bound of their second derivatives over a stretch. For the checks of axis limits
  * (core/limit_check.h, core/brake_check.h); docs/theory/numerics.md section 16 has the formulas.
  *
- * A way is a polynomial of arc length in x, which stands for time from -1 to 1 in some unit; `per_s` is dx/dt. With the way
+ * A feed polynomial gives arc length in powers of x, which stands for time from -1 to 1 in some unit; `per_s` is dx/dt. With
  * s = middle + half x and per_s = 1 / half the motion is that at 1 mm/s: velocity, acceleration and jerk then are the
  * first three derivatives of the axis by arc length.
  *
@@ -17,7 +17,7 @@
 #include "core/program_check.h"
 #include "core/real.h"
 
-#define WAY_DEGREE  7
+#define FEED_DEGREE 7
 #define PATH_DEGREE 4 /* of sigma and of the derivatives of all axes */
 
 enum quantity { VELOCITY, ACCELERATION, JERK, QUANTITIES };
@@ -35,8 +35,8 @@ struct path {
 };
 
 /* One feed piece: F in mm from its start, in powers of u = time / duration. */
-struct way {
-    struct real c[WAY_DEGREE + 1];
+struct feed_polynomial {
+    struct real c[FEED_DEGREE + 1];
     struct real per_s; /* 1 / duration */
     struct program_override override;
     int64_t start_q40_mm;
@@ -67,16 +67,16 @@ void path_motion_stretch(struct real *c, int degree, struct real by);
 void path_motion_read(struct path *path, const struct program *p, uint32_t i);
 
 /* Feed piece i of a program that keeps the rules of protocol.md 1.3. */
-void path_motion_read_way(struct way *way, const struct program *p, uint32_t i);
+void path_motion_read_piece(struct feed_polynomial *poly, const struct program *p, uint32_t i);
 
 /* At an arc length of the segment, with the first three derivatives of arc length in time; the curve is continued beyond its
  * ends. Sets the program's axes. */
 void path_motion_at(const struct path *path, struct real s_mm, const struct real f[QUANTITIES],
                     struct motion *out);
 
-/* Bounds of |q''| in x of velocity, acceleration and jerk of each axis, in their units of time, for the way c from x = -1 to
- * 1; `offset_mm` is what c is counted from, on the segment. */
-void path_motion_bend(const struct path *path, const struct real c[WAY_DEGREE + 1],
+/* Bounds of |q''| in x of velocity, acceleration and jerk of each axis, in their units of time, for the feed polynomial c from
+ * x = -1 to 1; `offset_mm` is what c is counted from, on the segment. */
+void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE + 1],
                       struct real per_s, struct real offset_mm, struct motion *out);
 
 #endif

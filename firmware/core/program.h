@@ -54,7 +54,7 @@ struct program_header {
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
     char name[33];          /* UTF-8, always terminated */
-    uint32_t hold_worst_us; /* longest stop of each kind, and the longest way of one */
+    uint32_t hold_worst_us; /* longest stop of each kind, and the longest distance of one */
     uint32_t hold_worst_um;
     uint32_t fault_worst_us;
     uint32_t fault_worst_um;

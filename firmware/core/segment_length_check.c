@@ -4,8 +4,8 @@
 
 #include "core/feed_bounds.h"
 
-/* How far a piece may reach beyond its two ends (FEED_WAY_SLACK), and a gap at a joint. */
-#define REACH_Q40 (FEED_WAY_SLACK_Q36 * 32)
+/* How far a piece may reach beyond its two ends (FEED_PIECE_SLACK), and a gap at a joint. */
+#define REACH_Q40 (FEED_PIECE_SLACK_Q36 * 32)
 
 static int64_t piece_start(const struct program *p, uint32_t i)
 {

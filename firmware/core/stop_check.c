@@ -189,19 +189,19 @@ struct stop_bound stop_curve(const struct stop_start *from, const struct program
     if (time_us >= MOST_TIME_US) {
         return none;
     }
-    /* the way is the speed times the centre of the deceleration in time */
+    /* the distance is the speed times the centre of the deceleration in time */
     uint64_t centre_us = lead_us + (time_us - lead_us) / 2u + 1u;
     centre_us += first_us > last_us ? qmath_div_u64(first_us - last_us, 6u) + 1u : 0u;
-    uint64_t way_um = qmath_div_up_u64(peak_um * centre_us, 1000000u);
-    struct stop_bound out = {(uint32_t)time_us, (uint32_t)lesser(way_um, NO_BOUND)};
+    uint64_t distance_um = qmath_div_up_u64(peak_um * centre_us, 1000000u);
+    struct stop_bound out = {(uint32_t)time_us, (uint32_t)lesser(distance_um, NO_BOUND)};
     return out;
 }
 
-static struct stop_bound sum(struct stop_bound a, uint64_t time_us, uint64_t way_um)
+static struct stop_bound sum(struct stop_bound a, uint64_t time_us, uint64_t distance_um)
 {
     struct stop_bound out = {
         (uint32_t)lesser(a.time_us + time_us, NO_BOUND),
-        (uint32_t)lesser(a.way_um + way_um, NO_BOUND),
+        (uint32_t)lesser(a.distance_um + distance_um, NO_BOUND),
     };
     return out;
 }
@@ -209,7 +209,7 @@ static struct stop_bound sum(struct stop_bound a, uint64_t time_us, uint64_t way
 static struct stop_bound most_of(struct stop_bound a, struct stop_bound b)
 {
     struct stop_bound out = {a.time_us > b.time_us ? a.time_us : b.time_us,
-                             a.way_um > b.way_um ? a.way_um : b.way_um};
+                             a.distance_um > b.distance_um ? a.distance_um : b.distance_um};
     return out;
 }
 
@@ -277,9 +277,9 @@ static struct stop_bound waited(const struct program *p, uint32_t piece, uint32_
     int64_t from = program_piece_start(p, piece);
     int64_t to = piece + 1u < p->header.piece_count ? program_piece_start(p, piece + 1u)
                                                     : p->header.length_q40_mm;
-    uint64_t way_um =
+    uint64_t distance_um =
         to <= from ? 0u : ((uint64_t)(to - from) >> 30) + 1u; /* below 2^-30 mm < um */
-    return sum(next, eighths_us(p, piece, eighths), way_um);
+    return sum(next, eighths_us(p, piece, eighths), distance_um);
 }
 
 /* --- The walk --- */
@@ -397,11 +397,12 @@ static int check_kind(const struct program *p, enum program_stop_kind kind,
             return PROGRAM_ERR_STOP_LONG;
         }
         longest_us = stop.bound_us > longest_us ? stop.bound_us : longest_us;
-        longest_um = bound.way_um > longest_um ? bound.way_um : longest_um;
+        longest_um = bound.distance_um > longest_um ? bound.distance_um : longest_um;
         program_check_attend(limits);
     }
     *index = 0;
-    return said->time_us == longest_us && said->way_um >= longest_um ? 0 : PROGRAM_ERR_STOP_WORST;
+    return said->time_us == longest_us && said->distance_um >= longest_um ? 0
+                                                                          : PROGRAM_ERR_STOP_WORST;
 }
 
 int stop_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)

@@ -27,7 +27,7 @@
 /* From the command to rest, held at UINT32_MAX. */
 struct stop_bound {
     uint32_t time_us;
-    uint32_t way_um;
+    uint32_t distance_um;
 };
 
 /* Contents private. */

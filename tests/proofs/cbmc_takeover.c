@@ -349,11 +349,11 @@ int path_brake_begin(struct path_brake *brake, const struct path_state *from,
 }
 
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
-                    int64_t way_left_q40_mm)
+                    int64_t distance_left_q40_mm)
 {
     (void)from;
     (void)numbers;
-    (void)way_left_q40_mm;
+    (void)distance_left_q40_mm;
     return nondet_int() != 0;
 }
 

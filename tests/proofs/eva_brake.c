@@ -21,7 +21,7 @@
  * mutant: core/path_brake.c: mantissa[code & 7u] => mantissa[code & 15u]
  * mutant: core/path_brake.c: from->speed_q56 <= PATH_BRAKE_MOST_SPEED && =>
  * mutant: core/path_brake.c: from->acceleration_q56 >= -MOST_Q56 && =>
- * mutant: core/path_brake.c: way_left <= 0 || => way_left <= -POWER(60) ||
+ * mutant: core/path_brake.c: left_q40_mm <= 0 || => left_q40_mm <= -POWER(60) ||
  * mutant: core/path_brake.c: if (speed_q56 <= fall_q56) => if (fall_q56 < 0)
  * mutant: core/path_brake.c: 6 * sixth_q56; => 60 * sixth_q56;
  * mutant: core/path_brake.c: brake->settle_ticks--; => brake->settle_ticks -= 2u;

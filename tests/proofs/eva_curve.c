@@ -34,7 +34,7 @@ int main(void)
     from.slope_um = (uint64_t)any_between(0, STOP_MOST_RISE);
     from.cut_us = (uint64_t)any_between(0, INT64_MAX);
     struct stop_bound bound = stop_curve(&from, &stop);
-    if (bound.way_um != NO_BOUND) {
+    if (bound.distance_um != NO_BOUND) {
         reached();
     }
     return 0;

@@ -87,11 +87,11 @@ int path_brake_begin(struct path_brake *brake, const struct path_state *from,
                      const struct path_brake_numbers *numbers);
 
 /*@ requires is_at(from) && IS_NUMBERS(numbers);
-    requires -2 * MOST_ARC <= way_q40_mm <= 2 * MOST_ARC;
-    assigns \result \from way_q40_mm;
+    requires -2 * MOST_ARC <= distance_q40_mm <= 2 * MOST_ARC;
+    assigns \result \from distance_q40_mm;
     ensures \result == 0 || \result == 1; */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
-                    int64_t way_q40_mm);
+                    int64_t distance_q40_mm);
 
 /*@ requires is_brake(brake);
     assigns *brake \from brake->at.speed_q56;

@@ -12,11 +12,11 @@
 #include "stop_table.h"
 #include "unity.h"
 
-#define Q40         1099511627776.0
-#define Q32         4294967296.0
-#define SAMPLES     200
-#define MOST_WAY_MM 28.0
-#define JOB         0x5EEDu
+#define Q40              1099511627776.0
+#define Q32              4294967296.0
+#define SAMPLES          200
+#define MOST_DISTANCE_MM 28.0
+#define JOB              0x5EEDu
 
 static void put(uint8_t *at, uint64_t value, int bytes)
 {
@@ -215,7 +215,7 @@ static void write_tail(struct chunked_cut *cut, const struct override_program *w
                        const struct quintic *q, int64_t start_q40)
 {
     const double most_mm = fmax(q->duration_s * w->limit.feed, 1e-3);
-    const uint32_t count = (uint32_t)fmin(ceil(most_mm / MOST_WAY_MM), CHUNKED_TAIL);
+    const uint32_t count = (uint32_t)fmin(ceil(most_mm / MOST_DISTANCE_MM), CHUNKED_TAIL);
     const uint64_t part_q32 = (uint64_t)(q->duration_s * Q32 / count);
     int64_t arc_q40 = start_q40;
     double whole[8] = {0};
@@ -247,7 +247,7 @@ static int find_tail(struct chunked_cut *cut, const struct override_program *w, 
     for (uint32_t k = least; k < p->header.segment_count; k++) {
         struct quintic q;
         const double way_mm = (double)(segment_end(p, k) - start_q40) / Q40;
-        if (way_mm > 4 * MOST_WAY_MM) {
+        if (way_mm > 4 * MOST_DISTANCE_MM) {
             return 0;
         }
         if (way_mm > 0 && find_duration(&q, w, way_mm, state)) {
@@ -255,7 +255,7 @@ static int find_tail(struct chunked_cut *cut, const struct override_program *w, 
             const double whole = floor(q.duration_s * 1024) / 1024;
             set_quintic(&q, way_mm, state[1], state[2], fmax(whole, 0.02));
             if (keeps(&q, &w->limit) &&
-                q.duration_s * w->limit.feed <= CHUNKED_TAIL * MOST_WAY_MM) {
+                q.duration_s * w->limit.feed <= CHUNKED_TAIL * MOST_DISTANCE_MM) {
                 cut->segments = k + 1u;
                 write_tail(cut, w, &q, start_q40);
                 return 1;

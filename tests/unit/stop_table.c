@@ -26,10 +26,11 @@ static struct stop_bound write_bounds(const struct program *p, uint8_t *image, u
         const struct stop_bound bound = stop_walk_back(&walk, i - 1u);
         put_u32(table + (i - 1u) * PROGRAM_STOP_SIZE + 8u + 4u * (uint32_t)kind, bound.time_us);
         worst.time_us = bound.time_us > worst.time_us ? bound.time_us : worst.time_us;
-        worst.way_um = bound.way_um > worst.way_um ? bound.way_um : worst.way_um;
+        worst.distance_um =
+            bound.distance_um > worst.distance_um ? bound.distance_um : worst.distance_um;
     }
     put_u32(image + 112u + 8u * (uint32_t)kind, worst.time_us);
-    put_u32(image + 116u + 8u * (uint32_t)kind, worst.way_um);
+    put_u32(image + 116u + 8u * (uint32_t)kind, worst.distance_um);
     return worst;
 }
 
@@ -45,9 +46,9 @@ void stop_table_fill(struct program *p, uint8_t *image, const uint8_t codes[6])
     const struct stop_bound hold = write_bounds(p, image, table, PROGRAM_STOP_HOLD);
     const struct stop_bound fault = write_bounds(p, image, table, PROGRAM_STOP_FAULT);
     p->header.hold_worst_us = hold.time_us;
-    p->header.hold_worst_um = hold.way_um;
+    p->header.hold_worst_um = hold.distance_um;
     p->header.fault_worst_us = fault.time_us;
-    p->header.fault_worst_um = fault.way_um;
+    p->header.fault_worst_um = fault.distance_um;
 }
 
 void stop_table_write(uint8_t *image, uint32_t size, const uint8_t codes[6])

@@ -7,7 +7,7 @@
 #include "golden.h"
 #include "unity.h"
 
-#define REACH_Q40 (FEED_WAY_SLACK_Q36 * 32)
+#define REACH_Q40 (FEED_PIECE_SLACK_Q36 * 32)
 #define FAST_Q40  (INT64_C(1) << 53) /* 8 m in one piece */
 
 static struct program program;

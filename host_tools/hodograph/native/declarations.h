@@ -39,7 +39,7 @@ const char *program_error_text(int code);
 /* core/stop_check.h */
 enum program_stop_kind { PROGRAM_STOP_HOLD, PROGRAM_STOP_FAULT };
 struct stop_bound {
-    uint32_t time_us, way_um;
+    uint32_t time_us, distance_um;
 };
 struct stop_walk {
     ...;
@@ -157,8 +157,8 @@ void contour_begin(struct contour *contour, const struct program *program,
                    struct contour_segment *segments);
 double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
-                       const int32_t *act_counts, uint32_t stride,
-                       const uint32_t *counts_per_unit, double *errors_um);
+                       const int32_t *act_counts, uint32_t stride, const uint32_t *counts_per_unit,
+                       double *errors_um);
 void contour_extra_errors(struct contour *contour, const struct program *program, uint32_t n,
                           const int64_t *arc_length_q40_mm, const int32_t *act_counts,
                           const uint32_t *counts_per_unit, double *errors);

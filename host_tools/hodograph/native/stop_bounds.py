@@ -17,10 +17,10 @@ def stop_bounds(program: NativeProgram, kind: int) -> tuple[NDArray[np.uint32], 
     """
     ffi, lib = library()
     count = int(program.pointer.header.piece_count)
-    time_us, way_um = np.empty(count, dtype=np.uint32), np.empty(count, dtype=np.uint32)
+    time_us, distance_um = np.empty(count, dtype=np.uint32), np.empty(count, dtype=np.uint32)
     walk = ffi.new("struct stop_walk *")
     lib.stop_walk_begin(walk, program.pointer, kind)
     for piece in range(count - 1, -1, -1):
         bound = lib.stop_walk_back(walk, piece)
-        time_us[piece], way_um[piece] = bound.time_us, bound.way_um
-    return time_us, way_um
+        time_us[piece], distance_um[piece] = bound.time_us, bound.distance_um
+    return time_us, distance_um

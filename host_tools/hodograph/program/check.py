@@ -40,7 +40,7 @@ from ..spline.spatial.curve import hodograph_of
 from ..spline.spatial.quaternion import polar
 from .check_stops import stop_fault
 from .codes import ProgramError
-from .geometry import PREIMAGE_LIMIT, WAY_SCALE, segment_ways
+from .geometry import PREIMAGE_LIMIT, ARC_SCALE, segment_arcs
 from .image import (
     PLANE_AXES,
     Program,
@@ -60,7 +60,7 @@ LEAST_FEED_MM_S = 2.0**-10
 """A slower feed counts as this one: pairs that are too short for it are too short at any feed."""
 
 REACH_Q40 = 1 << 27
-"""How far a piece may reach beyond its ends: 2^-14 mm (WAY_SLACK_MM), and a gap at a joint."""
+"""How far a piece may reach beyond its ends: 2^-14 mm (PIECE_SLACK_MM), and a gap at a joint."""
 
 _LEAST_FEED_Q24 = 1 << 14
 
@@ -106,9 +106,9 @@ Rule = tuple[Bool, int, ProgramError]
 
 POINT_LIMIT_Q40 = 4096 << 40
 ARC_LIMIT_Q40 = 1 << 62
-JOIN_WAY = wide(WAY_SCALE << (88 - 34))
-CLOSE_WAY = wide(WAY_SCALE << (88 - 24))
-LONGEST_WAY = wide(32 * WAY_SCALE << 88)
+JOIN_ARC = wide(ARC_SCALE << (88 - 34))
+CLOSE_ARC = wide(ARC_SCALE << (88 - 24))
+LONGEST_ARC = wide(32 * ARC_SCALE << 88)
 DIRECTION_RAD = 2.0**-20
 SLOPE = 2.0**-20
 CLOSE_Q40 = 1 << 16
@@ -154,7 +154,7 @@ def segment_faults(
         (outside, 0, code.ARC_RANGE),
         (_any(one <= wide(0) for one in sigma), 0, code.SIGMA),
         (_any(~(a <= b.doubled()) for a in sigma for b in sigma), 0, code.SIGMA_RATIO),
-        (_bool(~(distances[-1] <= LONGEST_WAY)), 0, code.SEGMENT_LONG),
+        (_bool(~(distances[-1] <= LONGEST_ARC)), 0, code.SEGMENT_LONG),
     ]
     if limits is not None:
         out.append((_leaves(program, limits), 0, code.TRAVEL))
@@ -174,7 +174,7 @@ def end_faults(program: Program, distances: tuple[Wide, ...]) -> list[Rule]:
     off = missing <= 0 or bool(_apart(np.array([0, missing]), distances[-1][last:])[0])
     away = program.point_q40[:, 0] - program.point_q40[:, last]
     open_end = [
-        _apart(np.array([0, distance]), own[last:], CLOSE_WAY)[0]
+        _apart(np.array([0, distance]), own[last:], CLOSE_ARC)[0]
         for distance, own in zip(away, distances[:-1], strict=False)
     ]
     extra_end = program.extra_q40[:, last, 4] if program.extra_q40.size else away[:0]
@@ -210,11 +210,11 @@ def _sigma3(a_q44: Int) -> list[Wide]:
     return [reduce(add, (product(one, one, weights) for one in a_q44)) for weights in _SIGMA3]
 
 
-def _apart(starts_q40: Int, distances: Wide, most: Wide = JOIN_WAY) -> Bool:
+def _apart(starts_q40: Int, distances: Wide, most: Wide = JOIN_ARC) -> Bool:
     """Whether each distance ends further than `most` from where the next one starts."""
     far = np.abs(np.diff(starts_q40.astype(np.float64))) > _FAR_Q40
     step = np.where(far, 0, starts_q40[1:] - starts_q40[:-1])
-    gap = distances[: len(step)] - scaled(step, WAY_SCALE, 48)
+    gap = distances[: len(step)] - scaled(step, ARC_SCALE, 48)
     return _bool(far | ~gap.within(most))
 
 
@@ -285,7 +285,7 @@ JOIN_FEED_Q24 = 2.0**8
 JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
-WAY_SLACK_MM = 2.0**-14
+PIECE_SLACK_MM = 2.0**-14
 """How far a piece may go before its start or beyond its end."""
 
 
@@ -368,7 +368,7 @@ def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[R
 def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: int) -> list[Rule]:
     lows, highs = derivative_extremes(duration, c, halvings)
     excess = distance_excess(duration, c, halvings)
-    backwards = (lows[0] < BACKWARDS_MM_S) | (excess > WAY_SLACK_MM)
+    backwards = (lows[0] < BACKWARDS_MM_S) | (excess > PIECE_SLACK_MM)
     out: list[Rule] = [(np.asarray(backwards), 0, ProgramError.BACKWARDS)]
     if limits is None:
         return out
@@ -485,7 +485,7 @@ def _check(
     header = _header_fault(program, limits, reserved, chunk)
     if header is not None:
         return Fault(header, 0)
-    distances = segment_ways(program.a_q44)
+    distances = segment_arcs(program.a_q44)
     return (
         _first(segment_faults(program, distances, limits))
         or _first(end_faults(program, distances))

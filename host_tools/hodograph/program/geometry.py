@@ -17,7 +17,7 @@ from .wide import Wide, product
 Int = NDArray[np.int64]
 Real = NDArray[np.float64]
 
-WAY_SCALE = 15
+ARC_SCALE = 15
 """Ways of segments are exact multiples of 2^-88 / 15 mm."""
 
 # 15 times the integral of a b is, for quadratics in Bernstein form,
@@ -27,7 +27,7 @@ _SQUARE = np.array([[3, 3, 1], [0, 2, 3], [0, 0, 3]], dtype=np.int64)
 """Weights of 30 times the integral of a b, and of 15 times that of a^2."""
 
 
-def segment_ways(a_q44: Int) -> tuple[Wide, ...]:
+def segment_arcs(a_q44: Int) -> tuple[Wide, ...]:
     """Integral over [0, 1] of r' by axis, and of sigma last, of each segment (N,), times 15 * 2^88.
 
     a_q44  (2, N, 3): w = u + iq, r' = w^2; or (4, N, 3): A = u + v i + p j + q k, r' = A i A*
@@ -46,10 +46,10 @@ def segment_ways(a_q44: Int) -> tuple[Wide, ...]:
     )
 
 
-def way_to_q40(distance: Wide) -> Int:
+def arc_to_q40(distance: Wide) -> Int:
     """Ways (integers over 15 * 2^88) rounded to 2^-40 mm."""
-    low = distance.low + (WAY_SCALE << 47)
-    return np.asarray(distance.high + (distance.high + (low >> 48)) // WAY_SCALE)
+    low = distance.low + (ARC_SCALE << 47)
+    return np.asarray(distance.high + (distance.high + (low >> 48)) // ARC_SCALE)
 
 
 LONGEST_SEGMENT_MM = 31.875
@@ -84,7 +84,7 @@ def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) 
     if np.abs(preimage).max(initial=0.0) >= 2.0**6:
         raise InputError("path: a segment is too long for the format")
     a_q44 = np.rint(preimage * 2.0**44).astype(np.int64)
-    *distances, along = (way_to_q40(distance.sums()) for distance in segment_ways(a_q44))
+    *distances, along = (arc_to_q40(distance.sums()) for distance in segment_arcs(a_q44))
     columns = [
         _anchored(distance[:-1], ideal, by)
         for distance, ideal, by in zip(

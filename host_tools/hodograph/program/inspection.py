@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
-from .geometry import segment_ways, way_to_q40
+from .geometry import segment_arcs, arc_to_q40
 from .image import (
     PIECE_SIZE,
     RECORD_BYTES,
@@ -133,7 +133,7 @@ def _bytes_text(found: dict[str, Any]) -> str:
 def end_point_q40(program: Program) -> NDArray[np.int64]:
     """Where it ends, (A,) in 2^-40 mm or degrees."""
     *distances, _ = (
-        int(way_to_q40(distance)[0]) for distance in segment_ways(program.a_q44[:, -1:])
+        int(arc_to_q40(distance)[0]) for distance in segment_arcs(program.a_q44[:, -1:])
     )
     distances += [int(one) for one in program.extra_q40[:, -1, -1]]
     return np.asarray(program.point_q40[:, -1] + np.array(distances, dtype=np.int64))

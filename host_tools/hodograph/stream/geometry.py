@@ -19,7 +19,7 @@ from ..errors import InputError, PlanError
 from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
-from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_ways, way_to_q40
+from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_arcs, arc_to_q40
 from ..spline import PHSpline, coordinates
 from ..spline.spatial import SpatialPHSpline
 from ..spline.splitting import cut_segments, part_of
@@ -238,8 +238,8 @@ class StreamPath:
             self._curve = joined((self._curve, block.curve))
             self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
             self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)
-        ways = segment_ways(made.a_q44[:, -1:])
-        self._end_point = point[:, -1] + np.array([way_to_q40(w)[0] for w in ways[:-1]])
+        ways = segment_arcs(made.a_q44[:, -1:])
+        self._end_point = point[:, -1] + np.array([arc_to_q40(w)[0] for w in ways[:-1]])
         if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
             raise PlanError(
                 f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"

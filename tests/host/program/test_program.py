@@ -23,7 +23,7 @@ from hodograph.program import (
 )
 from hodograph.program.check import check_image
 from hodograph.program.exact import ExactProgram
-from hodograph.program.geometry import segment_ways
+from hodograph.program.geometry import segment_arcs
 from hodograph.program.image import with_crc
 from hodograph.program.inspection import inspect_dict
 from hodograph.spline import PHSpline, from_control_polygon, line
@@ -61,7 +61,7 @@ def compiled(
 @given(st.integers(4, 40), st.integers(0, 10**6), st.booleans())
 def test_joints_meet_far_within_the_tolerance(count, seed, closed) -> None:
     program = compiled(wavy(count, seed, closed and count > 5))
-    dx, dy, ds = (distance.exact() for distance in segment_ways(program.a_q44))
+    dx, dy, ds = (distance.exact() for distance in segment_arcs(program.a_q44))
     unit = 15 << 48
     for start, distance, allowed in (
         (program.point_q40[0], dx, 17),

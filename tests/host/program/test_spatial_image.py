@@ -24,7 +24,7 @@ from hodograph.program import (
 from hodograph.program.check import check_image
 from hodograph.program.codes import ProgramError
 from hodograph.program.exact import ExactProgram
-from hodograph.program.geometry import quantise, segment_ways
+from hodograph.program.geometry import quantise, segment_arcs
 from hodograph.program.wide import product
 from hodograph.spline.spatial import spatial_through_points
 from spatial_curve import walk
@@ -78,7 +78,7 @@ def test_sums_of_products_are_exact() -> None:
 def test_joints_meet_far_within_the_tolerance(seed: int) -> None:
     program = compiled(seed)
     assert np.abs(program.a_q44).max() < 8 << 44
-    *distances, along = (distance.exact() for distance in segment_ways(program.a_q44))
+    *distances, along = (distance.exact() for distance in segment_arcs(program.a_q44))
     joints = np.append(program.start_q40, program.length_q40)
     columns = [
         (one, distance, 17) for one, distance in zip(program.point_q40, distances, strict=True)

@@ -60,12 +60,12 @@ def test_the_table_survives_encoding(program) -> None:
 @pytest.mark.parametrize("kind", [HOLD, FAULT])
 def test_both_checks_have_the_same_bounds(program, kind) -> None:
     """The controller's is never the shorter one, and some ten microseconds longer."""
-    time_us, way_um = stop_bounds(NativeProgram(encode(program)), kind)
+    time_us, distance_um = stop_bounds(NativeProgram(encode(program)), kind)
     own_us, own_um = bounds(program, kind)
     assert np.all(time_us >= own_us)
     assert np.all(time_us <= own_us + 100.0)
-    assert np.all(way_um >= own_um)
-    assert np.all(way_um <= 1.03 * own_um + 20.0)
+    assert np.all(distance_um >= own_um)
+    assert np.all(distance_um <= 1.03 * own_um + 20.0)
 
 
 @pytest.mark.parametrize("kind", [HOLD, FAULT])

@@ -12,7 +12,7 @@ from hodograph.feed import FeedRequest, Limits, plan_feed
 from hodograph.native import NativeProgram
 from hodograph.program import check, compile_program, encode
 from hodograph.program.check import segment_faults
-from hodograph.program.geometry import segment_ways
+from hodograph.program.geometry import segment_arcs
 from hodograph.spline.frames import LEFT, RIGHT, frames
 from hodograph.spline.spatial import (
     SpatialPHSpline,
@@ -131,7 +131,7 @@ def test_both_checks_refuse_another_slope_and_a_gap() -> None:
     for coefficient, change, code in ((0, 1 << 24, "JOIN_DIRECTION"), (4, 1 << 12, "JOIN_POINT")):
         program = compile_program(spline, plan)
         program.extra_q40[1, 2, coefficient] += change
-        masks = segment_faults(program, segment_ways(program.a_q44), None)
+        masks = segment_faults(program, segment_arcs(program.a_q44), None)
         assert {found.name for mask, _, found in masks if mask.any()} == {code}
         native = NativeProgram(encode(program)).check()
         found = check(program)

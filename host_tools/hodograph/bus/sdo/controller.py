@@ -363,7 +363,7 @@ _PROGRAM = (
     ("end_x_counts", 14),
     ("end_y_counts", 15),
 )
-_LONGEST = ("time_us", "way_um", "piece", "place_um")
+_LONGEST = ("time_us", "distance_um", "piece", "place_um")
 """Of PROGRAM from sub 16 on for holds, from sub 20 on for fault stops."""
 
 

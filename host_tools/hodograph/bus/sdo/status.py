@@ -295,7 +295,7 @@ def loaded_program(controller: Controller) -> LoadedProgram:
 def _longest(found: Mapping[str, int]) -> LongestStop:
     return LongestStop(
         time_s=found["time_us"] / 1e6,
-        distance_mm=found["way_um"] / 1e3,
+        distance_mm=found["distance_um"] / 1e3,
         at_mm=found["place_um"] / 1e3,
         piece=found["piece"],
     )
