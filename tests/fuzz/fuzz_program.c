@@ -99,7 +99,7 @@ static uint64_t get(const struct image *image, uint32_t at, uint32_t bytes)
 {
     uint64_t value = 0;
     for (uint32_t i = 0; i < bytes && at + i < image->size; ++i) {
-        value |= (uint64_t)image->bytes[at + i] << (8u * i);
+        value |= (uint64_t)image->bytes[(at + i) % IMAGE_MAX] << (8u * i);
     }
     return value;
 }
@@ -107,7 +107,7 @@ static uint64_t get(const struct image *image, uint32_t at, uint32_t bytes)
 static void put(struct image *image, uint32_t at, uint64_t value, uint32_t bytes)
 {
     for (uint32_t i = 0; i < bytes && at + i < image->size; ++i) {
-        image->bytes[at + i] = (uint8_t)(value >> (8u * i));
+        image->bytes[(at + i) % IMAGE_MAX] = (uint8_t)(value >> (8u * i));
     }
 }
 

@@ -124,7 +124,7 @@ static uint8_t next_axis(const struct machine *machine, uint8_t after)
     const uint8_t count = machine->config.axis_count;
     uint8_t next = count;
     for (uint8_t i = 0; i < count; ++i) {
-        if (wanted(machine, i) && (after >= count || precedes(machine, after, i)) &&
+        if (wanted(machine, i) && (after >= AXES_MAX || precedes(machine, after, i)) &&
             (next == count || precedes(machine, i, next))) {
             next = i;
         }

@@ -40,7 +40,7 @@ from ..spline.spatial.curve import hodograph_of
 from ..spline.spatial.quaternion import polar
 from .check_stops import stop_fault
 from .codes import ProgramError
-from .geometry import PREIMAGE_LIMIT, ARC_SCALE, segment_arcs
+from .geometry import ARC_SCALE, PREIMAGE_LIMIT, segment_arcs
 from .image import (
     PLANE_AXES,
     Program,

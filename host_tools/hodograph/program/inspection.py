@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
 from ..names import AXES
-from .geometry import segment_arcs, arc_to_q40
+from .geometry import arc_to_q40, segment_arcs
 from .image import (
     PIECE_SIZE,
     RECORD_BYTES,

@@ -24,7 +24,17 @@ from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
-from .windows import JOINTS, PIECE_BYTES, SectionFeed, Spacing, Stretch, Window, chained, taken
+from .windows import (
+    JOINTS,
+    PIECE_BYTES,
+    SectionFeed,
+    Spacing,
+    Stretch,
+    Window,
+    chained,
+    last_s,
+    taken,
+)
 
 Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
@@ -109,6 +119,7 @@ class _Made:
     first_segment, end_segment  numbers in the section of its first segment and of the one behind its last
     end_q40                     arc length of the section where its program ends
     pieces                      how many it has
+    tail, tail_codes            its pieces behind the joint, with their stop codes
     """
 
     header: ChunkHeader
@@ -116,6 +127,8 @@ class _Made:
     end_segment: int
     end_q40: int
     pieces: int
+    tail: FeedPieces
+    tail_codes: Codes
 
 
 @dataclass
@@ -153,6 +166,10 @@ class _Searched:
 
     def __post_init__(self) -> None:
         self.codes = _no_codes(len(self.window.stretch.pieces))
+
+
+class _RefusedPartError(PlanError):
+    """No chunk with the next part of the path is accepted."""
 
 
 class _Tails:
@@ -219,11 +236,30 @@ class SectionChunks:
         for window in self._feed.windows():
             first, joints = 0, list(window.joints)
             while joints:
-                planned, used = self._next(window, first, joints[:JOINTS])
+                before = self._kept
+                try:
+                    planned, used = self._next(window, first, joints[:JOINTS])
+                except _RefusedPartError:
+                    self._kept = before
+                    if not self._rest() and not self._feed.halve(window):
+                        raise
+                    break
                 yield planned
                 first, joints = joints[used - 1], joints[used:]
-            assert self._last is not None
-            self._feed.forget(self._last.first_segment)
+            if self._last is not None:
+                self._feed.forget(self._last.first_segment)
+
+    def _rest(self) -> bool:
+        """Lets the axes rest at the end of the newest chunk, whose tail is then kept: no chunk goes on in motion. False
+        where they rest there already, or nothing follows.
+        """
+        last, path = self._last, self._feed.path
+        if last is None or not len(last.tail) or last.end_q40 >= int(path.start_q40[-1]):
+            return False
+        self._kept = self._kept.with_new(last.tail, last.tail_codes)
+        self._last = replace(last, tail=taken(last.tail, slice(0, 0)))
+        self._feed.rest_at(last.end_q40, last_s(last.tail, len(last.tail)))
+        return True
 
     def _next(self, window: Window, first: int, joints: list[int]) -> tuple[PlannedChunk, int]:
         """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
@@ -265,7 +301,7 @@ class SectionChunks:
                 "lower the feed there, or switch fewer outputs at one place"
             )
         if fault is not None:
-            raise PlanError(
+            raise _RefusedPartError(
                 f"line {header.line}: the controller would refuse this part: {fault.text} "
                 f"(code {fault.code}): lower the feed there, and please report this file"
             )
@@ -316,7 +352,7 @@ class SectionChunks:
     def _require_room(self, program: Program, line: int) -> None:
         size = program.image_size + HEADER_SIZE
         if size > self._most:
-            raise PlanError(
+            raise _RefusedPartError(
                 f"line {line}: a part of the path that the controller needs at once takes {size} bytes, and it takes "
                 f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory"
             )
@@ -350,7 +386,12 @@ class SectionChunks:
         first = path.passed + path.segment_at(header.job_start_q40)
         end_q40 = header.job_start_q40 + program.length_q40
         end = first + program.segment_count
-        return _Made(header, first, end, end_q40, program.piece_count)
+        tail = slice(len(self._kept.codes), None)
+        pieces = taken(program.pieces, tail)
+        pieces = replace(pieces, start_q40=pieces.start_q40 + header.job_start_q40)
+        return _Made(
+            header, first, end, end_q40, program.piece_count, pieces, program.stops.codes[tail]
+        )
 
     def _with_tail(
         self, tails: _Tails, joint: int, thorough: bool | None
@@ -370,7 +411,7 @@ class SectionChunks:
             own = self._tail_codes(window, tail, thorough)
             program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
-                break
+                continue
             fault = self._fault(program)
             if fault is not None and fault.code == ProgramError.STOP_LONG:
                 program = without_long_stops(program)

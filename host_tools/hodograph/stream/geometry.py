@@ -19,7 +19,7 @@ from ..errors import InputError, PlanError
 from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
-from ..program.geometry import LONGEST_SEGMENT_MM, quantise, segment_arcs, arc_to_q40
+from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
 from ..spline import PHSpline, coordinates
 from ..spline.spatial import SpatialPHSpline
 from ..spline.splitting import cut_segments, part_of

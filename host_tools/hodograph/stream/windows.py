@@ -74,6 +74,7 @@ _TAIL_LOWERED = (2, 1.04)
 _TAIL_EXCESS = 1.0075
 """What a tail may use of the limits less RESERVE; whether the controller takes it is found by its own check."""
 _DRIFT_Q40 = 1024
+_SAME_MM = 1e-9
 
 
 JOINTS = 4
@@ -167,27 +168,62 @@ class SectionFeed:
         self._low_mm = 0.0
         self._wanted_s = FIRST_WINDOW_S if begin_point_q40 is None else WINDOW_S
         self._needed = 0
+        self._rest: tuple[int, float] | None = None
+        self._rest_mm: float | None = None
+        self._again = False
 
     def windows(self) -> Iterator[Window]:
         """The windows in order; the last one ends the section. Raises PlanError."""
         while True:
             window = self._next()
             yield window
-            if window.rests and self.at_end(window):
+            if self._again:
+                self._again = False
+                continue
+            if self._rest is not None:
+                self._begin_at_rest(*self._rest)
+            elif window.rests and self.at_end(window):
                 return
-            self._advance(window)
+            else:
+                self._advance(window)
             self._drop()
 
     def at_end(self, window: Window) -> bool:
         """Whether a window ends where the section does."""
         return self.path.complete and window.stretch.end_q40 == int(self.path.start_q40[-1])
 
+    def rest_at(self, end_q40: int, last_s: float) -> None:
+        """The next window begins at rest at this end of a segment, behind a piece that lasts last_s, in place of where
+        the present one ends.
+        """
+        self._rest = end_q40, last_s
+
+    def halve(self, window: Window) -> bool:
+        """The present window, which begins at rest, is planned again, to a rest within half of what it kept. False:
+        it begins in motion, or keeps one segment.
+        """
+        ends, low = self.path.curve.segment_starts_mm, self._low_mm + _SAME_MM
+        first = int(np.searchsorted(ends, low, side="right"))
+        half = int(np.searchsorted(ends, 0.5 * (low + window.end_mm), side="right")) - 1
+        end_mm = float(ends[max(first, half)])
+        if self._moving is not None or end_mm > window.end_mm - _SAME_MM:
+            return False
+        self._rest_mm, self._again = end_mm, True
+        return True
+
+    def _begin_at_rest(self, low_q40: int, before_s: float) -> None:
+        at = int(np.searchsorted(self.path.start_q40, low_q40))
+        self._low_q40, self._low_mm = low_q40, float(self.path.curve.segment_starts_mm[at])
+        self._before_s, self._rest, self._rest_mm = before_s, None, None
+        self._last, self._held, self._moving = None, None, None
+
     def _advance(self, window: Window) -> None:
         found, count = window.solution, window.count
         self._last, self._wanted_s = window, min(2.0 * self._wanted_s, WINDOW_S)
+        self._rest_mm = None
         self._low_mm = window.end_mm
         self._low_q40 = window.joint_q40(count)
-        self._before_s = _last_s(window.stretch.pieces, count)
+        self._before_s = last_s(window.stretch.pieces, count)
         if window.rests:
             self._held, self._moving = None, None
             return
@@ -209,6 +245,8 @@ class SectionFeed:
         self._read()
         limits, given = self._limits()
         high, stop_s = self._high(limits)
+        if self._rest_mm is not None:
+            high = self._rest_mm
         found = self._solved(limits, high, stop_s)
         if found is None:
             return self._to_rest(limits, given)
@@ -250,7 +288,8 @@ class SectionFeed:
         high: float,
         stop_s: float,
     ) -> Window:
-        rests = high >= self.path.curve.length_mm and self.path.complete
+        complete = high >= self.path.curve.length_mm and self.path.complete
+        rests = complete or self._rest_mm is not None
         count = found.grid.size if rests else kept(found, stop_s)
         joints = self._joints(found, count)
         marks = found.grid.s[list(joints)]
@@ -425,7 +464,7 @@ class SectionFeed:
         least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
         ends = curve.segment_starts_mm
         yield from self._brakes(window, joint, state, low, least)
-        before_s = _last_s(window.stretch.pieces, joint)
+        before_s = last_s(window.stretch.pieces, joint)
         tried: set[int] = set()
         for way in _TAIL_WAYS:
             wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
@@ -475,7 +514,7 @@ class SectionFeed:
                 return
 
 
-def _last_s(pieces: FeedPieces, count: int) -> float:
+def last_s(pieces: FeedPieces, count: int) -> float:
     """How long the last of the first pieces lasts."""
     return float(pieces.duration_q32_s[count - 1]) * 2.0**-32
 

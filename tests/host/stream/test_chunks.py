@@ -161,12 +161,23 @@ def test_fewer_pieces_are_shared_where_there_is_no_room(tmp_path: Path, machine:
     assert min(chunk.header.shared_pieces for chunk in chunks[1:]) < LEAST_SHARED_PIECES
 
 
+@pytest.mark.parametrize("most", [6800, 6000])
+def test_axes_rest_where_no_chunk_goes_on(tmp_path: Path, machine: Machine, most: int) -> None:
+    """At the end of a chunk, rather than that the job ends with an error."""
+    file = tmp_path / "wave.ngc"
+    file.write_text(_wave(60))
+    (roomy,) = _sections(file, machine)
+    (tight,) = _sections(file, machine, most)
+    _verify(tight, machine, most, 1)
+    assert concatenated(tight).duration_s > concatenated(roomy).duration_s + 0.02
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["dispensing", "engraving", "pocket"])
 def test_examples(machine: Machine, name: str) -> None:
     file = ROOT / "examples" / "toolpaths" / f"{name}.ngc"
     for chunks in _sections(file, machine):
-        _verify(chunks, machine)
+        _verify(chunks, machine, shared=FEWEST_SHARED_PIECES)
 
 
 @pytest.mark.long
@@ -177,7 +188,7 @@ def test_more_random_paths(tmp_path: Path, machine: Machine, seed: int) -> None:
     step, turn = 10.0 ** draw.uniform(-0.7, 1.0), draw.uniform(0.02, 1.5)
     file.write_text(_walk(seed, int(draw.integers(50, 900)), float(step), float(turn)))
     for chunks in _sections(file, machine):
-        _verify(chunks, machine)
+        _verify(chunks, machine, shared=FEWEST_SHARED_PIECES)
 
 
 @pytest.fixture(scope="module")
