@@ -254,7 +254,9 @@ class SectionChunks:
         where they rest there already, or nothing follows.
         """
         last, path = self._last, self._feed.path
-        if last is None or not len(last.tail) or last.end_q40 >= int(path.start_q40[-1]):
+        if last is None or not len(last.tail):
+            return False
+        if path.complete and last.end_q40 == int(path.start_q40[-1]):
             return False
         self._kept = self._kept.with_new(last.tail, last.tail_codes)
         self._last = replace(last, tail=taken(last.tail, slice(0, 0)))

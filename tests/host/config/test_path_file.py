@@ -291,7 +291,7 @@ def test_knots_are_chord_lengths_unless_said(tmp_path: Path) -> None:
         ("[9, 1, 2.5]", "[9, 1, inf]", r"point 1 holds inf: give three finite numbers"),
         ("[9, 1, 2.5]", "[9, 1, 5000]", r"point 1 holds 5000: at most 4096 mm from 0"),
         ("[0, 0, 1]", "[0, 0, 1, 2]", r"point 1 must be \[x, y, z, a\] like the first"),
-        ("[0, 0, 1]", "[0, 0, 1, 2, 3, 4, 5]", r"point 0 must be \[x, y\]"),
+        ("[0, 0, 1]", "[0, 0, 1, 2, 3, 4, 5]", r"point 0 has 7 numbers: at most 6"),
         ("false", "false\nstart_tangent = [0, 1]", r"start_tangent must be three numbers"),
         ("false", "false\nend_tangent = [0, 0, 0]", r"end_tangent must not be \[0, 0, 0\]"),
         ("false", "false\nknots = 'even'", r'knots cannot be "even"; use one of: chord'),
