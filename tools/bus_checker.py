@@ -4,7 +4,7 @@
 Known identifiers with the length that the machine's DBC gives them; SYNC counters in order; each PDO of SYNC type
 once a SYNC while its drive is operational, and none of a drive that is not; setpoints within the feed limit; legal
 statuswords and transitions of CiA 402; heartbeats in time and with the state that NMT commanded; no EMCY, no SDO
-abort, no boot-up that was not asked for.
+abort, no boot-up that was not requested.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Heartbeats of all nodes: in time, and with the state that NMT commanded; no boot-up that was not asked for."""
+"""Heartbeats of all nodes: in time, and with the state that NMT commanded; no boot-up that was not requested."""
 
 from __future__ import annotations
 

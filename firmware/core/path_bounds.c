@@ -81,7 +81,7 @@ static void set_aside(struct motion *out, const struct motion *begin, const stru
     }
 }
 
-/* The feed polynomial x half from the middle of the part, x from -1 to 1; |q''| <= M makes M / 2 between its ends. */
+/* Arc length from the middle of the part is x half, x from -1 to 1; |q''| <= M makes M / 2 between its ends. */
 static void fill(struct path_bounds *bounds, struct path_bounds_number *numbers,
                  const struct part *part)
 {

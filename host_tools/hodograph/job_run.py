@@ -37,7 +37,7 @@ Look = Callable[[], None]
 """Waits a little and raises what has gone wrong on the bus meanwhile."""
 
 Operator = Callable[[str, Look], None]
-"""Informs the operator why the job stops, and returns when it may go on; calls the second one while it waits."""
+"""Shows the operator why the job stops, and returns when it may go on; calls the second one while it waits."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ bool fake_port_take(struct can_msg *message);
 void fake_port_tick(uint32_t late_ns);
 void fake_port_receive(const struct can_msg *message);
 
-/* What the application asked for. */
+/* What the application requested. */
 uint32_t fake_port_period_us(void);
 uint32_t fake_port_awaited_us(void); /* port_tick_await of the last tick; 0: not called */
 bool fake_port_hurry(void);          /* and in a hurry */

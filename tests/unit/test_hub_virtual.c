@@ -120,7 +120,7 @@ static int receive(struct can_msg messages[CAN_SOCKET_BATCH])
     return can_socket_receive(&mine, messages, &more);
 }
 
-/* Receives the bus, and wakes nobody. */
+/* Receives all frames of the bus, and wakes nobody. */
 static struct can_socket open_listener(void)
 {
     struct can_socket listener;

@@ -20,7 +20,7 @@ from typing import Any
 
 ABSENT = "absent"
 _FORMAT = 1  # of the files of stamps
-_KEPT_S = 60 * 24 * 3600.0  # a stamp that nobody requested for so long is removed
+_KEPT_S = 60 * 24 * 3600.0  # a stamp that nobody used for so long is removed
 
 Fact = dict[str, Any]
 
@@ -115,7 +115,7 @@ class Stamps:
             return
 
     def prune(self, now_s: float | None = None) -> None:
-        """Removes stamps that were not requested in two months."""
+        """Removes stamps that were not used in two months."""
         limit = (time.time() if now_s is None else now_s) - _KEPT_S
         for path in (self._root() / self.part).glob("*/*"):
             try:

@@ -166,7 +166,7 @@ def _processor_s() -> float:
 
 
 class Plugin:
-    """Informs the recorder which test file is at work."""
+    """Gives the recorder the test file that is at work."""
 
     def __init__(self, recorder: Recorder, group: str) -> None:
         self.recorder = recorder

@@ -108,7 +108,7 @@ static inline void axis_synced(struct axis *axis)
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
 
 /* All pure, under the lock. */
-bool axis_lost_for_long(const struct axis *axis, uint32_t now_us); /* lost for long */
+bool axis_lost_for_long(const struct axis *axis, uint32_t now_us); /* no TPDO1 for so long */
 bool axis_in_fault(const struct axis *axis);                       /* Fault, or on the way there */
 bool axis_left_operation_enabled(
     const struct axis *axis); /* was enabled, shall be, and is not any more */

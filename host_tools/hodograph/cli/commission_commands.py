@@ -32,7 +32,7 @@ from ..commission.drive_facts import MODES
 from ..config import load_machine
 from ..config.axis_table import MAX_AXES
 from ..errors import BusError, InputError
-from .output import note, print_json, write_files
+from .output import note, print_json, require_places, write_files
 
 
 def scan(options: Namespace) -> None:
@@ -41,6 +41,7 @@ def scan(options: Namespace) -> None:
         raise InputError("--assign: needs LSS: leave --no-lss out")
     if options.store and not options.assign:
         raise InputError("--store: stores what --assign gives: add --assign")
+    require_places(options.output)
     address = bus_address(options.bus)
     scanned = _scanned(options, address)
     if scanned.unconfigured.hidden is not None:

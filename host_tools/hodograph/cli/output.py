@@ -137,15 +137,25 @@ class _Lines:
 
 
 def require_places(*files: Path | None, folders: Sequence[Path | None] = ()) -> None:
-    """Raises InputError: a file or folder that a command writes at its end cannot be made; None: none is asked for.
+    """Raises InputError: a file or folder that a command writes at its end cannot be made; None: none is wanted.
 
     To be called first: a run takes long, and a motion of the machine cannot be had again. It writes nothing.
     """
     for file in filter(None, files):
-        _require_place(file, errno.EISDIR if file.is_dir() else _refusal(file.parent))
+        if _is_device(file):
+            _require_place(file, None if os.access(file, os.W_OK) else errno.EACCES)
+        else:
+            _require_place(file, errno.EISDIR if file.is_dir() else _refusal(file.resolve().parent))
     for folder in filter(None, folders):
         above = (place for place in (folder, *folder.parents) if place.exists())
         _require_place(folder, _refusal(next(above)))
+
+
+def _is_device(file: Path) -> bool:
+    """Or a pipe, or a link to what the shell has redirected: written into, never replaced."""
+    if not file.exists() or file.is_dir():
+        return False
+    return not file.is_file() or file.is_relative_to("/dev")
 
 
 def _require_place(path: Path, code: int | None) -> None:
@@ -164,9 +174,10 @@ def _refusal(folder: Path) -> int | None:
 
 def write_file(file: Path, data: bytes) -> None:
     """Writes a result, whole or not at all; into a device or a pipe as it comes. Raises InputError."""
-    if file.exists() and not file.is_file() and not file.is_dir():
+    if _is_device(file):
         _write_into(file, data)
         return
+    file = file.resolve()
     fresh = file.with_name(file.name + ".part")
     try:
         fresh.write_bytes(data)

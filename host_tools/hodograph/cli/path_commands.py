@@ -207,9 +207,10 @@ def compile_(options: Namespace) -> None:
         refuse_toolpath_options(options, options.file)
         pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     require_fit(pipeline.whole_machine)
+    output = options.output or Path(pipeline.file.name + ".hdgp")
+    require_places(output)
     image = pipeline.image
     print_notes(pipeline, pipeline.compilation.plan)
-    output = options.output or Path(pipeline.file.name + ".hdgp")
     write_file(output, image)
     _warn_of_size(image, pipeline.machine)
     program = pipeline.program

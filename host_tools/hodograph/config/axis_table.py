@@ -155,7 +155,7 @@ _SCALING = (
 
 
 class _AxisTable:
-    """One [[axis]], or a table in it, of an axis that is measured in `unit`: its keys are asked for by what they are
+    """One [[axis]], or a table in it, of an axis that is measured in `unit`: its keys are looked up by what they are
     called in mm.
     """
 

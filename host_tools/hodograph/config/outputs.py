@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..errors import InputError
@@ -312,6 +313,11 @@ class PlacedOutput:
         if isinstance(self.value, bool):
             return "on" if self.value else "off"
         return f"{self.value:g}" if self.per_mm_s is None else f"{self.per_mm_s:g} by mm/s"
+
+
+def words_of(placed: Sequence[PlacedOutput]) -> str:
+    """A line for each output that switches at a place."""
+    return "\n".join(f"{one.name} {one.words}" for one in placed)
 
 
 def placed_outputs(outputs: Outputs | None, events: Events) -> list[PlacedOutput]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..config.outputs import Outputs, placed_outputs
+from ..config.outputs import Outputs, placed_outputs, words_of
 from ..events import Events
 from .decoder import Floats
 from .derived import ProgramPath
@@ -33,7 +33,7 @@ def output_marks(outputs: Outputs | None, events: Events) -> tuple[OutputMark, .
     """The marks of a program, by place; none where the outputs of the machine are not known."""
     placed = placed_outputs(outputs, events)
     return tuple(
-        OutputMark(place, "\n".join(f"{o.name} {o.words}" for o in placed if o.place_mm == place))
+        OutputMark(place, words_of([one for one in placed if one.place_mm == place]))
         for place in sorted({one.place_mm for one in placed})
     )
 

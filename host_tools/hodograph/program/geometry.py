@@ -18,7 +18,7 @@ Int = NDArray[np.int64]
 Real = NDArray[np.float64]
 
 ARC_SCALE = 15
-"""Ways of segments are exact multiples of 2^-88 / 15 mm."""
+"""Arc lengths of segments are exact multiples of 2^-88 / 15 mm."""
 
 # 15 times the integral of a b is, for quadratics in Bernstein form,
 # 3 a0 b0 + 3 a2 b2 + 2 a1 b1 + 3/2 (a0 b1 + a1 b0 + a1 b2 + a2 b1) + 1/2 (a0 b2 + a2 b0).
@@ -47,7 +47,7 @@ def segment_arcs(a_q44: Int) -> tuple[Wide, ...]:
 
 
 def arc_to_q40(distance: Wide) -> Int:
-    """Ways (integers over 15 * 2^88) rounded to 2^-40 mm."""
+    """Arc lengths (integers over 15 * 2^88) rounded to 2^-40 mm."""
     low = distance.low + (ARC_SCALE << 47)
     return np.asarray(distance.high + (distance.high + (low >> 48)) // ARC_SCALE)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..config.outputs import PlacedOutput, placed_outputs
+from ..config.outputs import placed_outputs, words_of
 from ..pipeline import Pipeline
 from ..simulate import Motion
 from ..spline import coordinates
@@ -30,7 +30,7 @@ def mark_outputs(axes: Any, pipeline: Pipeline) -> None:
     axes.plot(*points.T, "v", color=RED, markersize=7, label=_LABEL)
     for place_mm in np.unique(places_mm):
         here = places_mm == place_mm
-        words = _words([one for one, at in zip(placed, here, strict=True) if at])
+        words = words_of([one for one, at in zip(placed, here, strict=True) if at])
         point = points[int(np.argmax(here))]
         if in_space:
             axes.text(*point, f"  {words}", fontsize=8)
@@ -44,7 +44,7 @@ def mark_switching_times(axes: Axes, motion: Motion) -> None:
     """When the outputs of a run switched, with their names, in a figure over time in s."""
     acted = motion.acted_outputs
     for time_s in sorted({one.time_s for one in acted}):
-        words = _words([one for one in acted if one.time_s == time_s])
+        words = words_of([one for one in acted if one.time_s == time_s])
         axes.axvline(time_s, color=RED, linewidth=0.9, linestyle=(0, (4, 2)))
         axes.annotate(
             words,
@@ -55,7 +55,3 @@ def mark_switching_times(axes: Axes, motion: Motion) -> None:
             color=RED,
             fontsize=8,
         )
-
-
-def _words(outputs: list[PlacedOutput]) -> str:
-    return "\n".join(f"{one.name} {one.words}" for one in outputs)

@@ -230,6 +230,7 @@ class SectionChunks:
         self._last: _Made | None = None
         self._searched: _Searched | None = None
         self._tail_bytes = 0
+        self._rested_s = 0.0
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -251,13 +252,14 @@ class SectionChunks:
 
     def _rest(self) -> bool:
         """Lets the axes rest at the end of the newest chunk, whose tail is then kept: no chunk goes on in motion. False
-        where they rest there already, or nothing follows.
+        where they rest there already, or the path ends there.
         """
         last, path = self._last, self._feed.path
         if last is None or not len(last.tail):
             return False
-        if path.complete and last.end_q40 == int(path.start_q40[-1]):
+        if last.end_q40 == int(path.start_q40[-1]) and not self._feed.read_more():
             return False
+        self._rested_s += _seconds(last.tail)
         self._kept = self._kept.with_new(last.tail, last.tail_codes)
         self._last = replace(last, tail=taken(last.tail, slice(0, 0)))
         self._feed.rest_at(last.end_q40, last_s(last.tail, len(last.tail)))
@@ -311,7 +313,7 @@ class SectionChunks:
         self._tail_bytes = program.image_size + HEADER_SIZE - kept_bytes
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
-        new_s = float(pieces.duration_q32_s.sum()) * 2.0**-32
+        new_s, self._rested_s = self._rested_s + _seconds(pieces), 0.0
         return PlannedChunk(
             Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
         ), used
@@ -533,6 +535,10 @@ class SectionChunks:
         plan = replace(window.plan, limits=replace(limits, zones=zones))
         terms = replace(stop_terms(self.machine, limits), quick=not thorough)
         return stop_codes(program, plan, terms, wanted)
+
+
+def _seconds(pieces: FeedPieces) -> float:
+    return float(pieces.duration_q32_s.sum()) * 2.0**-32
 
 
 def _on_short_segments(program: Program) -> NDArray[np.bool_]:

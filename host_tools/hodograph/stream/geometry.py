@@ -238,8 +238,8 @@ class StreamPath:
             self._curve = joined((self._curve, block.curve))
             self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
             self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)
-        ways = segment_arcs(made.a_q44[:, -1:])
-        self._end_point = point[:, -1] + np.array([arc_to_q40(w)[0] for w in ways[:-1]])
+        arcs = segment_arcs(made.a_q44[:, -1:])
+        self._end_point = point[:, -1] + np.array([arc_to_q40(w)[0] for w in arcs[:-1]])
         if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
             raise PlanError(
                 f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"

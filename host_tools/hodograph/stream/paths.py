@@ -82,6 +82,10 @@ class PathsJob:
     def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
         """From path number `first` on, from this arc length of it."""
         paths = load_paths(self.file)
+        if any(one.file.turns_alone for one in paths):
+            raise InputError(
+                f"{self.file}: axes turn alone, which no chunk does: use hodograph run"
+            )
         if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
             first, begin_q40 = first + 1, 0
         place: JobPlace | None = None

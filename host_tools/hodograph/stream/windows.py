@@ -330,11 +330,16 @@ class SectionFeed:
         while not self.path.complete:
             if self.path.count and self._ahead_s() > self._wanted_s * (1.0 + _END_SHARE):
                 return
-            block = next(self._blocks, None)
-            if block is None:
-                self.path.complete = True
-            else:
-                self.path.append(block)
+            self.read_more()
+
+    def read_more(self) -> bool:
+        """Reads a block; false: there is none."""
+        block = None if self.path.complete else next(self._blocks, None)
+        if block is None:
+            self.path.complete = True
+            return False
+        self.path.append(block)
+        return True
 
     def _estimate(self, limits: PlanLimits) -> _Estimate:
         """The estimate of all of the path that is known; kept until more of it is, or the window has moved on."""

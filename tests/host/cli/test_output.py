@@ -318,6 +318,21 @@ def test_places_that_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         require_places(folders=[Path("a/b")])
 
 
+def test_a_link_stays_one(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_file(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"
+
+
+def test_a_device_can_be_written_where_its_folder_cannot() -> None:
+    require_places(Path("/dev/null"))
+    write_file(Path("/dev/null"), b"image")
+    assert not Path("/dev/null").is_file()
+
+
 def test_a_pipe_stays_a_pipe(tmp_path: Path) -> None:
     """As /dev/stdout, or /dev/null for root: it is written into, not replaced by a file."""
     pipe = tmp_path / "pipe"

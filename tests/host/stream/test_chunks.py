@@ -176,9 +176,13 @@ def test_axes_rest_where_no_chunk_goes_on(tmp_path: Path, machine: Machine, most
     file = tmp_path / "wave.ngc"
     file.write_text(_wave(60))
     (roomy,) = _sections(file, machine)
-    (tight,) = _sections(file, machine, most)
+    (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
+    made = list(SectionChunks(machine, "wave", section.blocks, 1, most).chunks())
+    tight = [one.chunk for one in made]
     _verify(tight, machine, most, 1)
-    assert concatenated(tight).duration_s > concatenated(roomy).duration_s + 0.02
+    duration_s = concatenated(tight).duration_s
+    assert duration_s > concatenated(roomy).duration_s + 0.02
+    assert sum(one.new_s for one in made) == pytest.approx(duration_s, abs=1e-9)
 
 
 @pytest.mark.long

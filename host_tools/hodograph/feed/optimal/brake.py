@@ -27,6 +27,8 @@ def brake_to_rest(state: State, low: float, high: float, period_s: float) -> End
     """The brake from a moving state at arc length `low` to rest at `high`, in pieces of one duration; None: there is
     none that never turns back, or its pieces would be too brief. It may exceed limits.
     """
+    if state.q <= 0.0:
+        return None
     feed, acceleration, way = sqrt(state.q), 0.5 * state.slope, high - low
     square = 0.25 * feed * feed + acceleration * way / 3.0
     if way <= 0.0 or square < 0.0:
