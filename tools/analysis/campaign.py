@@ -25,8 +25,8 @@ from testing.cache import Stamps, content, digest, tree
 ROOT = Path(__file__).resolve().parents[2]
 # Images of examples/NAME.toml, made once: planning may differ in the last bit from machine to machine.
 EXAMPLES = {
-    "alpha": ROOT / "tests/data/programs/alpha_exponential.hdgp",
-    "heart": ROOT / "tests/data/programs/heart_exponential.hdgp",
+    "alpha": ROOT / "tests/data/counts/alpha.hdgp",
+    "heart": ROOT / "tests/data/counts/heart.hdgp",
     "star": ROOT / "tests/data/counts/star.hdgp",
     "alpha_optimal": ROOT / "tests/data/counts/alpha_optimal.hdgp",
     "heart_optimal": ROOT / "tests/data/counts/heart_optimal.hdgp",
