@@ -26,7 +26,6 @@
 #define HUB_BUSES       4u
 #define HUB_CONNECTIONS 64u
 #define HUB_QUEUE       2048u
-#define HUB_UNPOLLED    64u /* grants between two looks at all connections, at most */
 
 struct hub_options {
     bool is_virtual;
@@ -55,8 +54,6 @@ struct hub_connection {
     struct can_filter tracked[LOCAL_BUS_FILTERS]; /* frames of its own that come back to it */
     size_t tracked_count;
     struct hub_queue queue;
-    struct local_bus_frame outgoing[LOCAL_BUS_PACKET]; /* virtual time: its next packet */
-    size_t outgoing_count;
 };
 
 /* A bus in virtual time. */
@@ -74,12 +71,10 @@ struct hub {
     struct hub_bus buses[HUB_BUSES];
     struct hub_connection connections[HUB_CONNECTIONS];
     struct virtual_time time;
-    uint64_t pace_real_ns;          /* where speed is limited: an instant of real time, */
-    uint64_t pace_virtual_ns;       /* and that of virtual time which may not come before it */
-    bool poll_all;                  /* members of participants that compute, too */
-    struct hub_connection *granted; /* that alone computes, and waits for no process; or NULL */
-    unsigned unpolled;              /* grants since the last look at all connections */
-    uint64_t lost;                  /* frames that found no room */
+    uint64_t pace_real_ns;    /* where speed is limited: an instant of real time, */
+    uint64_t pace_virtual_ns; /* and that of virtual time which may not come before it */
+    bool poll_all;            /* members of participants that compute, too */
+    uint64_t lost;            /* frames that found no room */
 };
 
 /* Serves a bus at each of these paths, which are made and must not be there. 0, or a negative errno with the index of the path that

@@ -205,52 +205,6 @@ static void test_an_answer_comes_behind_what_waits_already(void)
     TEST_ASSERT_EQUAL(0x302, got[3].id);
 }
 
-/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too long. */
-static int frames_in(int fd)
-{
-    struct local_bus_frame packet[LOCAL_BUS_PACKET + 1u];
-    int count = 0;
-    for (ssize_t size = 1; size > 0;) {
-        size = recv(fd, packet, sizeof packet, MSG_DONTWAIT);
-        TEST_ASSERT_LESS_OR_EQUAL((ssize_t)(LOCAL_BUS_PACKET * sizeof packet[0]), size);
-        for (size_t i = 0; size > 0 && i < (size_t)size / sizeof packet[0]; ++i) {
-            TEST_ASSERT_EQUAL(0x100 + count, packet[i].frame.can_id);
-            count++;
-        }
-    }
-    return count;
-}
-
-static void test_many_frames_come_in_packets_and_in_order(void)
-{
-    enum { FRAMES = 2 * CAN_SOCKET_BATCH + 3 };
-    struct local_bus_control welcome;
-    struct can_msg got[CAN_SOCKET_BATCH];
-    const int recorder = open_connection(LOCAL_BUS_HELLO_MEMBER, 0, "", &welcome);
-    const struct can_match all = {0x000, 0x000};
-    int more = 1;
-    int count = 0;
-    TEST_ASSERT_EQUAL(0, can_socket_defer(&mine, &all, 1));
-    for (uint32_t i = 0; i < FRAMES; ++i) {
-        send_frame(&other, 0x100 + i, 0);
-    }
-    say_wait(&other, LOCAL_BUS_NEVER);
-    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + CLOCK_NS_PER_S) {
-        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NS_PER_S));
-    }
-    while (more != 0) {
-        const int some = can_socket_receive(&mine, got, &more);
-        for (int i = 0; i < some; ++i) {
-            TEST_ASSERT_EQUAL(0x100 + count + i, got[i].id);
-        }
-        count += some;
-    }
-    TEST_ASSERT_EQUAL(FRAMES, count);
-    hub_thread_end();
-    TEST_ASSERT_EQUAL(FRAMES, frames_in(recorder));
-    (void)close(recorder);
-}
-
 static void test_filters_and_deferred_frames_do_not_wake(void)
 {
     const struct can_match wanted[2] = {{0x100, 0x7FF}, {0x200, 0x7FF}};
@@ -431,7 +385,6 @@ int main(void)
     RUN_TEST(test_a_frame_takes_its_bits_and_wakes);
     RUN_TEST(test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_order);
     RUN_TEST(test_an_answer_comes_behind_what_waits_already);
-    RUN_TEST(test_many_frames_come_in_packets_and_in_order);
     RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
     RUN_TEST(test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once);

@@ -26,14 +26,12 @@ from ..errors import BusError
 
 NAME_VARIABLE = "HODOGRAPH_PARTICIPANT"
 """Of the environment: what a process is called in virtual time."""
-MOST_FRAMES = 8
-"""In a packet from the hub to a member."""
 _NAME_BYTES = 32
 _MARK = 0xFFFFFFFF
 _NEVER_NS = 2**64 - 1
 _CONTROL = struct.Struct(f"=IHHIIQ{_NAME_BYTES}s")
 _WATCHES, _VIRTUAL, _SENT = 1, 2, 4
-_VERSION = 3
+_VERSION = 2
 _HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
 _WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
 _LOOK_S = 0.05
