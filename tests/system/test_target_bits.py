@@ -75,8 +75,8 @@ def counts(store: Store, run: str, kernel: str) -> np.ndarray:
 def test_near_the_double_kernel(kernel: str) -> None:
     """At every tick: the fixed kernel within its rounding, the float kernel within 10 nm.
 
-    A stop may be on the border between two numbers of ticks, and kernels then choose different ones. Rests of one of the
-    139 random programs differ so, by less than 30 nm.
+    A stop may be on the border between two numbers of ticks, and kernels then choose different ones. Rests of one of
+    the 139 random programs differ so, by less than 30 nm.
     """
     plain, stopped = 0, []
     for store, run in CASES:
