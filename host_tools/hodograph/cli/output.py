@@ -152,7 +152,7 @@ def require_places(*files: Path | None, folders: Sequence[Path | None] = ()) -> 
 
 
 def _is_device(file: Path) -> bool:
-    """Or a pipe, or a link to what the shell has redirected: written into, never replaced."""
+    """Whether a file is a device, a pipe, or a link below /dev to what the shell has redirected: never replaced."""
     if not file.exists() or file.is_dir():
         return False
     return not file.is_file() or file.is_relative_to("/dev")

@@ -259,7 +259,7 @@ class SectionChunks:
             return False
         if last.end_q40 == int(path.start_q40[-1]) and not self._feed.read_more():
             return False
-        self._rested_s += _seconds(last.tail)
+        self._rested_s += last.tail.total_q32_s * 2.0**-32
         self._kept = self._kept.with_new(last.tail, last.tail_codes)
         self._last = replace(last, tail=taken(last.tail, slice(0, 0)))
         self._feed.rest_at(last.end_q40, last_s(last.tail, len(last.tail)))
@@ -313,7 +313,7 @@ class SectionChunks:
         self._tail_bytes = program.image_size + HEADER_SIZE - kept_bytes
         joint_q40 = window.joint_q40(joint)
         line = self._feed.path.line_at(joint_q40)
-        new_s, self._rested_s = self._rested_s + _seconds(pieces), 0.0
+        new_s, self._rested_s = self._rested_s + pieces.total_q32_s * 2.0**-32, 0.0
         return PlannedChunk(
             Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
         ), used
@@ -535,10 +535,6 @@ class SectionChunks:
         plan = replace(window.plan, limits=replace(limits, zones=zones))
         terms = replace(stop_terms(self.machine, limits), quick=not thorough)
         return stop_codes(program, plan, terms, wanted)
-
-
-def _seconds(pieces: FeedPieces) -> float:
-    return float(pieces.duration_q32_s.sum()) * 2.0**-32
 
 
 def _on_short_segments(program: Program) -> NDArray[np.bool_]:

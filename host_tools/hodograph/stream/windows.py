@@ -8,7 +8,7 @@ to rest at the end of a segment not far behind the joint.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import ceil
@@ -59,11 +59,11 @@ RESERVE = 0.01
 _EASED = (1e-3, 1e-2)
 """Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
 
-_BRAKE_WAYS = (1.1, 1.2, 1.3, 1.4, 1.5)
-"""Ways of brakes without a quadratic program, tried first, in times the way that braking takes at least."""
+_BRAKE_DISTANCES = (1.1, 1.2, 1.3, 1.4, 1.5)
+"""Of brakes without a quadratic program, tried first, in times the distance that braking takes at least."""
 
-_TAIL_WAYS = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
-"""Ways of tails that are tried, in times the way that braking takes at least: some, and then those between them."""
+_TAIL_DISTANCES = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
+"""Of tails that are tried, in times the distance that braking takes at least: some, and then those between them."""
 
 _MOST_LOWERED, _LOWERED = 8, 1.01
 """How often, and by which share, the limits of an interval are lowered that the controller would refuse."""
@@ -458,9 +458,9 @@ class SectionFeed:
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
 
     def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """Ways to rest from a joint of a window, as _TAIL_WAYS has them, each to the end of a segment at arc length
-        `least_q40` of the section or behind it; each as it is planned, and then slower where the controller would
-        refuse that. The last one is the rest of the window.
+        """Tails from a joint of a window to rest, over the distances in _TAIL_DISTANCES, each to the end of a segment
+        at arc length `least_q40` of the section or behind it; each as it is planned, and then slower where the
+        controller would refuse that. The last one is the rest of the window.
         """
         found, curve = window.solution, self.path.curve
         knot = window.first + joint
@@ -470,14 +470,7 @@ class SectionFeed:
         ends = curve.segment_starts_mm
         yield from self._brakes(window, joint, state, low, least)
         before_s = last_s(window.stretch.pieces, joint)
-        tried: set[int] = set()
-        for way in _TAIL_WAYS:
-            wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
-            at = int(np.searchsorted(ends, wanted))
-            if at in tried or at >= ends.size or ends[at] >= found.grid.s[-1]:
-                continue
-            tried.add(at)
-            high = float(ends[at])
+        for high in self._tail_ends(_TAIL_DISTANCES, window, state, low, least):
             limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
             one = plan_window(
                 curve, limits, low, high, state, self._period_s, hurried=True, before_s=before_s
@@ -499,24 +492,30 @@ class SectionFeed:
     def _brakes(
         self, window: Window, joint: int, state: State, low: float, least: float
     ) -> Iterator[Stretch]:
-        """The shortest of the brakes to rest, as _BRAKE_WAYS has them, that keeps the limits of a window."""
-        curve, tried = self.path.curve, {-1}
-        ends = curve.segment_starts_mm
-        for way in _BRAKE_WAYS:
-            wanted = max(low + way * _braking_mm(state, window.limits), least - 1e-6)
-            at = int(np.searchsorted(ends, wanted))
-            if at in tried or at >= ends.size or ends[at] >= window.solution.grid.s[-1]:
-                continue
-            tried.add(at)
-            high = float(ends[at])
+        """The shortest of the brakes to rest, as _BRAKE_DISTANCES has them, that keeps the limits of a window."""
+        curve = self.path.curve
+        for high in self._tail_ends(_BRAKE_DISTANCES, window, state, low, least):
             brake = brake_to_rest(state, low, high, self._period_s)
             if brake is None:
                 continue
             limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
-            track = make_track(brake, 1.0, ends)
+            track = make_track(brake, 1.0, curve.segment_starts_mm)
             if piece_usage(curve, limits, track).max() <= 1.0:
                 yield self._stretch(track, window.plan, window.joint_q40(joint))
                 return
+
+    def _tail_ends(
+        self, distances: Sequence[float], window: Window, state: State, low: float, least: float
+    ) -> Iterator[float]:
+        """The ends of segments within a window, each once, at these distances from `low` or behind, from `least` on."""
+        ends, tried = self.path.curve.segment_starts_mm, set[int]()
+        for distance in distances:
+            wanted = max(low + distance * _braking_mm(state, window.limits), least - 1e-6)
+            at = int(np.searchsorted(ends, wanted))
+            if at in tried or at >= ends.size or ends[at] >= window.solution.grid.s[-1]:
+                continue
+            tried.add(at)
+            yield float(ends[at])
 
 
 def last_s(pieces: FeedPieces, count: int) -> float:

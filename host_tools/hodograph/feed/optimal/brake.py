@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A way to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/numerics.md
+"""A brake to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/numerics.md
 5.6.
 
 With u = t / T the feed is (1 - u)^2 (v (1 + 2 u) + a T u): it begins with the feed v and the acceleration a, and ends
-with neither. Its way T (v / 2 + a T / 12) gives T. Such a brake takes about a fifth longer than the fastest one, since
-its jerk falls evenly.
+with neither. Its distance T (v / 2 + a T / 12) gives T. Such a brake takes about a fifth longer than the fastest one,
+since its jerk falls evenly.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ def brake_to_rest(state: State, low: float, high: float, period_s: float) -> End
     """
     if state.q <= 0.0:
         return None
-    feed, acceleration, way = sqrt(state.q), 0.5 * state.slope, high - low
-    square = 0.25 * feed * feed + acceleration * way / 3.0
-    if way <= 0.0 or square < 0.0:
+    feed, acceleration, distance = sqrt(state.q), 0.5 * state.slope, high - low
+    square = 0.25 * feed * feed + acceleration * distance / 3.0
+    if distance <= 0.0 or square < 0.0:
         return None
-    total_s = 2.0 * way / (0.5 * feed + sqrt(square))
+    total_s = 2.0 * distance / (0.5 * feed + sqrt(square))
     if 3.0 * feed + acceleration * total_s < 0.0:
         return None
     count = min(max(round(total_s / _PIECE_S), _FEWEST), _MOST)
-    count = max(count, ceil(2.0 * way / LONGEST_PIECE_MM))
+    count = max(count, ceil(2.0 * distance / LONGEST_PIECE_MM))
     if total_s < _LEAST_PERIODS * count * period_s:
         return None
     u, lead = np.linspace(0.0, 1.0, count + 1), acceleration * total_s
