@@ -177,7 +177,8 @@ static void search_quickly(const struct stop_setting *setting, struct stop_piece
     *best = none;
     int found = better(setting, piece, near, after_s, 1, best);
     for (int down = 0; down <= STOP_FEWER && !found; down += 4) {
-        for (size_t i = 0; i < sizeof shapes / sizeof shapes[0] && !found; i++) {
+        const size_t count = down > 0 ? sizeof shapes / sizeof shapes[0] : 1u;
+        for (size_t i = 0; i < count && !found; i++) {
             const int quarters[3] = {down * shapes[i][0], down * shapes[i][1], down * shapes[i][2]};
             found = lower_by(setting, piece, piece->most, quarters, after_s, best);
         }
