@@ -186,10 +186,10 @@ def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
 def _place(section: JobSection, made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
     """Setpoint of all axes of the path at a tick of a section, in counts."""
     moved, machine = section.pipeline.machine, made.job.machine
-    _, setpoints = program.setpoints(made.kernel, moved.path_counts, tick, 1)
+    setpoint = program.counts_at(made.kernel, moved.path_counts, tick)
     stands = section.standing_mm + machine.offset_mm[: moved.first_axis]
     counts = np.rint(stands * machine.path_counts[: moved.first_axis])
-    return [*counts.astype(int).tolist(), *setpoints[0].tolist()]
+    return [*counts.astype(int).tolist(), *setpoint]
 
 
 def _off_counts(at: RunSession, place: list[int]) -> int:
