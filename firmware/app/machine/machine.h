@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * machine: the axes as one machine: its state (object 0x2002), its commands, and what it does in each tick.
+ * machine: the state of the machine (object 0x2002), the commands that change it, and its step in each tick.
  *
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
  *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
- * Three places change the state: the requests (main loop, under the lock; machine_requests.c), the timer's functions
- * (machine_tick.c, machine_supervise.c, machine_fault.c), and the raising of a fault (machine_fault.c). The whole struct is guarded by the port's lock. Who uses whom: tick, supervise and requests ->
- * fault -> drives -> machine.
+ * The state changes in three places: requests (main loop, under the lock; machine_requests.c), the timer's functions
+ * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). The port's lock guards the whole struct. Files use
+ * each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H

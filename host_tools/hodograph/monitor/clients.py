@@ -38,7 +38,7 @@ class ClientSlots(Generic[Socket]):
         return self._waiting.pop(0) if len(self._waiting) > MOST_WAITING else None
 
     def take_slot(self, socket: Socket, *, may_command: bool) -> Socket | None:
-        """Gives a socket its slot after its hello message; returns a browser that only watches itself if none is free."""
+        """Gives a socket its slot after its hello message. Returns a browser that only watches if none is free."""
         if socket in self._waiting:
             self._waiting.remove(socket)
         if may_command:
