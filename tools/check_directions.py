@@ -228,6 +228,8 @@ PYTHON_RULES: dict[str, set[str]] = {
         "names",
         "data",
         "config",
+        "bustime",
+        "program",
         "spline",
         "feed",
         "native",

@@ -3,7 +3,7 @@
  * chunk_records: the coefficient records of a job in chunks: those near the motion, in the memory of the port
  * (core/coefficient_cache.h). The main loop makes them ahead of the tick: some half of the cache is ahead of the motion.
  * Where the main loop stands still for longer than that, the tick has no point: the fault EMCY 0x6100, and the drives stop by
- * their own ramps, as when the main loop stands still at all (FAULT_UNATTENDED).
+ * their own ramps, as when the main loop stands still at all (FAULT_MAIN_LOOP_STALL).
  * Main loop; machine is locked here where it has to be.
  */
 #ifndef APP_CHUNK_RECORDS_H

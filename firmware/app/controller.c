@@ -123,7 +123,7 @@ static void beat_in_stream(void *self)
     struct controller *controller = self;
     controller_beat(controller);
     port_lock();
-    machine_attend(&controller->machine);
+    machine_note_main_loop(&controller->machine);
     commands_execute_urgent(&controller->machine, controller->urgent);
     controller->urgent = 0;
     port_unlock();
@@ -312,7 +312,7 @@ static void take_frame(struct controller *controller, const struct can_msg *in)
 static bool next_frame(struct controller *controller, struct can_msg *in)
 {
     port_lock();
-    machine_attend(&controller->machine);
+    machine_note_main_loop(&controller->machine);
     const bool got = frame_queue_take(&controller->queue, in);
     port_unlock();
     return got;
@@ -383,7 +383,7 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
 static void note_silence(struct controller *controller)
 {
     port_lock();
-    const uint8_t node = controller->machine.silent_node;
+    const uint8_t node = controller->machine.unresponsive_node;
     port_unlock();
     drive_boot_silent(&controller->boot, node);
 }

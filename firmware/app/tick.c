@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/tick.h (see there): what happens each period: SYNC, supervision, setpoints. */
+/* Implements app/tick.h: one period of the controller. */
 #include "app/tick.h"
 
 #include <string.h>
@@ -35,15 +35,15 @@ static bool send(struct tick *tick, const struct can_msg *message)
     return sent;
 }
 
-/* First of all, so that the work of the tick does not move it about. */
+/* Sent first, so that the time of a SYNC does not depend on the work of its tick. */
 static bool send_sync(struct tick *tick)
 {
     tick->machine->statistics.syncs++;
     return send(tick, sync_producer_next(&tick->sync));
 }
 
-/* Where frames of the tick before still wait, a SYNC would overtake the setpoints among them, and the drives would make the
- * way of two periods at the next one. So the tick sends nothing, and program time waits. */
+/* If frames of the last tick still wait to be sent, a SYNC would overtake the setpoints among them, and the drives would
+ * move the distance of two periods at the next SYNC. So this tick sends nothing, and the program clock is paused. */
 static enum machine_sync begin_sync(struct tick *tick)
 {
     if (!port_can_delivered()) {
@@ -53,7 +53,7 @@ static enum machine_sync begin_sync(struct tick *tick)
     return send_sync(tick) ? MACHINE_SYNC_SENT : MACHINE_SYNC_REFUSED;
 }
 
-/* Axes that hold have none. */
+/* Zero for axes that hold their position. */
 static const struct feedforward_offset *find_offsets(struct tick *tick,
                                                      struct feedforward_offset offset[AXES_MAX])
 {
@@ -99,7 +99,7 @@ static void send_velocities(struct tick *tick, const struct feedforward_offset *
     }
 }
 
-/* After the setpoints, whose SYNC they have to be latched at. */
+/* Sent after the setpoints: module and drives latch both at the next SYNC. */
 static void send_outputs(struct tick *tick, bool synced)
 {
     struct machine *machine = tick->machine;
@@ -111,7 +111,7 @@ static void send_outputs(struct tick *tick, bool synced)
     }
 }
 
-/* All positions first: they matter most on a bus that is full. */
+/* All positions first: they are the most important frames on a full bus. */
 static void send_process_data(struct tick *tick)
 {
     struct machine *machine = tick->machine;
@@ -126,7 +126,7 @@ static void send_process_data(struct tick *tick)
     }
 }
 
-/* At lock step nothing but this time keeps the next SYNC from coming at once. */
+/* The longest time that the port waits for answers of simulated drives. */
 static uint32_t guard_us(const struct machine *machine)
 {
     const uint32_t wait_us = machine_answer_wait_us(machine);

@@ -1,6 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* tick: what happens each period, in its order on the bus: SYNC, then the setpoints that belong to
- * it. */
+/*
+ * tick: all that the controller does in one period: SYNC, supervision of the drives, one step of the machine, setpoints.
+ *
+ * The timer interrupt calls tick_run once a period, under the port's lock. tick.c contains the order on the bus and all
+ * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints.
+ */
 #ifndef APP_TICK_H
 #define APP_TICK_H
 
@@ -17,15 +21,16 @@ struct tick {
     struct sync_producer sync;
     struct offsets offsets;
     struct outputs outputs;
-    bool refused;          /* the port took not all frames of this tick */
-    bool setpoint_refused; /* and a setpoint was among them */
+    bool refused;          /* the port refused a frame of this tick */
+    bool setpoint_refused; /* the port refused a setpoint of this tick */
 };
 
 void tick_init(struct tick *tick, struct machine *machine);
 
-/* One period: send SYNC k; look at what the drives answered to the last one; move the machine on;
- * send setpoints k, then what feedforward adds to them, then outputs that change; for simulated drives ask the port to wait for their answers, for
- * answer_wait_ms (0x2004 sub 8) or a period at most. Timer. */
+/* One period k. Sends SYNC k, checks the answers of the drives to SYNC k-1, executes one step of the machine, then sends
+ * setpoints k, feedforward and changed outputs. For simulated drives it asks the port to wait for their answers, for at
+ * most the longer of answer_wait_ms (0x2004 sub 8) and a period. now_us: port_time_us(); late_ns: delay of this tick
+ * after its due time. Timer. */
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

@@ -2,8 +2,8 @@
 /* cia402: states, controlword and statusword of the drive profile (CiA 402-2, finite state
  * automaton).
  *
- * What both sides share: names and codings. The drive's side is cia402_device.h, the controller's
- * cia402_master.h. Pure functions, any context.
+ * Names and codes that drive and controller share. The state machine of a drive is in cia402_device.h, the controlwords
+ * that the controller sends are in cia402_master.h. Pure functions, any context.
  */
 #ifndef CANOPEN_CIA402_H
 #define CANOPEN_CIA402_H

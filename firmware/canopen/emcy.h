@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* emcy: emergency messages (CiA 301, 7.2.7), error register 0x1001 and history 0x1003. */
+/*
+ * emcy: emergency messages (CiA 301, 7.2.7), error register 0x1001 and error history 0x1003. The controller and each
+ * simulated drive have a producer. The controller reads messages of drives with emcy_decode. No I/O: the caller sends.
+ */
 #ifndef CANOPEN_EMCY_H
 #define CANOPEN_EMCY_H
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* nmt: network management (CiA 301, 7.2.8 and 7.3.2): the slave's state machine and the master's
- * commands. */
+/*
+ * nmt: network management (CiA 301, 7.2.8 and 7.3.2): the state machine of a slave, and the frames of the master's
+ * commands. The controller is master and slave, each simulated drive a slave. No I/O: the caller sends.
+ */
 #ifndef CANOPEN_NMT_H
 #define CANOPEN_NMT_H
 
@@ -32,7 +34,7 @@ enum nmt_error_behaviour {
     NMT_ERROR_STOPPED = 2
 };
 
-/* All are called from nmt_slave_process; each may be NULL. */
+/* Called by nmt_slave_process. Each may be NULL. */
 struct nmt_hooks {
     void (*reset_node)(void *context); /* all values back to power-on, then communication */
     void (*reset_communication)(

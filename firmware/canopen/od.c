@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/od.h (see there): an object dictionary: a constant table of entries over one struct of
- * values. */
+/* Implements canopen/od.h: finds and moves values of an object dictionary. */
 #include "canopen/od.h"
 
 #include <string.h>

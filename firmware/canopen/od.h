@@ -1,20 +1,18 @@
 /* SPDX-License-Identifier: MIT */
-/* od: an object dictionary: a constant table of entries over one struct that holds the values.
+/* od: an object dictionary, as a constant table of entries and one struct with the values.
  *
- * tools/eds makes both from an EDS file: `struct od_<name>` with a named, typed field for
- * each value (in the host's byte order, so that the application simply uses the fields),
- * `od_<name>_defaults`, and `od_<name>_table`. This module finds entries and moves values between
- * the struct and the little-endian bytes of the bus, with the checks of CiA 301: existence, access,
- * size, limits of the EDS.
+ * tools/eds generates both from an EDS file: `struct od_<name>` with a named, typed field for each value, in the
+ * processor's byte order, `od_<name>_defaults` and `od_<name>_table`. The application uses the fields directly. This
+ * module finds entries, and moves values between the struct and the little-endian bytes of the bus. It makes the checks
+ * of CiA 301: existence, access, size, limits of the EDS. Its callers are od_transfer, pdo_map and the application.
  *
  *     static struct od_controller values;
  *     values = od_controller_defaults;
  *     od_init(&od, &od_controller_table, &values, &hooks, app);
  *
- * Hooks let the application compute a value when it is read, veto a write, learn of a write, and
- * stream DOMAIN data. All hooks run in the context of the caller (SDO: main loop); each may be NULL.
- * Fields that another context writes and that the processor does not load in one instruction (64
- * bits) should be copied by the read hook under the port's lock.
+ * By hooks the application computes a value when it is read, refuses a write, is notified of a write, and moves DOMAIN
+ * data. Each hook may be NULL and runs in the context of the caller (SDO: main loop). The read hook should copy fields of
+ * 64 bits that another context writes, under the port's lock, because the processor loads them in two instructions.
  *
  * od_find, od_size are pure. The rest: main loop.
  */

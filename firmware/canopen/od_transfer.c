@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/od_transfer.h (see there): one object of a dictionary, written or read in pieces, as an SDO
- * transfer brings or takes it. */
+/* Implements canopen/od_transfer.h: writes or reads one object of a dictionary piece by piece. */
 #include "canopen/od_transfer.h"
 
 #include <stddef.h>

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* od_transfer: one object of a dictionary, written or read in pieces, as an SDO transfer brings or takes it.
+/* od_transfer: writes or reads one object of a dictionary piece by piece. It joins the segments and blocks of sdo_server to
+ * the object dictionary (canopen/od).
  *
  *     write: od_transfer_begin_write, od_transfer_put as often as needed, od_transfer_finish_write
  *     read:  od_transfer_begin_read,  od_transfer_get as often as needed
- *     od_transfer_drop where a transfer ends before that, or one of these gave an abort code
+ *     od_transfer_drop if a transfer ends early, or one of these functions returned an abort code
  *
  * A value other than a DOMAIN is collected and written in one piece at the end, so that an incomplete transfer changes
  * nothing. A value that is read is copied at the beginning, so that all its pieces are of one moment. DOMAIN data goes

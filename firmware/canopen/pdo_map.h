@@ -2,12 +2,12 @@
 /* pdo_map: one remappable PDO of a device (CiA 301, 7.2.2, objects 0x1400 ... 0x1BFF): parameters, mapping, packing,
  * times.
  * 
- * The parameters live in the object dictionary, with whatever sub-indices its EDS gives them; this module checks writes
- * to them (pdo_map_write, from the od's write hook), takes them over (pdo_map_written) and keeps the mapping ready for
- * use: entries and bytes, without a search. The direction follows from the index: 0x1400 ... are received, 0x1800 ...
- * sent. What may be mapped is what the EDS says (PDOMapping), readable to be sent, writable to be received. Values go
- * past the od's hooks: the application brings fields up to date before packing, and checks received ones when it uses
- * them.
+ * Used by the simulated drives and the I/O module. The parameters are in the object dictionary, with the sub-indices of
+ * its EDS. This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
+ * (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of 0x1400 ... are
+ * received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object must be readable
+ * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application updates
+ * fields before packing, and checks received values when it uses them.
  * 
  * Rules for writes, with their abort codes:
  *   COB-ID (sub 1)      another identifier while the PDO is valid (bit 31 clear), an identifier of

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/sdo_client.h (see there): reads and writes values of other nodes, expedited or segmented, as
- * a polled machine. */
+/* Implements canopen/sdo_client.h: reads and writes objects of other nodes. */
 #include "canopen/sdo_client.h"
 
 #include <string.h>

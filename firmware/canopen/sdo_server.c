@@ -303,7 +303,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
 }
 
 /* While idle: true for each segment that is left of a block whose transfer the server broke off. */
-static bool block_download_straggler(struct sdo_server *s, const uint8_t *data)
+static bool block_download_late_segment(struct sdo_server *s, const uint8_t *data)
 {
     uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
     bool late_segment = s->received != 0 && sequence == s->received + 1;
@@ -651,7 +651,7 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     if (server->state == SDO_SERVER_BLOCK_DOWNLOAD && !restarts(server, in->data)) {
         return block_download_segment(server, in->data, out);
     }
-    if (server->state == SDO_SERVER_IDLE && block_download_straggler(server, in->data)) {
+    if (server->state == SDO_SERVER_IDLE && block_download_late_segment(server, in->data)) {
         return false;
     }
     if (is_initiate(in->data)) {

@@ -1,31 +1,35 @@
 /* SPDX-License-Identifier: MIT */
-/* sdo_server: gives an object dictionary to one SDO client (CiA 301, 7.2.4).
+/* sdo_server: lets one SDO client at a time read and write an object dictionary (CiA 301, 7.2.4). Used by the controller and
+ * by each simulated drive. No I/O: frames in, frames out.
  * 
  * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client reads): expedited,
  * segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.
  * 
- * One transfer at a time, of one client. While it is under way an initiate request is refused with SDO_ABORT_LOCAL and
- * its own object, and the transfer goes on: the request comes from another client. Only a client that has moved nothing
- * yet may begin again, with the same object: it has lost an answer. One that is in the middle aborts first; one that is
- * gone is forgotten after the timeout. An abort counts when it names the object of the transfer, or none (index 0).
+ * One transfer at a time. During a transfer an initiate request comes from another client: it is refused with
+ * SDO_ABORT_LOCAL and the object of the request, and the transfer continues. There is one exception: before any data has
+ * moved, an initiate request for the same object restarts the transfer, because its client has lost a response. After
+ * that, a client has to abort before it begins again. A client that sends nothing is dropped after the timeout. An abort
+ * is accepted if it names the object of the transfer, or no object (index 0).
  * 
- * A command to stop gets through: an expedited write of one byte that the dictionary's hook `urgent` names is carried
- * out and answered beside the transfer under way, which goes on. Its client has to disregard that answer, which names
- * another object than its own. Within a block, such a write is distinguished from segments by all its eight bytes.
+ * Stop commands are executed during a transfer: the hook `urgent` of the dictionary names them (expedited writes of one
+ * byte). The server executes and answers such a write, and the transfer continues. The client of the transfer has to
+ * ignore this response, which names another object. Within a block, all eight bytes of such a write distinguish it from a
+ * segment.
  * 
- * Within a block each frame is a segment by its number. A frame that has the form of a request for an existing object,
- * and whose number is not one of the next two, is refused as the request of another client. A frame of another client
- * with just the next number is taken for a segment. The true segment, with the same number and other bytes, then ends
- * the transfer; if it is lost, the CRC does.
+ * Within a block, frames are segments with a number. A frame is refused as the request of another client if it has the
+ * form of a request for an existing object and its number is not one of the next two. A frame of another client that
+ * happens to have the next number is taken for a segment. The transfer then fails at the true segment, which has the same
+ * number and other bytes, or, if that is lost, at the CRC.
  * 
- * Loss within a block: segments after a gap are ignored and the answer at the block's end names the last good one, from
- * where the client repeats. When the block's last segment itself is lost, the server gives that answer after half of
- * the timeout; a client that only paused repeats a few segments. Loss of a whole block ends in the timeout.
+ * Lost segments: the server ignores segments after a gap. Its response at the end of the block names the last good
+ * segment, from which the client repeats. If the last segment of a block is lost, the server sends this response after
+ * half of the timeout; a client that only paused then repeats a few segments. A block that is lost as a whole ends in the
+ * timeout.
  * 
- * A client that sends a block does not listen: after an abort by the server the rest of the block still comes. Frames
- * whose numbers go on from the last segment are therefore no requests.
+ * A client receives nothing while it sends a block. So after an abort by the server the rest of the block still comes.
+ * Frames whose numbers continue from the last segment are therefore not taken for requests.
  * 
- * Frames in, frames out. All functions: main loop (the hooks may take long); the receive interrupt only queues. */
+ * All functions: main loop (the hooks may take long); the receive interrupt only queues. */
 #ifndef CANOPEN_SDO_SERVER_H
 #define CANOPEN_SDO_SERVER_H
 

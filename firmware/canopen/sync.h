@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* sync: SYNC with counter (CiA 301, 7.2.5; objects 0x1005, 0x1006, 0x1019). */
+/*
+ * sync: produces and consumes SYNC frames with a counter (CiA 301, 7.2.5; objects 0x1005, 0x1006, 0x1019). The tick of the
+ * controller is the producer, each simulated drive a consumer. The caller decides when a SYNC is due. No I/O.
+ */
 #ifndef CANOPEN_SYNC_H
 #define CANOPEN_SYNC_H
 
@@ -8,7 +11,7 @@
 
 #include "can/can_frame.h"
 
-/* Counter overflow values that CiA 301 allows: 0 (no counter), 2 ... 240. */
+/* Values of 0x1019 that CiA 301 allows: 0 (no counter), 2 ... 240. */
 #define SYNC_OVERFLOW_MAX 240u
 
 struct sync_producer {
@@ -19,7 +22,7 @@ struct sync_producer {
 /* Timer (or before it starts). `overflow` is 0x1019. */
 void sync_producer_init(struct sync_producer *producer, uint8_t overflow);
 
-/* The next SYNC: 1 ... overflow, then 1 again. It is the producer's until the next call. Timer. */
+/* The next SYNC; its counter goes from 1 to the overflow value, then from 1 again. Valid until the next call. Timer. */
 const struct can_msg *sync_producer_next(struct sync_producer *producer);
 
 struct sync_consumer {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The rules of docs/reference/protocol.md 1.8: events on the path. Used by program_check. Main loop. */
+/* Checks the events of a program: outputs that switch on the path (docs/reference/protocol.md 1.8). A part of
+ * program_check. Pure, main loop. */
 #ifndef HODOGRAPH_CORE_EVENT_CHECK_H
 #define HODOGRAPH_CORE_EVENT_CHECK_H
 

@@ -19,7 +19,7 @@ static void set_slope(struct feed_piece *f)
     }
     const int shift = f->slope_shift - 12 - f->exponent;
     f->feed_factor = shift < 0 ? 1 : shift < 31 ? (int32_t)1 << shift : INT32_MAX;
-    f->feed_drop = shift >= 0 ? 0 : shift < -31 ? 31 : -shift;
+    f->feed_right_shift = shift >= 0 ? 0 : shift < -31 ? 31 : -shift;
 }
 
 void feed_piece_set(void *piece, const struct program_piece *from)
@@ -57,7 +57,7 @@ void feed_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s)
     arc =
         qmath_mul_unsigned(arc, tau) + (2 * qmath_mul_hi(slope, low_q63) >> (32 - f->slope_shift));
     out->arc_length_q40_mm = f->start_q40_mm + qmath_round(arc, 4);
-    out->feed_q32_mm_s = qmath_product(slope >> f->feed_drop, f->feed_factor);
+    out->feed_q32_mm_s = qmath_product(slope >> f->feed_right_shift, f->feed_factor);
 }
 
 /* The derivative of the slope, less three bits so that a coefficient times 6 fits. */

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Evaluating a feed piece in integers: arc length and feed at a time (docs/theory/numerics.md section 9,
- * "Feed"). Used by the fixed and the float kernel. Pure, tick context.
+ * Evaluates a feed piece in integers: arc length, feed and acceleration at a time (docs/theory/numerics.md section 9,
+ * "Feed"). Part of the fixed and the float kernel: feed_piece_set when coefficients are precomputed (main loop), the
+ * others in the tick. Pure.
  */
 #ifndef HODOGRAPH_CORE_FEED_PIECE_H
 #define HODOGRAPH_CORE_FEED_PIECE_H
@@ -13,11 +14,13 @@
 struct feed_piece {
     int64_t start_q40_mm;
     int64_t c_q44_mm[7];
-    int32_t slope[7];    /* coefficients of the derivative in tau, */
-    int32_t slope_shift; /* 2^slope_shift times these in q44 */
-    int32_t feed_factor; /* these in 2^-32 mm/s: times 2^0 ... 2^30, */
-    int32_t feed_drop;   /* or without so many bits */
-    int32_t exponent;    /* tau = t / 2^exponent */
+    /* Derivative by tau: its coefficients are slope[k] 2^slope_shift in q44 mm. */
+    int32_t slope[7];
+    int32_t slope_shift;
+    /* Feed in q32 mm/s = (slope >> feed_right_shift) * feed_factor. One of them is neutral: 0, or 1. */
+    int32_t feed_factor;      /* 2^0 ... 2^30, or 2^31 - 1 where the feed saturates */
+    int32_t feed_right_shift; /* 0 ... 31 */
+    int32_t exponent;         /* tau = t / 2^exponent */
 };
 
 struct feed_point {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a kernel is: how a segment and a feed piece are made ready and then evaluated. core/interpolator.h drives one of them.
+ * The interface of a kernel: it precomputes the coefficients of segments and feed pieces, and evaluates them. Its callers
+ * are core/coefficients (precomputing, main loop) and core/interpolator (evaluating, tick).
  *
- * An image links the kernels that it names: its `kernels_linked` is core/kernels_all.c on a host, one of
- * firmware/targets/kernels_*.c on a microcontroller. Pure, any context.
+ * `kernels_linked` lists the kernels of an image: core/kernels_all.c on a host, one of firmware/targets/kernels_*.c on a
+ * microcontroller. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_H
 #define HODOGRAPH_CORE_KERNEL_H
@@ -24,37 +25,37 @@ enum kernel_number {
 
 #define KERNELS 3u
 
-/* For the parts of a tick that a kernel has in common for planar and spatial programs: no call is left in either. */
+/* KERNEL_INLINE: for code that the planar and the spatial version of a kernel share. It is inlined into both, so a tick has
+ * no additional call. KERNEL_APART: for code of one version only, which stays a function. */
 #if defined(__GNUC__)
 #define KERNEL_INLINE static inline __attribute__((always_inline))
-#define KERNEL_APART                                                                               \
-    __attribute__((noinline)) /* and what only some of them contain, a function of its own */
+#define KERNEL_APART  __attribute__((noinline))
 #else
 #define KERNEL_INLINE static inline
 #define KERNEL_APART
 #endif
 
-/* Contents of a piece or segment that was made ready are the kernel's own: `*_size` bytes, aligned to 8. Results stand
- * before 64-bit arguments: so all of them are passed in registers on a 32-bit Arm. */
+/* Precomputed coefficients are private to the kernel: `*_size` bytes, aligned to 8. Result parameters come before 64-bit
+ * arguments, so that a 32-bit Arm passes all of them in registers. */
 
 /* How a kernel evaluates the path of a program. */
 struct kernel_path {
-    size_t segment_size; /* of three path axes at most; */
+    size_t segment_size; /* bytes for up to three path axes, */
     size_t extra_size;   /* and for each extra axis */
     void (*segment_set)(void *segment, const struct ph_segment *from);
-    /* At an arc length of this segment (from the start of the program): as many coordinates as the program has path axes. */
+    /* The point at an arc length of this segment (from the start of the program): a coordinate for each path axis. */
     void (*segment_at)(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm);
 };
 
 struct kernel {
     size_t piece_size;
     void (*piece_set)(void *piece, const struct program_piece *from);
-    /* At local time t, 0 <= t < duration. */
+    /* Arc length and feed at local time t, 0 <= t < duration. */
     void (*piece_at)(const void *piece, struct feed_point *out, uint64_t t_q42_s);
-    /* F'' there, in 2^-40 mm/s^2. */
+    /* Path acceleration F'' at local time t, in 2^-40 mm/s^2. */
     int64_t (*piece_acceleration)(const void *piece, uint64_t t_q42_s);
-    struct kernel_path plane; /* of a planar program, */
-    struct kernel_path space; /* and of a spatial one */
+    struct kernel_path plane; /* for planar programs */
+    struct kernel_path space; /* for spatial programs */
 };
 
 static inline const struct kernel_path *kernel_path(const struct kernel *kernel,

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Bounds of how the axes move along the path, for a stretch of it: the first three derivatives of each axis by arc
- * length.
+ * Bounds of the first three derivatives of each axis by arc length, on a stretch of the path. Used by the proof of the
+ * stops (core/brake_check, for `hodograph verify`).
  *
- * Each segment is cut into equal parts, 8 to 64, the shorter the stretch the more. For a part the derivatives at both
- * ends are kept, and by how much a derivative may differ from the straight line between them, which follows from a
- * bound of its second derivative (core/path_motion). The parts used last are kept, since the next stretch is near.
+ * Each segment is cut into 8 to 64 equal parts. A shorter stretch takes smaller parts. Stored for each part are the
+ * derivatives at both ends and their greatest difference from the straight line between the ends. This difference
+ * follows from a bound of the second derivative (core/path_motion). The parts used last stay stored, because the next
+ * stretch is near.
  *
- * Integers only (core/real.h). Main loop; the caller lends the memory, some 2.5 KiB.
+ * Integers only (core/real.h). Main loop. The caller provides the memory, about 2.5 KiB.
  */
 #ifndef HODOGRAPH_CORE_PATH_BOUNDS_H
 #define HODOGRAPH_CORE_PATH_BOUNDS_H

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The stop table of a program (docs/reference/protocol.md 1.4): how long a stop can take, and whether the bounds in the
- * table cover that. The table's bounds are not trusted: they are computed anew from the feed pieces, the override
- * bounds and the stop parameters (docs/theory/numerics.md section 7, "Stops"). Integer arithmetic; every value is
- * rounded so that a bound is never too short.
+ * Checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it cover the longest
+ * stop? The bounds are computed anew from the feed pieces, the override bounds and the stop parameters
+ * (docs/theory/numerics.md section 7, "Stops"). A part of program_check; the host tools compute the table with it.
  *
- * The table is gone through from the last piece to the first, since a stop that cannot brake in a piece goes on into
- * the next. About 10 000 instructions per piece and kind. Main loop.
+ * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.
+ * Integer arithmetic; every value is rounded so that a bound is never too short. About 10 000 instructions for each
+ * piece and kind of stop. Pure, main loop.
  */
 #ifndef HODOGRAPH_CORE_STOP_CHECK_H
 #define HODOGRAPH_CORE_STOP_CHECK_H
@@ -16,15 +16,16 @@
 #include "core/program.h"
 #include "core/program_check.h"
 
-/* Ticks of a stop that are not in the continuous curve: until the command takes effect, and the excess of a brake in
- * whole ticks (tests/unit/test_path_brake.c). */
+/* Ticks that a stop takes beyond its continuous curve: until the command takes effect, and because it brakes in whole
+ * ticks (tests/unit/test_path_brake.c). */
 #define STOP_TICKS 9u
-/* Time in which the piece whose numbers count may still change, in periods of program time: three ticks at 200 %. */
+/* The stop parameters that apply are those of a piece that begins within this time: three ticks at 200 %, in periods of
+ * program time. */
 #define STOP_WINDOW_TICKS 6u
 #define STOP_WINDOW                                                                                \
     8 /* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
 
-/* From the command to rest, held at UINT32_MAX. */
+/* From the command to standstill; saturates at UINT32_MAX. */
 struct stop_bound {
     uint32_t time_us;
     uint32_t distance_um;

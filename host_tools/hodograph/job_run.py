@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A job on the bus: its sections one after the other, and what happens at rest between them.
+"""Runs a job on the bus: its sections one after the other, and the machine commands at rest between them.
 
-Each section is a program: it is uploaded where the axes stand, started, recorded and analysed. Dwells are waited for,
-program stops and tool changes are left to the operator, messages are printed.
+For `hodograph run` and the API; `stream/sender` uses the part for rests. Each section is one program: it is uploaded
+where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator at
+program stops and tool changes, and prints messages.
 """
 
 from __future__ import annotations
@@ -24,20 +25,23 @@ from .native import NativeProgram
 from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
 
-_LOOK_S = 0.1
+_CHECK_S = 0.1
 _START_COUNTS = 2
-"""So far off its start a section begins at once: the rounding of the end of the one before."""
+"""A section begins without a move to its start if no axis is farther from it: the rounding of the last end."""
 
 
 class NoRoomError(PlanError):
     """A section takes more memory than the controller has for a program."""
 
 
-Look = Callable[[], None]
-"""Waits a little and raises what has gone wrong on the bus meanwhile."""
+BusCheck = Callable[[], None]
+"""Waits 0.1 s. Raises RunError for a fault, BusError when the drives are off or the controller is gone."""
 
-Operator = Callable[[str, Look], None]
-"""Shows the operator why the job stops, and returns when it may go on; calls the second one while it waits."""
+Operator = Callable[[str, BusCheck], None]
+"""Shows the operator why the job stops (file, line, code), and returns when the job may continue.
+
+Has to call the check again and again while it waits.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +83,9 @@ class JobRun:
 
 
 def prepared(job: Job, kernel: str) -> PreparedJob:
-    """Plans and compiles every section, so that whatever can be wrong shows before anything moves.
+    """Plans and compiles every section, so that every error is found before anything moves.
 
-    Raises InputError, and PlanError: a section that no controller of this machine has room for.
+    Raises InputError, and PlanError (NoRoomError: a section does not fit the memory of the machine's controller).
     """
     begin = perf_counter()
     programs = []
@@ -100,14 +104,14 @@ def prepared(job: Job, kernel: str) -> PreparedJob:
 
 
 def operator_stops(job: Job) -> Iterator[tuple[int, str]]:
-    """Where a job waits for the operator: source line, and the code of it."""
+    """The program stops and tool changes of a job, as source line and code ("M0", "M1", "M6 T2")."""
     for section in job.sections:
-        yield from stops(section.before)
-    yield from stops(job.after)
+        yield from operator_stops_of(section.before)
+    yield from operator_stops_of(job.after)
 
 
-def stops(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
-    """The same of some commands."""
+def operator_stops_of(commands: Sequence[Command]) -> Iterator[tuple[int, str]]:
+    """The program stops and tool changes among some commands."""
     for command in commands:
         if isinstance(command, ProgramStop):
             yield command.line, "M1" if command.optional else "M0"
@@ -126,10 +130,10 @@ def run_job(
 ) -> JobRun:
     """Runs a job from wherever the axes stand.
 
-    record  keeps the frames; of a job with several sections one file each, NAME.1.log, NAME.2.log, …
+    record  file for the frames; a job with several sections writes one file each: NAME.1.log, NAME.2.log, …
 
-    A job ends at a fault, a stop, or a setpoint that jumps. Where a section came to its end but its recording is not
-    that of its program (a hold, a feed override), the job goes on, and ends with that error.
+    A job ends at a fault, a stop, or a setpoint step beyond the limits. If a section reaches its end but its recording
+    differs from its program (a hold, a feed override), the job continues and raises this error at its end.
     Raises RefusedError, BusError and RunError, naming file and line.
     """
     job = made.job
@@ -139,7 +143,7 @@ def run_job(
     passed = 0
     _to_start(at, job.sections[0], made, made.programs[0], unhomed)
     for number, (section, program) in enumerate(zip(job.sections, made.programs, strict=True), 1):
-        at_rest(at, job.file, section.before, operator)
+        execute_at_rest(at, job.file, section.before, operator)
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
         # No move, unless an operator moved the axes during the stop.
         _to_start(at, section, made, program, unhomed)
@@ -153,7 +157,7 @@ def run_job(
         )
         _require_end(at, section, made, program, place)
         passed += program.ticks
-        say(at, job.file, [command for _, command in section.events])
+        report_messages(at, job.file, [command for _, command in section.events])
         try:
             file = _record_of(record, number, job)
             machine = section.pipeline.machine
@@ -162,7 +166,7 @@ def run_job(
             raise RunError(f"{place}: {error}") from None
         except RunError as error:
             failure = failure or RunError(f"{place}: {error}")
-    at_rest(at, job.file, job.after, operator)
+    execute_at_rest(at, job.file, job.after, operator)
     if failure is not None:
         raise failure
     motion = JobMotion(job, tuple(run.motion for run in runs), made.planning_s)
@@ -180,16 +184,16 @@ def _record_of(record: Path | None, number: int, job: Job) -> Path | None:
 
 
 def _place(section: JobSection, made: PreparedJob, program: NativeProgram, tick: int) -> list[int]:
-    """Where a tick of a section has all axes of the path, in counts."""
+    """Setpoint of all axes of the path at a tick of a section, in counts."""
     moved, machine = section.pipeline.machine, made.job.machine
-    _, setpoints = program.setpoints(made.kernel, moved.path_counts, tick, 1)
+    setpoint = program.counts_at(made.kernel, moved.path_counts, tick)
     stands = section.standing_mm + machine.offset_mm[: moved.first_axis]
     counts = np.rint(stands * machine.path_counts[: moved.first_axis])
-    return [*counts.astype(int).tolist(), *setpoints[0].tolist()]
+    return [*counts.astype(int).tolist(), *setpoint]
 
 
 def _off_counts(at: RunSession, place: list[int]) -> int:
-    """How far the targets are from a place, in counts of the axis that is farthest."""
+    """Greatest distance of an axis from a place, in counts."""
     return int(np.abs(np.subtract(at.controller.targets(len(place)), place)).max())
 
 
@@ -210,18 +214,20 @@ def _require_end(
         raise RunError(f"{place}: stopped before its end: the job ends here")
 
 
-def at_rest(at: RunSession, file: Path, commands: Sequence[Command], operator: Operator) -> None:
-    """What happens at rest, in its order. Commands that the machine has nothing for are passed."""
+def execute_at_rest(
+    at: RunSession, file: Path, commands: Sequence[Command], operator: Operator
+) -> None:
+    """Executes the commands at a rest in their order. Commands for which the machine has no device are skipped."""
     for command in commands:
-        say(at, file, [command])
+        report_messages(at, file, [command])
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
-        for line, code in stops([command]):
-            operator(f"{file}:{line}: {code}", lambda: _look(at, _LOOK_S))
+        for line, code in operator_stops_of([command]):
+            operator(f"{file}:{line}: {code}", lambda: _check_bus(at, _CHECK_S))
 
 
-def say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
-    """Reports the messages among commands. Those within a section are reported at its end."""
+def report_messages(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
+    """Prints the messages among some commands. Those within a section are printed at its end."""
     for command in commands:
         if isinstance(command, Message):
             at.note(f"{file}:{command.line}: {command.text}")
@@ -230,10 +236,10 @@ def say(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
 def _dwell(at: RunSession, duration_s: float) -> None:
     end_s = at.controller.clock.now_s() + duration_s
     while (left_s := end_s - at.controller.clock.now_s()) > 0.0:
-        _look(at, min(left_s, _LOOK_S))
+        _check_bus(at, min(left_s, _CHECK_S))
 
 
-def _look(at: RunSession, wait_s: float) -> None:
+def _check_bus(at: RunSession, wait_s: float) -> None:
     """Waits at rest. Raises RunError for a fault, BusError: the drives are off, or the controller is gone."""
     if at.rig is not None:
         at.rig.check()

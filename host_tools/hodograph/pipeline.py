@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -573,14 +573,41 @@ def _require_one_way(file: PathFile, moved: NDArray[np.float64], closed: bool) -
 
 
 def start_counts(pipeline: Pipeline, kernel: str) -> list[int]:
-    """Where all axes of the machine's path stand at the start of the program, in counts."""
-    whole, standing = pipeline.whole_machine, pipeline.standing_mm
-    _, first = pipeline.accepted.setpoints(kernel, pipeline.machine.path_counts, 0, 1)
+    """Where all axes of the machine's path stand at the start of the program of a pipeline, in counts."""
+    return program_start_counts(
+        pipeline.accepted, pipeline.whole_machine, kernel, pipeline.standing_mm
+    )
+
+
+def program_start_counts(
+    program: NativeProgram, whole: Machine, kernel: str, standing_mm: Sequence[float] | None = None
+) -> list[int]:
+    """Where all axes of a machine's path stand at the start of a program, in counts.
+
+    whole        the machine with all axes of its path
+    standing_mm  where axes before those of the program stand, without the work offset; None: not known
+
+    Raises InputError: the program has more path axes than the machine, or turns axes alone and it is not known where
+    the others stand.
+    """
+    if program.first_axis and not standing_mm:
+        raise InputError(
+            "the program turns axes alone, and does not hold where x, y and z stand: give its path file, or "
+            "hodograph run its toolpath"
+        )
+    if program.axis_count > len(whole.path_axes):
+        raise InputError(
+            f"the program has {program.axis_count} path axes, {whole.file} has {len(whole.path_axes)}: "
+            "compile its path for this machine"
+        )
+    moved = whole.turning if program.first_axis else whole
     before = [
         round((at + offset) * counts)
-        for at, offset, counts in zip(standing, whole.offset_mm, whole.path_counts, strict=False)
+        for at, offset, counts in zip(
+            standing_mm or (), whole.offset_mm, whole.path_counts, strict=False
+        )
     ]
-    return [*before, *first[0].tolist()]
+    return [*before, *program.counts_at(kernel, moved.path_counts)]
 
 
 def _drawn_by(path: SpacePathSpec, moved: NDArray[np.float64]) -> PathSpec | SpacePathSpec:

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * pacing: when a request of the emulated board is answered, so that its ticks come as those of the Linux port do
- * (port/linux/schedule.h). Pure arithmetic on monotonic nanoseconds.
+ * pacing: decides when the gateway replies to a request of the emulated board, so that the ticks of the board come at the
+ * same times as those of the Linux port (port/linux/schedule.h). Used by gateway/fifo_side. Pure arithmetic on monotonic
+ * nanoseconds.
  *
- * The board's clock stands still while it waits for the reply to a tick's request; so the reply is what makes its next tick due.
+ * The clock of the board stands while it waits for the reply to the request of a tick. So the next tick is due with the
+ * reply.
  */
 #ifndef GATEWAY_PACING_H
 #define GATEWAY_PACING_H

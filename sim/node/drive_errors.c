@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_errors.h (see there): the errors of a simulated drive. */
+/* Implements node/drive_errors.h: reports errors of a simulated drive. */
 #include "node/drive_errors.h"
 
 enum { HISTORY = 8 };

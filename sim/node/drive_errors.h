@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_errors: the errors of a simulated drive: error code 0x603F, error register 0x1001, history 0x1003, EMCY. What an
- * error does to the motion is the servo's. All in one context.
+/* drive_errors: reports errors of a simulated drive: error code 0x603F, error register 0x1001, history 0x1003, EMCY. It does
+ * not change the motion: the reaction to an error is in node/servo. All in one context.
  */
 #ifndef NODE_DRIVE_ERRORS_H
 #define NODE_DRIVE_ERRORS_H
@@ -20,7 +20,7 @@ struct drive_errors {
 /* No error. Clears 0x1001 and 0x1003; `values` must stay valid. */
 void drive_errors_init(struct drive_errors *errors, uint8_t id, struct od_drive *values);
 
-/* A new error, with the first byte of its EMCY's detail. */
+/* Reports a new error. `detail`: first manufacturer byte of its EMCY. */
 void drive_errors_report(struct drive_errors *errors, uint16_t code, uint8_t detail);
 
 /* A frame for RPDO number `i` (from 0) was too short; only the first one of a series is reported. */
@@ -31,7 +31,7 @@ void drive_errors_rpdo_short(struct drive_errors *errors, int i, const struct pd
  * and no other communication error is present. */
 void drive_errors_rpdo_good(struct drive_errors *errors, int i);
 
-/* All errors are gone. */
+/* Ends all errors. */
 void drive_errors_clear(struct drive_errors *errors);
 
 #endif

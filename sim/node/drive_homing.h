@@ -7,8 +7,8 @@
  *     21, 22   the mirror of 19, 20
  *     35, 37   home is here
  *
- * Edges are seen once a period: the slow speed decides how exact home is. One period is drive_homing_move, then the caller
- * reads the switches, then drive_homing_evaluate. All in one context.
+ * Switches are read once a period, so the slow speed decides how exact home is. In each period the servo calls
+ * drive_homing_move, reads the switches, then calls drive_homing_evaluate. All in one context.
  */
 #ifndef NODE_DRIVE_HOMING_H
 #define NODE_DRIVE_HOMING_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* drives: the simulated drives of one process on one SocketCAN bus, and its I/O module.
+/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program hodograph-drive.
  *
- * All in one thread. Bus errors are kept in `failed`; the caller checks it. Frames that the interface has no room for
- * are lost.
+ * It reads frames from the socket, gives them to the nodes, and sends what they return. All functions in one thread. An
+ * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no space are lost.
  */
 #ifndef NODE_DRIVES_H
 #define NODE_DRIVES_H

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* equipment: what stands around the motor of a simulated axis: switches, ratings, brake, friction.
+/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated drive
+ * (node/drive_node, node/servo).
  *
- * Switches sit at places of the machine, in the coordinates that the axis has at power-on; homing
- * does not move them. Pure functions.
+ * Switches have places in the coordinates that the axis has at power-on. Homing changes the coordinates, not the
+ * switches. Pure functions.
  */
 #ifndef NODE_EQUIPMENT_H
 #define NODE_EQUIPMENT_H
@@ -17,7 +18,7 @@
 #define EQUIPMENT_INPUT_POSITIVE UINT32_C(2)
 #define EQUIPMENT_INPUT_HOME     UINT32_C(4)
 
-/* Where there is no switch. */
+/* The place of a switch that does not exist. */
 #define EQUIPMENT_NOWHERE 1e12
 
 struct equipment {

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time; paper.md
- * section 5:
+/* pdff: one sample of the servo loop PDFF (pseudo-derivative feedback with feedforward), as in section 5 of the paper
+ * (docs/validation/paper.md). The axis model (plant/drive) calls it at the rate of the loop. Pure.
  *
  *     speed_ref = k_pp (x_com - x_act) + k_pf d(x_com)/dt
  *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
- * The integral counts the present sample too (backward Euler; forward Euler: not before the next sample) and stands
- * still while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
+ * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward Euler).
+ * It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H

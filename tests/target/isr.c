@@ -177,7 +177,7 @@ static void period(void)
     const uint32_t period_us = machine.config.period_us;
     bus.time_ns += period_us * 1000u;
     bus.time_us += period_us;
-    machine_attend(&machine);
+    machine_note_main_loop(&machine);
     if (machine_on_path(&machine)) {
         timed_isr(bus.time_us);
     } else {

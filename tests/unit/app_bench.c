@@ -166,7 +166,7 @@ static void beat(struct app_bench *bench)
 }
 
 /* As a port does that waits for answers. */
-void app_bench_period_unattended(struct app_bench *bench)
+void app_bench_period_without_main_loop(struct app_bench *bench)
 {
     const bool guard_over = fake_port_awaited_us() > 0u && !fake_port_ready();
     fake_port_advance_us(guard_over ? fake_port_awaited_us() : bench->controller.config.period_us);
@@ -181,7 +181,7 @@ void app_bench_period_unattended(struct app_bench *bench)
 
 void app_bench_period(struct app_bench *bench)
 {
-    app_bench_period_unattended(bench);
+    app_bench_period_without_main_loop(bench);
     app_bench_settle(bench);
 }
 

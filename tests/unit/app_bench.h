@@ -43,7 +43,7 @@ void app_bench_power_cycle(struct app_bench *bench);
 
 /* One period: tick, answers, main loop. */
 void app_bench_period(struct app_bench *bench);
-void app_bench_period_unattended(struct app_bench *bench); /* without the main loop */
+void app_bench_period_without_main_loop(struct app_bench *bench); /* without the main loop */
 void app_bench_periods(struct app_bench *bench, uint32_t count);
 
 /* Periods until the state; fails the test when it takes more than `most`. Returns how many. */

@@ -1082,16 +1082,16 @@ static void test_with_drives_off_the_host_may_go(void)
 static void test_a_main_loop_that_stands_still_stops_the_axes_on_the_path(void)
 {
     run_some(100);
-    TEST_ASSERT_EQUAL_UINT32(0, machine()->unattended_us);
+    TEST_ASSERT_EQUAL_UINT32(0, machine()->main_loop_stall_us);
     fake_port_advance_us(1000);
     fake_port_tick(0);
-    TEST_ASSERT_EQUAL_UINT32(1000, machine()->unattended_us);
+    TEST_ASSERT_EQUAL_UINT32(1000, machine()->main_loop_stall_us);
     app_bench_period(&bench);
-    TEST_ASSERT_EQUAL_UINT32(0, machine()->unattended_us);
+    TEST_ASSERT_EQUAL_UINT32(0, machine()->main_loop_stall_us);
     TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
-    machine()->unattended_us = MACHINE_UNATTENDED_US + 1u;
+    machine()->main_loop_stall_us = MACHINE_MAIN_LOOP_STALL_US + 1u;
     app_bench_period(&bench);
-    expect_fault(FAULT_UNATTENDED, 0);
+    expect_fault(FAULT_MAIN_LOOP_STALL, 0);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_BRAKING, machine()->fault_phase);
     until_phase(MACHINE_FAULT_OFF, 1000);
     TEST_ASSERT_EQUAL_UINT32(0, drive(0)->cut_moving);
@@ -1103,7 +1103,7 @@ static void test_at_standstill_the_main_loop_may_take_its_time(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     switch_on();
-    machine()->unattended_us = MACHINE_UNATTENDED_US + 1u;
+    machine()->main_loop_stall_us = MACHINE_MAIN_LOOP_STALL_US + 1u;
     app_bench_period(&bench);
     TEST_ASSERT_EQUAL_INT(MACHINE_READY, machine()->state);
 }

@@ -576,7 +576,7 @@ static void test_a_fault_ends_the_job_on_its_path(void)
         command(COMMAND_START);
         app_bench_periods(&bench, tick);
         port_lock();
-        machine_raise(&bench.controller.machine, FAULT_UNATTENDED, 0, 0);
+        machine_raise(&bench.controller.machine, FAULT_MAIN_LOOP_STALL, 0, 0);
         port_unlock();
         app_bench_periods(&bench, 1200);
         TEST_ASSERT_EQUAL_INT(MACHINE_FAULT_OFF, bench.controller.machine.fault_phase);
@@ -792,8 +792,8 @@ static void test_a_main_loop_that_makes_no_records(void)
     command(COMMAND_START);
     uint32_t ticks = 0;
     while (bench.controller.machine.state == MACHINE_RUNNING) {
-        TEST_ASSERT_TRUE(ticks++ < MACHINE_UNATTENDED_US / 1000u);
-        app_bench_period_unattended(&bench);
+        TEST_ASSERT_TRUE(ticks++ < MACHINE_MAIN_LOOP_STALL_US / 1000u);
+        app_bench_period_without_main_loop(&bench);
     }
     TEST_ASSERT_TRUE(ticks > 600u);
     TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, bench.controller.machine.state);
@@ -810,7 +810,7 @@ static void test_the_motion_asks_for_records(void)
     command(COMMAND_START);
     uint32_t asked = 0;
     for (uint32_t k = 0; k < 1000u; ++k) {
-        app_bench_period_unattended(&bench);
+        app_bench_period_without_main_loop(&bench);
         if (motion_wants_records(&bench.controller.machine.motion)) {
             asked++;
             app_bench_settle(&bench);

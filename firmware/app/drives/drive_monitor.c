@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_monitor.h (see there): heartbeats and emergency messages of the drives, and what
- * they mean for the zero of a homed axis. */
+/* Implements app/drives/drive_monitor.h: supervises heartbeats and emergency messages. */
 #include "app/drives/drive_monitor.h"
 
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_polling.h (see there): reads a few times a second what no PDO carries. */
+/* Implements app/drives/drive_polling.h: reads values of the drives that are in no PDO. */
 #include "app/drives/drive_polling.h"
 
 #include <string.h>
@@ -22,7 +22,7 @@ bool drive_polling_receive(struct drive_polling *polling, const struct can_msg *
     return sdo_client_receive(&polling->client, in, out);
 }
 
-/* A refusal or a silence leaves the last value: supervision is not the task of this module. */
+/* A refused or unanswered read keeps the last value. Supervision is the task of other modules. */
 static void take_value(const struct drive_polling *polling, struct machine *machine)
 {
     port_lock();

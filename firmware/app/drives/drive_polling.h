@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_polling: reads a few times a second what no PDO carries: following error (0x60F4) and, where a drive has no
- * TPDO3 for them, digital inputs (0x60FD). Axis after axis by SDO, each about DRIVE_POLLING_US apart.
+ * drive_polling: reads values of the drives that are in no PDO, for display only: following error (0x60F4), and digital
+ * inputs (0x60FD) of drives without a TPDO3 for them. It reads one object of one axis by SDO, then waits
+ * DRIVE_POLLING_US.
  *
- * Main loop; takes the port's lock where it touches the machine.
+ * Called by app/controller.c. Main loop; takes the port's lock where it writes to the axes.
  */
 #ifndef APP_DRIVES_DRIVE_POLLING_H
 #define APP_DRIVES_DRIVE_POLLING_H
@@ -26,11 +27,12 @@ struct drive_polling {
 
 void drive_polling_init(struct drive_polling *polling);
 
-/* Takes a frame; others than SDO answers are ignored. True when *out is to be sent. */
+/* Takes a frame; ignores all except SDO responses. True when *out is to be sent. */
 bool drive_polling_receive(struct drive_polling *polling, const struct can_msg *in,
                            struct can_msg *out);
 
-/* Lets time pass. `allowed`: nobody else uses the SDO channels of the drives. True when *out is to be sent. */
+/* To be called in each round of the main loop. `allowed`: no other module uses the SDO channels of the drives. True when
+ * *out is to be sent. */
 bool drive_polling_process(struct drive_polling *polling, struct machine *machine,
                            const struct drive_properties *facts, bool allowed, uint32_t elapsed_us,
                            struct can_msg *out);

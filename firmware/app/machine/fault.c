@@ -31,7 +31,7 @@ const char *fault_text(uint16_t code)
         return "no SYNC for too long with real drives, microseconds";
     case FAULT_STOP_LATE:
         return "stop along the path took longer than its bound and a fifth, setpoint";
-    case FAULT_UNATTENDED:
+    case FAULT_MAIN_LOOP_STALL:
         return "the main loop of the controller stood still, microseconds";
     default:
         return emcy_text(code);

@@ -22,7 +22,7 @@
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
 #define FAULT_STOP_LATE                                                                            \
     (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */
-#define FAULT_UNATTENDED (EMCY_MANUFACTURER | 0x0Bu) /* the main loop stands still; us */
+#define FAULT_MAIN_LOOP_STALL (EMCY_MANUFACTURER | 0x0Bu) /* the main loop has stalled; us */
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */

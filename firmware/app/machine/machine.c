@@ -14,7 +14,7 @@ void machine_enter_boot(struct machine *machine)
     machine->state = MACHINE_BOOT;
     machine->configured = false;
     machine->mode_left = false;
-    machine->silent_node = 0;
+    machine->unresponsive_node = 0;
     machine->boot_due = true;
 }
 
@@ -128,8 +128,8 @@ uint32_t machine_answer_wait_us(const struct machine *machine)
 static bool all_answered(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        const struct tpdo_monitor *answers = &machine->axes[i].tpdo1;
-        if (answers->count == 0u && !answers->lost) {
+        const struct tpdo_monitor *monitor = &machine->axes[i].tpdo1;
+        if (monitor->count == 0u && !monitor->lost) {
             return false;
         }
     }

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * machine: the axes as one machine: its state (object 0x2002), its commands, and what it does in each tick.
+ * machine: the state of the machine (object 0x2002), the commands that change it, and its step in each tick.
  *
  *   BOOT -> OFF -> ENABLING -> READY -> RUNNING -> READY        any -> FAULT -> BOOT
  *                                       RUNNING -> STOPPING -> READY
  *                                       RUNNING -> HOLDING -> HELD -> RUNNING, STOPPING
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
- * Three places change the state: the requests (main loop, under the lock; machine_requests.c), the timer's functions
- * (machine_tick.c, machine_supervise.c, machine_fault.c), and the raising of a fault (machine_fault.c). The whole struct is guarded by the port's lock. Who uses whom: tick, supervise and requests ->
- * fault -> drives -> machine.
+ * The state changes in three places: requests (main loop, under the lock; machine_requests.c), the timer's functions
+ * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). The port's lock guards the whole struct. Files use
+ * each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H
@@ -78,7 +78,7 @@ enum machine_refusal {
 
 /* While the main loop stalls, no command is executed and no heartbeat is sent. The axes are stopped on the path before
  * the drives stop for missing heartbeats, or a watchdog restarts the processor. */
-#define MACHINE_UNATTENDED_US 1000000u
+#define MACHINE_MAIN_LOOP_STALL_US 1000000u
 
 #define MACHINE_ARRIVE_TICKS 2000u /* time for the axes to reach their targets after settling */
 
@@ -101,12 +101,12 @@ struct machine {
     uint32_t fault_serial; /* counts every change of `fault` */
     enum machine_state state;
     enum machine_fault_phase fault_phase; /* in FAULT */
-    uint32_t ticks_left;       /* settling, enabling, quick stop, resetting, first answers */
-    uint32_t override_percent; /* wanted, object 0x2010 sub 1; for every program */
-    uint32_t unattended_us;    /* since the last round of the main loop, by ticks */
-    uint32_t sync_us;          /* time of the last SYNC */
-    uint32_t unsent_ticks;     /* in a row with a frame that the port refused */
-    uint32_t sync_left_us;     /* time of the last SYNC that has left */
+    uint32_t ticks_left;         /* settling, enabling, quick stop, resetting, first answers */
+    uint32_t override_percent;   /* wanted, object 0x2010 sub 1; for every program */
+    uint32_t main_loop_stall_us; /* ticks times period since the last round of the main loop */
+    uint32_t sync_us;            /* time of the last SYNC */
+    uint32_t unsent_ticks;       /* in a row with a frame that the port refused */
+    uint32_t sync_left_us;       /* time of the last SYNC that has left */
     uint32_t
         arriving_ticks; /* since the settling time of a motion was over, with an axis away from its target */
     bool sync_sent;      /* the last SYNC has left */
@@ -114,11 +114,12 @@ struct machine {
     bool sync_waits;     /* this tick has none: the one before is not over */
     bool setpoints_sent; /* and all setpoints after it */
     bool
-        withheld; /* this tick makes no new setpoint: its SYNC, or a setpoint before it, has not left */
-    bool simulated;      /* every drive is a simulated one: the port may let ticks wait for them */
-    bool configured;     /* drives are configured; BOOT then waits for their first answers */
-    uint8_t silent_node; /* BOOT again because this one was started and did not answer; 0: none */
-    bool boot_due;       /* the main loop shall find and configure the drives (anew) */
+        clock_paused; /* no new setpoint in this tick: its SYNC, or a setpoint before it, has not left */
+    bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
+    bool configured; /* drives are configured; BOOT then waits for their first answers */
+    uint8_t
+        unresponsive_node; /* state BOOT again: this node was started and did not answer; 0: none */
+    bool boot_due;         /* the main loop shall find and configure the drives (anew) */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
     bool unhomed_allowed; /* the next start is accepted though axes are not homed */
@@ -248,9 +249,9 @@ bool machine_receive(struct machine *machine, uint8_t node, const struct pdo_act
                      uint32_t now_us);
 
 /* A round of the main loop has begun. Under the lock. */
-static inline void machine_attend(struct machine *machine)
+static inline void machine_note_main_loop(struct machine *machine)
 {
-    machine->unattended_us = 0;
+    machine->main_loop_stall_us = 0;
 }
 
 /* The axis of a node, or NULL. Pure. */

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* What the main loop asks of the machine. docs/reference/architecture.md has the table of requests by state. */
+/* The requests of app/machine/machine.h: commands of the operator, from app/commands.c (main loop, under the lock). Each
+ * changes the state, or returns why not. docs/reference/architecture.md section 4 has the table of requests by state. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"
 #include "app/machine/machine_fault.h"
 
-/* What keeps most requests from being looked at any further. */
+/* The reason for which most requests are refused; MACHINE_ACCEPTED: none. */
 static enum machine_refusal not_available(const struct machine *machine)
 {
     if (machine->state == MACHINE_FAULT) {

@@ -35,14 +35,14 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
 }
 
 /* Where the SYNC itself did not leave, no answer is missing. */
-static void close_unanswered(struct machine *machine, struct tpdo_monitor *answers, uint32_t now_us)
+static void close_unanswered(struct machine *machine, struct tpdo_monitor *monitor, uint32_t now_us)
 {
     if (!machine->sync_sent) {
-        answers->count = 0;
+        monitor->count = 0;
         return;
     }
     const uint32_t missed =
-        tpdo_monitor_close_sync(answers, now_us, machine->sync_us, machine_answer_wait_us(machine),
+        tpdo_monitor_close_sync(monitor, now_us, machine->sync_us, machine_answer_wait_us(machine),
                                 machine->config.missed_max);
     if (missed != 0u && machine_on_path(machine)) {
         machine->statistics.missed_tpdos += missed;
@@ -85,10 +85,10 @@ static bool close_sync(struct machine *machine, uint32_t now_us)
 /* Only while axes move by setpoints or by themselves: at standstill a check of a large program may take long. */
 static void supervise_main_loop(struct machine *machine)
 {
-    if (machine->unattended_us <= MACHINE_UNATTENDED_US) {
-        machine->unattended_us += machine->config.period_us;
+    if (machine->main_loop_stall_us <= MACHINE_MAIN_LOOP_STALL_US) {
+        machine->main_loop_stall_us += machine->config.period_us;
     } else if (machine_on_path(machine) || machine->state == MACHINE_HOMING) {
-        machine_raise(machine, FAULT_UNATTENDED, 0, machine->unattended_us);
+        machine_raise(machine, FAULT_MAIN_LOOP_STALL, 0, machine->main_loop_stall_us);
     }
 }
 
@@ -115,7 +115,7 @@ void machine_note_sync(struct machine *machine, uint32_t now_us, enum machine_sy
     const bool follow = machine_on_path(machine) || machine->state == MACHINE_READY;
     machine->sync_now = sent;
     machine->sync_waits = sync == MACHINE_SYNC_WAITS;
-    machine->withheld = !sent || !machine->setpoints_sent;
+    machine->clock_paused = !sent || !machine->setpoints_sent;
     if (sent) {
         machine->sync_left_us = now_us;
     }

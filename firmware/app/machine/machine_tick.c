@@ -5,7 +5,7 @@
 #include "app/machine/machine_drives.h"
 #include "app/machine/machine_fault.h"
 
-static uint8_t silent_node(const struct machine *machine)
+static uint8_t unresponsive_node(const struct machine *machine)
 {
     uint8_t i = 0;
     while (i + 1u < machine->config.axis_count && machine->axes[i].tpdo1.present) {
@@ -35,16 +35,16 @@ static void step_boot(struct machine *machine)
     }
     if (!machine_drives_answer(machine)) {
         if (machine_time_is_up(machine)) {
-            const uint8_t silent = silent_node(machine);
+            const uint8_t silent = unresponsive_node(machine);
             machine_enter_boot(machine);
-            machine->silent_node = silent;
+            machine->unresponsive_node = silent;
         }
         return;
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         tpdo_monitor_restart(&machine->axes[i].tpdo1);
     }
-    machine->silent_node = 0;
+    machine->unresponsive_node = 0;
     machine->state = MACHINE_OFF;
     raise_found(machine);
 }
@@ -92,7 +92,7 @@ static void step_arriving(struct machine *machine)
 
 static void step_motion(struct machine *machine)
 {
-    if (machine->withheld) {
+    if (machine->clock_paused) {
         return;
     }
     if (!motion_over(&machine->motion)) {
@@ -111,7 +111,7 @@ static void step_braking(struct machine *machine)
 {
     if (!machine_followed(machine) || motion_late(&machine->motion)) {
         machine_fault_quick(machine);
-    } else if (machine->withheld) {
+    } else if (machine->clock_paused) {
         return;
     } else if (!motion_over(&machine->motion)) {
         next_targets(machine);

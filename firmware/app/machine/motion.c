@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/motion.h (see there): the point on the path and the targets of the axes, in each tick of
- * a program. */
+/* Implements app/machine/motion.h: one run of a program. */
 #include "app/machine/motion.h"
 
 #include <string.h>

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * motion: a program that runs: from its feed plan and the commands, in each tick, the point on the path and the targets
- * of the axes that follow it.
+ * motion: one run of a program. In each tick it computes the point on the path, from the program and the commands (hold,
+ * stop, override), and the targets of the axes that follow the path.
  *
- * Prepared by the main loop, then owned by the tick (under the port's lock).
+ * The main loop prepares it (app/commands.c) and hands it to the machine. Then it belongs to the tick (machine_tick.c),
+ * under the port's lock.
  */
 #ifndef APP_MACHINE_MOTION_H
 #define APP_MACHINE_MOTION_H
@@ -46,14 +47,14 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 void motion_begin_job(struct motion *motion, const struct chunk *first,
                       const struct coefficients_window *window, const struct config *config);
 
-/* Goes on with the next chunk of the job, of which these records are there, where the motion is in the part that it shares with
- * the program under way, or rests: then true, and that program is not needed any more. A chunk that begins at rest starts so many
- * ticks after its predecessor has ended as it says (chunk_rest_ticks), at once when it comes later; ticks of a hold do not count.
- * Under the lock. */
+/* Takes the next chunk of the job over, with its coefficient records in `window`. This is possible while the motion is in
+ * the part that both chunks share, or rests: then true, and the previous chunk is no longer needed. A chunk that begins
+ * at rest starts chunk_rest_ticks after the end of its predecessor, or at once if it comes later. Ticks of a hold do not
+ * count. Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next,
                       const struct coefficients_window *window);
 
-/* True when the motion has come so far that the main loop should make records further on. Timer. */
+/* True when the main loop should compute the next coefficient records of the chunk. Timer. */
 static inline bool motion_wants_records(const struct motion *motion)
 {
     return feed_override_wants_records(&motion->feed, &motion->interp) != 0;
@@ -69,23 +70,24 @@ static inline uint32_t motion_axis_count(const struct motion *motion)
     return motion->scale.axis_count;
 }
 
-/* The axes of the machine that it moves: from this one on, */
+/* Number of the first axis of the machine that the motion moves. Pure. */
 static inline uint32_t motion_first_axis(const struct motion *motion)
 {
     return motion->scale.first_axis;
 }
 
-/* and below this one. Pure. */
+/* Number of the axis after the last one that it moves. Pure. */
 static inline uint32_t motion_axes_end(const struct motion *motion)
 {
     return motion_first_axis(motion) + motion_axis_count(motion);
 }
 
-/* Before motion_step in each tick: counts the ticks of a rest between two chunks. True: this tick repeats the last setpoint, and
- * there is no motion_step. Timer. */
+/* Counts the ticks of a rest between two chunks; call it before motion_step in each tick. True: this tick repeats the last
+ * setpoint, and motion_step must not be called. Timer. */
 bool motion_rests(struct motion *motion);
 
-/* Asks for a stop along the path inside the program's limits, or the machine's. Under the lock. */
+/* Commands a path stop: motion_stop inside the limits of the program, motion_fault_stop inside those of the machine. Under
+ * the lock. */
 void motion_stop(struct motion *motion);
 void motion_fault_stop(struct motion *motion);
 
@@ -97,16 +99,16 @@ void motion_override(struct motion *motion, uint32_t percent);
 /* True while a hold has the path at rest. */
 bool motion_held(const struct motion *motion);
 
-/* True at rest at the end of the tail of a chunk: only the next chunk leads on. */
+/* True at rest at the end of the tail of a chunk: the motion needs the next chunk to continue. */
 bool motion_waits(const struct motion *motion);
 
-/* The same, but false where the rest is one of the job, before a chunk that begins at rest. */
+/* The same, but false at a rest of the job (before a chunk that begins at rest). */
 bool motion_misses_chunk(const struct motion *motion);
 
-/* True while it comes to rest and has taken longer than its bound and a fifth. */
+/* True while the motion comes to rest and has passed its stop deadline (1.2 times the stop time bound). */
 bool motion_late(const struct motion *motion);
 
-/* True when the last setpoint given was the last one: end of the program or of the stop. */
+/* True when there are no more setpoints: end of the program or of the stop. */
 bool motion_over(const struct motion *motion);
 
 /* Program time of the last setpoint, to nearest; before the first one that of the start; in a brake that of its begin.

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/offsets.h (see there): what feedforward adds to the setpoints of a motion, by axis of the
- * path. */
+/* Implements app/machine/offsets.h: velocity and torque offsets of the setpoints. */
 #include "app/machine/offsets.h"
 
 #include <stddef.h>

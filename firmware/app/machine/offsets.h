@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* offsets: what feedforward (core/feedforward) adds to the setpoints of a motion, by axis of the path.
+/*
+ * offsets: velocity and torque offsets that feedforward (core/feedforward) adds to the setpoints of a motion.
+ *
+ * Called by the tick (app/tick.c) after the machine's step, while feedforward is configured.
  */
 #ifndef APP_MACHINE_OFFSETS_H
 #define APP_MACHINE_OFFSETS_H
@@ -17,8 +20,8 @@ struct offsets {
 
 void offsets_init(struct offsets *offsets);
 
-/* Offsets of this tick's setpoints, zero when the motion gave no new ones; `motion` after its step,
- * or NULL when none is under way. Once a tick while feedforward is configured. Timer. */
+/* Offsets of this tick's setpoints, by axis of the machine; 0 where the motion gave no new setpoint. `motion`: after its
+ * step; NULL when no motion runs. Call it once a tick. Timer. */
 void offsets_step(struct offsets *offsets, const struct config *config, const struct motion *motion,
                   struct feedforward_offset offset[AXES_MAX]);
 

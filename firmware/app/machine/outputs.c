@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/outputs.h (see there): the delay by ticks, and the frame to the I/O module. */
+/* Implements app/machine/outputs.h: the effect of the machine's state, the delay by ticks, and the frame. */
 #include "app/machine/outputs.h"
 
 #include <string.h>
@@ -11,42 +11,42 @@ void outputs_init(struct outputs *outputs)
     memset(outputs, 0, sizeof *outputs);
 }
 
-/* ---- What the state of the machine leaves of them ---- */
+/* ---- Effect of the machine's state ---- */
 
 enum outputs_mode {
-    OUTPUTS_FOLLOW,  /* those of the path */
-    OUTPUTS_MASKED,  /* off until the motion goes on */
-    OUTPUTS_CLEARED, /* off; the motion switches none any more */
+    OUTPUTS_FOLLOW,  /* as the path has switched them */
+    OUTPUTS_MASKED,  /* off now; as the path has switched them when the motion continues */
+    OUTPUTS_CLEARED, /* off, and the path's own state is cleared */
 };
 
-static enum outputs_mode unless(bool kept, enum outputs_mode mode)
+static enum outputs_mode follow_or(bool follow, enum outputs_mode otherwise)
 {
-    return kept ? OUTPUTS_FOLLOW : mode;
+    return follow ? OUTPUTS_FOLLOW : otherwise;
 }
 
 static enum outputs_mode mode_of(const struct machine *machine)
 {
     const uint32_t behaviour = machine->config.outputs.behaviour;
     switch (machine->state) {
-    case MACHINE_RUNNING: /* at the end of a tail the path rests unasked, as in a hold */
-        return unless((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u ||
-                          !motion_misses_chunk(&machine->motion),
-                      OUTPUTS_MASKED);
+    case MACHINE_RUNNING: /* a motion that waits for a chunk is as one in hold */
+        return follow_or((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u ||
+                             !motion_misses_chunk(&machine->motion),
+                         OUTPUTS_MASKED);
     case MACHINE_HOLDING:
     case MACHINE_HELD:
-        return unless((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u, OUTPUTS_MASKED);
+        return follow_or((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u, OUTPUTS_MASKED);
     case MACHINE_STOPPING:
-        return unless((behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) != 0u, OUTPUTS_CLEARED);
+        return follow_or((behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) != 0u, OUTPUTS_CLEARED);
     case MACHINE_READY:
-        return unless((behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u, OUTPUTS_CLEARED);
-    case MACHINE_BOOT: /* a module that is configured anew begins with its outputs off */
+        return follow_or((behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u, OUTPUTS_CLEARED);
+    case MACHINE_BOOT: /* the configuration of a module begins with its outputs off */
         return OUTPUTS_CLEARED;
     default:
-        return unless((behaviour & CONFIG_OUTPUTS_KEEP_AT_FAULT) != 0u, OUTPUTS_CLEARED);
+        return follow_or((behaviour & CONFIG_OUTPUTS_KEEP_AT_FAULT) != 0u, OUTPUTS_CLEARED);
     }
 }
 
-/* ---- Held back ---- */
+/* ---- Delay ---- */
 
 static void put(struct outputs *outputs, const struct path_outputs_values *values)
 {
@@ -54,7 +54,7 @@ static void put(struct outputs *outputs, const struct path_outputs_values *value
     outputs->held_back[outputs->newest] = *values;
 }
 
-/* Those of `delay_ticks` SYNCs ago. */
+/* Makes the outputs of `delay_ticks` SYNCs ago the present ones. */
 static void hold_back(struct outputs *outputs, const struct path_outputs_values *values,
                       uint32_t delay_ticks)
 {
@@ -73,8 +73,8 @@ static void switch_off(struct outputs *outputs)
     memset(&outputs->present, 0, sizeof outputs->present);
 }
 
-/* At the last setpoint; without a new one it changes nothing. During a rest before a program the setpoint is not yet the program's:
- * an event at its start acts with its first one. */
+/* Executes the events up to the last setpoint. During a rest before a program that setpoint is not the program's: an
+ * event at its start acts with its first setpoint. */
 static void follow_path(struct motion *motion)
 {
     if (motion->setpoints > 0u && !motion->precedes && path_outputs_active(&motion->outputs) != 0) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* statistics: how the ticks went (object 0x2008). Guarded by the port's lock. */
+/* statistics: counters of the tick: lateness, missed TPDOs, refused frames (object 0x2008). Written by the tick and by
+ * machine_supervise.c, read by the main loop under the port's lock. */
 #ifndef APP_MACHINE_STATISTICS_H
 #define APP_MACHINE_STATISTICS_H
 
@@ -7,7 +8,7 @@
 
 struct statistics {
     uint32_t syncs; /* since power-on */
-    /* of the present or last run of a program: from start until READY (or the end of braking) */
+    /* Of the present or last run of a program, from start until READY or the end of a fault stop: */
     uint32_t program_tick;
     uint32_t deadline_misses; /* ticks that began more than a period after their due time */
     uint32_t worst_late_ns;
@@ -16,10 +17,10 @@ struct statistics {
     uint32_t frames_not_sent;
 };
 
-/* A program starts: everything but the SYNCs begins again at 0. Under the lock. */
+/* Sets all counters except `syncs` to 0, at the start of a program. Under the lock. */
 void statistics_restart(struct statistics *statistics);
 
-/* A tick of a run that began late_ns after its due time took tick_ns. Timer. */
+/* Counts a tick of a run: it began late_ns after its due time and took tick_ns. Timer. */
 void statistics_tick(struct statistics *statistics, uint32_t late_ns, uint32_t tick_ns,
                      uint32_t period_us);
 

@@ -1,82 +1,81 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/tpdo_monitor.h (see there): which SYNCs a drive has answered with its TPDO1, and which it
- * has left unanswered. */
+/* Implements app/machine/tpdo_monitor.h: counts the TPDO1 frames that a drive did not send. */
 #include "app/machine/tpdo_monitor.h"
 
 #include <string.h>
 
-void tpdo_monitor_init(struct tpdo_monitor *answers)
+void tpdo_monitor_init(struct tpdo_monitor *monitor)
 {
-    memset(answers, 0, sizeof *answers);
+    memset(monitor, 0, sizeof *monitor);
 }
 
-void tpdo_monitor_take(struct tpdo_monitor *answers, uint32_t now_us)
+void tpdo_monitor_take(struct tpdo_monitor *monitor, uint32_t now_us)
 {
-    if (answers->count < UINT8_MAX) {
-        answers->count++;
+    if (monitor->count < UINT8_MAX) {
+        monitor->count++;
     }
-    answers->present = true;
-    answers->lost = false;
-    answers->last_us = now_us;
+    monitor->present = true;
+    monitor->lost = false;
+    monitor->last_us = now_us;
 }
 
-void tpdo_monitor_restart(struct tpdo_monitor *answers)
+void tpdo_monitor_restart(struct tpdo_monitor *monitor)
 {
-    const struct tpdo_monitor before = *answers;
-    tpdo_monitor_init(answers);
-    answers->present = before.present;
-    answers->last_us = before.last_us;
+    const struct tpdo_monitor before = *monitor;
+    tpdo_monitor_init(monitor);
+    monitor->present = before.present;
+    monitor->last_us = before.last_us;
 }
 
-/* The oldest absent one turns out to be late, or missed. */
-static void settle(struct tpdo_monitor *answers)
+/* It is known to be late, or missed. */
+static void drop_oldest_pending(struct tpdo_monitor *monitor)
 {
-    answers->first = (uint8_t)((answers->first + 1u) % TPDO_MONITOR_UNSETTLED);
-    answers->unsettled--;
+    monitor->first = (uint8_t)((monitor->first + 1u) % TPDO_MONITOR_PENDING_MAX);
+    monitor->pending--;
 }
 
-static uint32_t note_absent(struct tpdo_monitor *answers, uint32_t sync_us)
+static uint32_t note_absent(struct tpdo_monitor *monitor, uint32_t sync_us)
 {
     uint32_t missed = 0;
-    if (answers->unsettled == TPDO_MONITOR_UNSETTLED) {
-        settle(answers);
+    if (monitor->pending == TPDO_MONITOR_PENDING_MAX) {
+        drop_oldest_pending(monitor);
         missed = 1;
     }
-    answers->absent_us[(answers->first + answers->unsettled) % TPDO_MONITOR_UNSETTLED] = sync_us;
-    answers->unsettled++;
-    if (answers->absent_in_row < UINT32_MAX) {
-        answers->absent_in_row++;
+    monitor->absent_us[(monitor->first + monitor->pending) % TPDO_MONITOR_PENDING_MAX] = sync_us;
+    monitor->pending++;
+    if (monitor->absent_in_row < UINT32_MAX) {
+        monitor->absent_in_row++;
     }
     return missed;
 }
 
-static void note_present(struct tpdo_monitor *answers)
+static void note_present(struct tpdo_monitor *monitor)
 {
-    for (uint32_t late = answers->count - 1u; late > 0u && answers->unsettled > 0u; --late) {
-        settle(answers);
+    for (uint32_t late = monitor->count - 1u; late > 0u && monitor->pending > 0u; --late) {
+        drop_oldest_pending(monitor);
     }
-    answers->absent_in_row = 0;
+    monitor->absent_in_row = 0;
 }
 
-uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *answers, uint32_t now_us, uint32_t sync_us,
+uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *monitor, uint32_t now_us, uint32_t sync_us,
                                  uint32_t wait_us, uint8_t missed_max)
 {
     uint32_t missed = 0;
-    if (!answers->present) {
+    if (!monitor->present) {
         return 0;
     }
-    if (answers->count == 0u) {
-        missed = note_absent(answers, sync_us);
+    if (monitor->count == 0u) {
+        missed = note_absent(monitor, sync_us);
     } else {
-        note_present(answers);
+        note_present(monitor);
     }
-    answers->count = 0;
-    answers->lost = answers->absent_in_row > missed_max && now_us - answers->last_us > wait_us;
-    while (answers->unsettled > 0u &&
-           (answers->lost || now_us - answers->absent_us[answers->first] >= wait_us)) {
-        settle(answers);
+    monitor->count = 0;
+    monitor->lost = monitor->absent_in_row > missed_max && now_us - monitor->last_us > wait_us;
+    while (monitor->pending > 0u &&
+           (monitor->lost || now_us - monitor->absent_us[monitor->first] >= wait_us)) {
+        drop_oldest_pending(monitor);
         missed++;
     }
-    answers->missed += missed;
+    monitor->missed += missed;
     return missed;
 }

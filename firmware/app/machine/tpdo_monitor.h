@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * tpdo_monitor: which SYNCs a drive has answered with its TPDO1, and which it has left unanswered.
+ * tpdo_monitor: counts the TPDO1 frames that a drive did not send, one monitor for each axis.
  *
- * A TPDO1 does not say which SYNC it answers. One that is absent at the next SYNC is only late when two of them come
- * during a later SYNC, at most `wait_us` after the SYNC it belongs to; else it is missed. Only missed ones are counted,
- * late ones are not; of a drive that is lost all are. (A drive that is late by one SYNC from some time on appears as
- * one missed answer.)
+ * The drive sends one TPDO1 after each SYNC. The frame does not contain which SYNC it answers. So a TPDO1 that is absent
+ * at the next SYNC is pending first. It was late if two TPDO1 come in one later period, at most `wait_us` after the SYNC
+ * that it belongs to. Otherwise it is missed. Missed frames are counted, late ones are not. All pending frames of a lost
+ * drive are missed. A drive that becomes late by one SYNC and stays so gives one missed frame.
  *
- * Guarded by the port's lock; times are port_time_us(), which wraps.
+ * Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock. Times are port_time_us(), which wraps.
  */
 #ifndef APP_MACHINE_TPDO_MONITOR_H
 #define APP_MACHINE_TPDO_MONITOR_H
@@ -15,46 +15,46 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* When more are absent at once the oldest counts as missed. */
-#define TPDO_MONITOR_UNSETTLED 8u
+/* Frames that can be pending. One more, and the oldest counts as missed. */
+#define TPDO_MONITOR_PENDING_MAX 8u
 
 struct tpdo_monitor {
-    bool present;           /* has answered a SYNC since tpdo_monitor_init */
-    bool lost;              /* more than the permitted number missed in a row */
-    uint8_t count;          /* to the present SYNC; more than 1: late ones, or frames doubled */
-    uint32_t last_us;       /* time of the last one */
-    uint32_t absent_in_row; /* SYNCs in a row without one */
-    uint32_t absent_us
-        [TPDO_MONITOR_UNSETTLED]; /* a ring: SYNCs not answered, and not known yet whether late or missed */
-    uint8_t first;                /* the oldest of these */
-    uint8_t unsettled;            /* how many */
-    uint32_t missed;              /* all in all */
+    bool present;           /* a TPDO1 has come since tpdo_monitor_init */
+    bool lost;              /* the drive has not answered more SYNCs in a row than is permitted */
+    uint8_t count;          /* TPDO1 since the present SYNC; more than 1: late or doubled frames */
+    uint32_t last_us;       /* time of the last TPDO1 */
+    uint32_t absent_in_row; /* SYNCs in a row without a TPDO1 */
+    uint32_t
+        absent_us[TPDO_MONITOR_PENDING_MAX]; /* ring: times of the SYNCs whose TPDO1 is pending */
+    uint8_t first;                           /* index of the oldest */
+    uint8_t pending;                         /* number of pending frames */
+    uint32_t missed;                         /* frames missed since tpdo_monitor_init */
 };
 
-void tpdo_monitor_init(struct tpdo_monitor *answers);
+void tpdo_monitor_init(struct tpdo_monitor *monitor);
 
-/* A TPDO1 has come. Receive. */
-void tpdo_monitor_take(struct tpdo_monitor *answers, uint32_t now_us);
+/* A TPDO1 has come at now_us. Receive. */
+void tpdo_monitor_take(struct tpdo_monitor *monitor, uint32_t now_us);
 
-/* Counts anew from here on; a drive that is present stays so. Under the lock. */
-void tpdo_monitor_restart(struct tpdo_monitor *answers);
+/* Sets all counters to 0. `present` stays. Main loop or timer, under the lock. */
+void tpdo_monitor_restart(struct tpdo_monitor *monitor);
 
-/* The usual end of a SYNC: true when it was answered and none is unsettled; then nothing is missed. False, with nothing
- * changed: tpdo_monitor_close_sync has to be called. Timer. */
-static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *answers)
+/* Closes a SYNC that was answered while no frame is pending: true, and nothing is missed. Otherwise false, and nothing is
+ * changed: call tpdo_monitor_close_sync. Timer. */
+static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *monitor)
 {
-    if (answers->count == 0u || answers->unsettled != 0u) {
+    if (monitor->count == 0u || monitor->pending != 0u) {
         return false;
     }
-    answers->count = 0;
-    answers->absent_in_row = 0;
+    monitor->count = 0;
+    monitor->absent_in_row = 0;
     return true;
 }
 
-/* The SYNC that was sent at sync_us is over. Up to missed_max SYNCs in a row may pass without an answer; one more, and
- * more than wait_us since the last answer, and the drive is lost, until it answers again. Returns how many answers are
- * now known to be missed. Timer. */
-uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *answers, uint32_t now_us, uint32_t sync_us,
+/* Closes the SYNC that was sent at sync_us. The drive is lost when more than missed_max SYNCs in a row have no answer and
+ * the last answer is more than wait_us ago; it stays lost until its next TPDO1. Returns the number of frames that this
+ * call found to be missed. Timer. */
+uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *monitor, uint32_t now_us, uint32_t sync_us,
                                  uint32_t wait_us, uint8_t missed_max);
 
 #endif

@@ -15,9 +15,9 @@ from ..bus.run import BusRun, RunSession, run_program, run_session
 from ..bus.sdo import actions
 from ..bus.sdo.controller import BOOT, DISABLE, HOLD, OFF, READY, RESUME
 from ..bus.sdo.status import read_status
+from ..bustime import require_fit
 from ..errors import InputError
 from ..job_run import operator_stops, prepared, run_job
-from ..native import NativeProgram
 from .job import Job, JobRun
 from .machine import Machine
 from .program import Program, Run
@@ -87,16 +87,11 @@ class Controller:
         """Moves straight to the start of a program, with the drives on, then loads it; returns the distance in mm.
 
         unhomed   also where axes with a homing method are not homed
+
+        Raises InputError for a loaded image that turns axes alone: it does not hold where the others stand.
         """
-        machine = self._machine._file
-        native = NativeProgram(program.image)
-        if native.first_axis:
-            raise InputError(
-                "goto_start: the program turns axes alone: goto with its start, then upload"
-            )
-        _, first = native.setpoints(machine.kernel, machine.path_counts, 0, 1)
-        start = tuple(int(counts) for counts in first[0])
-        distance_mm = goto(self._node, machine, start, unhomed=unhomed)
+        start = program._start_counts()
+        distance_mm = goto(self._node, self._machine._file, start, unhomed=unhomed)
         self.upload(program)
         return distance_mm
 
@@ -145,9 +140,16 @@ class Controller:
 
         Raises RunError, beside the faults of a motion, where the recorded setpoints are not those of the program.
         """
-        machine = program.machine._file
-        kernel = machine.kernel
-        found = run_program(self._session, machine, program.image, kernel, unhomed=unhomed)
+        moved = program._moved
+        found = run_program(
+            self._session,
+            moved,
+            program.image,
+            moved.kernel,
+            unhomed=unhomed,
+            on=program.machine._file,
+            start=program._start_counts(),
+        )
         return _run_of(found)
 
     def run_job(
@@ -199,7 +201,8 @@ def connect(
     wait_s   how long to wait for the controller
     note     takes lines for the user; None: nobody does
 
-    On an error the axes are stopped. Raises BusError, and RefusedError while the axes move by somebody else.
+    On an error the axes are stopped. Raises BusError, RefusedError while the axes already move, and InputError for a
+    machine whose frames do not fit its period.
 
     >>> from hodograph import load_plan, example_file
     >>> program = load_plan(example_file("star")).program()
@@ -208,5 +211,6 @@ def connect(
     >>> run.setpoints_sha256 == program.simulate().setpoints_sha256
     True
     """
+    require_fit(machine._file)
     with run_session(machine._file, bus_address(bus), pace, wait_s, note or _silent) as session:
         yield Controller(session, machine)

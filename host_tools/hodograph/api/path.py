@@ -188,12 +188,7 @@ class Path:
     @property
     def node_points_mm(self) -> Real:
         """Joints of the N segments, (N + 1, A), from start to end."""
-        curve = self._curve
-        return (
-            curve.axes_nodes
-            if isinstance(curve, SpatialPHSpline)
-            else coordinates(curve.nodal_points)
-        )
+        return self._curve.axes_nodes
 
     @property
     def node_arc_lengths_mm(self) -> Real:
@@ -207,7 +202,7 @@ class Path:
 
     def point_mm(self, arc_length_mm: ArrayLike) -> Real:
         """Points (…, A)."""
-        return _places(self._curve, np.asarray(arc_length_mm, dtype=np.float64))
+        return self._curve.axes_point(arc_length_mm)
 
     def tangent(self, arc_length_mm: ArrayLike) -> Real:
         """Unit tangents (…, 2), in space (…, 3)."""
@@ -336,7 +331,7 @@ class Plan:
         s = np.clip(feed.arc_length(t), 0.0, curve.length_mm)
         along = feed.feed(t), feed.acceleration(t), feed.jerk(t)
         axes = (np.moveaxis(each, 0, -1) for each in axis_motion(frames(curve, s), *along))
-        return PathMotion(t, s, *along, _places(curve, s), *axes)
+        return PathMotion(t, s, *along, curve.axes_point(s), *axes)
 
     def program(self) -> Program:
         """The program for the plan's machine, as its controller accepts it.
@@ -345,7 +340,7 @@ class Plan:
         """
         if self.machine is None:
             raise InputError(f"{self.path.name}: a program needs a machine: give machine= to plan")
-        return Program(self._pipeline.image, self.machine)
+        return Program(self._pipeline.image, self.machine, self._pipeline.standing_mm)
 
     def __repr__(self) -> str:
         return f"Plan({self.path.name!r}, {self.profile}, {self.duration_s:.6g} s)"
@@ -358,7 +353,11 @@ def load_path(file: str | PathLike[str]) -> Path:
 
 def path_of(file: PathFile) -> Path:
     """The path that a path file describes."""
-    pipeline = pipeline_of(file)
+    return _path_in(file, pipeline_of(file))
+
+
+def _path_in(file: PathFile, pipeline: Pipeline) -> Path:
+    """The path of a pipeline that was made of a path file."""
     found = pipeline.found_spline
     return Path(file, found.spline, found.notes)
 
@@ -420,13 +419,6 @@ def _plane(direction: Real | None) -> complex | None:
     return None if direction is None else complex(direction[0], direction[1])
 
 
-def _places(curve: PHSpline | SpatialPHSpline, s: Real) -> Real:
-    """All axes (…, A) at arc lengths."""
-    return (
-        curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else coordinates(curve.point(s))
-    )
-
-
 def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan:
     """The plan that a path file (TOML) asks for, by its [path], [feed] and [limits].
 
@@ -435,12 +427,10 @@ def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan
     Raises InputError and PlanError.
     """
     found = load_path_file(FilePath(file))
-    if machine is None:
-        known = Pipeline(found).machine_or_none
-        machine = None if known is None else Machine(known)
-    return Plan(
-        path_of(found), machine, pipeline_of(found, None if machine is None else machine._file)
-    )
+    pipeline = pipeline_of(found, None if machine is None else machine._file)
+    if machine is None and pipeline.machine_or_none is not None:
+        machine = Machine(pipeline.whole_machine)
+    return Plan(_path_in(found, pipeline), machine, pipeline)
 
 
 def _file_limits(limits: Limits, axes: int) -> FileLimits:

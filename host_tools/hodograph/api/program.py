@@ -16,7 +16,8 @@ from ..config import SPACE_AXES
 from ..config import Machine as MachineFile
 from ..errors import InputError
 from ..native import NativeProgram
-from ..pipeline import controller_verdict
+from ..pipeline import controller_verdict, program_start_counts
+from ..program.image import read_image
 from ..simulate import Motion, simulate_on
 from .machine import Machine
 
@@ -128,6 +129,8 @@ class Program:
 
     image: bytes = field(repr=False)
     machine: Machine
+    _standing_mm: tuple[float, ...] = field(default=(), repr=False)
+    """Where axes of the machine's path before those of the program stand, where the program turns axes alone."""
 
     def __post_init__(self) -> None:
         fault = controller_verdict(self._native, self._moved)
@@ -166,6 +169,11 @@ class Program:
         """Time of the motion; the last setpoint is at its end or less than a period behind."""
         return self._native.duration_q32_s * 2.0**-32
 
+    def _start_counts(self) -> list[int]:
+        """Where all axes of the machine's path stand at its start. Raises InputError: that is not known."""
+        machine = self.machine._file
+        return program_start_counts(self._native, machine, machine.kernel, self._standing_mm)
+
     def setpoints_counts(self, kernel: Kernel | None = None) -> NDArray[np.int32]:
         """All setpoints in counts (ticks, A), as the controller computes them. `kernel` None: the machine's."""
         machine = self._moved
@@ -186,8 +194,7 @@ class Program:
 
 def load_program(file: str | PathLike[str], machine: Machine) -> Program:
     """A program image from a file (.hdgp), for a machine. Raises InputError."""
-    try:
-        image = FilePath(file).read_bytes()
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
+    image = read_image(FilePath(file))
+    if image is None:
+        raise InputError(f"{file}: no program image: make one with hodograph compile")
     return Program(image, machine)

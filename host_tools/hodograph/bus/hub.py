@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A hodograph-hub of our own: local buses for processes that we start (docs/reference/virtual-time.md)."""
+"""Starts a hodograph-hub for local buses (docs/reference/virtual-time.md), and ends it.
+
+For commands that serve a bus of their own (`own_bus`), `faults`, `hodograph demo` and `local_bus` of the API.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ _LOOK_S = 0.002
 
 
 def is_served(path: Path) -> bool:
-    """Whether a hub listens there: the socket is there a moment before."""
+    """Whether a hub accepts connections there. Its socket file exists a moment earlier."""
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as probe:
         return probe.connect_ex(str(path)) == 0
 

@@ -129,8 +129,7 @@ def run_program(
     """
     whole = on or machine
     if start is None:
-        _, first = NativeProgram(image).setpoints(kernel, machine.path_counts, 0, 1)
-        start = first[0].tolist()
+        start = NativeProgram(image).counts_at(kernel, machine.path_counts)
     bring_up(at, whole, kernel)
     goto(at.controller, whole, start, unhomed=unhomed)
     recorded = record_program(at, machine, image, progress, unhomed=unhomed)

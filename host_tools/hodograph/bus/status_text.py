@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A status for people: rows with names, or one line."""
+"""The status of a controller as text: rows of name and value, or one line.
+
+For `hodograph status`, `status --watch` and the live page. Pure; `sdo/status` reads the values.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ Row = tuple[str, str]
 def status_rows(
     status: Status, load: BusLoad | None = None, names: Sequence[str] = ()
 ) -> list[Row]:
-    """Everything, a line each; `names` are those of the axes."""
+    """All of a status as rows (name, value). `names`: of the axes, by axis."""
     rows = [("controller", f"node {status.node} on {status.bus}: {status.state}")]
     rows += _trouble_rows(status)
     rows.append(("configuration", _configuration_words(status)))

@@ -13,13 +13,13 @@ from ..bus.address import BusAddress
 from ..bus.run import RunSession, run_session
 from ..config import Machine
 from ..errors import InputError
-from ..job_run import Look
+from ..job_run import BusCheck
 from .output import note
 
 
 @contextmanager
 def session(machine: Machine, address: BusAddress, options: Namespace) -> Iterator[RunSession]:
-    """The controller of a machine on a bus, as the options of run and stream say."""
+    """The controller of a machine on a bus, by the options of run and stream."""
     with run_session(
         machine, address, options.pace or "real-time", options.wait, note, options.controller
     ) as at:
@@ -30,17 +30,17 @@ def session(machine: Machine, address: BusAddress, options: Namespace) -> Iterat
         yield at
 
 
-def pass_stop(text: str, look: Look) -> None:
-    """Goes on at a program stop without waiting."""
-    look()
+def pass_stop(text: str, check_bus: BusCheck) -> None:
+    """Continues at a program stop without waiting."""
+    check_bus()
     note(f"{text}: passed without waiting (--no-stops)")
 
 
-def await_enter(text: str, look: Look) -> None:
+def await_enter(text: str, check_bus: BusCheck) -> None:
     """Waits at a program stop until Enter is pressed."""
     note(f"{text}: waits for Enter; Ctrl-C ends the job")
     while True:
-        look()
+        check_bus()
         if select.select([sys.stdin], [], [], 0.0)[0]:
             if not sys.stdin.readline():
                 raise InputError(f"{text}: standard input has ended: the job ends here")

@@ -19,8 +19,8 @@ from ..monitor.security import make_token
 from ..monitor.session import Live, LivePage, PageAddress, Replay
 from ..native import NativeProgram
 from ..pipeline import load_pipeline
+from ..program.image import read_image
 from .output import note
-from .path_commands import read_image
 from .targets import DEFAULT_BITRATE
 
 _USUAL_PERIOD_US = 1000

@@ -18,23 +18,29 @@ from ..config import SPACE_AXES, Machine, load_machine, read_toml
 from ..errors import InputError
 from ..names import is_toolpath
 from ..native import NativeProgram
-from ..pipeline import load_pipeline, program_limits, start_counts
+from ..pipeline import load_pipeline, program_limits, program_start_counts, start_counts
+from ..program.image import read_image
 from .bus_commands import reached, stopping
 from .output import duration_text, note, print_json, print_rows, progress, size_text
-from .path_commands import motion_rows, print_notes, read_image
+from .path_commands import motion_rows, print_notes
 from .targets import DEFAULT_BITRATE
 
 
 def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None, list[int] | None]:
-    """The image, its machine, and where all axes of the path stand at the start of the program, where that is known."""
+    """The program image of FILE, its machine, and where all axes of the path stand at its start, in counts.
+
+    The last two are None for an image without --machine.
+    """
     image = read_image(options.file)
     if image is not None:
         machine = load_machine(options.machine) if options.machine else None
         if machine is not None:
             program_limits(machine)
-            require_axes(NativeProgram(image), machine)
+            kernel = options.kernel or machine.kernel
+            start = program_start_counts(NativeProgram(image), machine, kernel)
             require_fit(machine)
-        return image, machine, None
+            return image, machine, start
+        return image, None, None
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
     machine = pipeline.whole_machine
     require_fit(machine)
@@ -68,17 +74,17 @@ def goto(options: Namespace) -> None:
     """hodograph goto."""
     address = bus_address(options.bus)
     image: bytes | None = None
-    end: list[int] | None = None
     if options.to is None:
-        image, named, end = _image_and_machine(options)
-        if named is None:
+        image, named, start = _image_and_machine(options)
+        if named is None or start is None:
             raise InputError(f"{options.file}: a program image needs --machine FILE")
-        machine = named
+        if options.z is not None:
+            raise InputError("--z: goes with --to")
+        machine, end = named, start
     else:
         machine = machine_of(options.file, options.machine)
         require_fit(machine)
-    if end is None or options.z is not None:
-        end = _end_counts(options, machine, image)
+        end = _given_point(options, machine)
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
         controller.require_standing()
         controller.configure(machine, options.kernel or machine.kernel)
@@ -95,36 +101,15 @@ def goto(options: Namespace) -> None:
     )
 
 
-def _end_counts(options: Namespace, machine: Machine, image: bytes | None) -> list[int]:
-    if image is None:
-        to = [*options.to, *([] if options.z is None else [options.z])]
-        if options.z is not None and len(machine.path_axes) < SPACE_AXES:
-            raise InputError(f"--z: the path of {machine.file} has two axes: leave it out")
-        reach = 2**31 / machine.counts_per_mm
-        if max(map(abs, to)) >= reach:
-            raise InputError(f"--to: must be within ±{reach:.0f} mm")
-        return [round(mm * machine.counts_per_mm) for mm in to]
-    if options.z is not None:
-        raise InputError("--z: goes with --to")
-    require_axes(NativeProgram(image), machine)
-    _, setpoints = NativeProgram(image).setpoints(
-        options.kernel or machine.kernel, machine.path_counts, 0, 1
-    )
-    return [int(counts) for counts in setpoints[0]]
-
-
-def require_axes(program: NativeProgram, machine: Machine) -> None:
-    """Raises InputError: the program has more path axes than the machine, or turns axes alone."""
-    if program.first_axis:
-        raise InputError(
-            "the program turns axes alone, and does not hold where x, y and z stand: give its path file, or "
-            "hodograph run its toolpath"
-        )
-    if program.axis_count > len(machine.path_axes):
-        raise InputError(
-            f"the program has {program.axis_count} path axes, {machine.file} has {len(machine.path_axes)}: "
-            "compile its path for this machine"
-        )
+def _given_point(options: Namespace, machine: Machine) -> list[int]:
+    """The point of --to and --z in counts. Raises InputError: the machine cannot have it."""
+    to = [*options.to, *([] if options.z is None else [options.z])]
+    if options.z is not None and len(machine.path_axes) < SPACE_AXES:
+        raise InputError(f"--z: the path of {machine.file} has two axes: leave it out")
+    reach = 2**31 / machine.counts_per_mm
+    if max(map(abs, to)) >= reach:
+        raise InputError(f"--to: must be within ±{reach:.0f} mm")
+    return [round(mm * machine.counts_per_mm) for mm in to]
 
 
 def machine_of(file: Path, given: Path | None) -> Machine:

@@ -173,25 +173,27 @@ def _refusal(folder: Path) -> int | None:
 
 
 def write_file(file: Path, data: bytes) -> None:
-    """Writes a result, whole or not at all; into a device or a pipe as it comes. Raises InputError."""
-    if _is_device(file):
-        _write_into(file, data)
-        return
-    file = file.resolve()
+    """Writes a result: a file whole or not at all, a device or a pipe directly. Raises InputError."""
+    direct = _is_device(file)
+    place = file if direct else file.resolve()
+    try:
+        if direct:
+            file.write_bytes(data)
+        else:
+            _replace(place, data)
+    except OSError as error:
+        raise InputError(f"{place}: cannot be written: {error.strerror}") from None
+
+
+def _replace(file: Path, data: bytes) -> None:
+    """Writes a file under another name, then renames it. Raises OSError, and leaves nothing then."""
     fresh = file.with_name(file.name + ".part")
     try:
         fresh.write_bytes(data)
         fresh.replace(file)
-    except OSError as error:
+    except OSError:
         fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
-
-
-def _write_into(file: Path, data: bytes) -> None:
-    try:
-        file.write_bytes(data)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
+        raise
 
 
 def write_files(files: Mapping[Path, str], *, force: bool) -> None:

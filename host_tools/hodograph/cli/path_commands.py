@@ -18,7 +18,7 @@ from ..native import NativeProgram
 from ..pipeline import Pipeline, load_pipeline
 from ..program import Program, decode, inspect_dict, inspect_text
 from ..program.check import check, coefficients_in_range
-from ..program.image import LARGEST_BANK, MAGIC, RECORD_BYTES, memory_bytes
+from ..program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes, read_image
 from ..program.stops import stops_dict, stops_text
 from ..simulate import Motion, StoppedRun, last_tick_s, simulate_on, simulate_stop, write_trace
 from ..spline import PHSpline, coordinates
@@ -48,9 +48,7 @@ def spline(options: Namespace) -> None:
     result: dict[str, object] = {
         "closed": curve.closed,
         "segments": curve.segment_count,
-        "nodal_points": coordinates(
-            curve.axes_nodes if isinstance(curve, SpatialPHSpline) else curve.nodal_points
-        ).tolist(),
+        "nodal_points": curve.axes_nodes.tolist(),
         "length_mm": curve.length_mm,
         "segment_lengths_mm": curve.segment_lengths_mm.tolist(),
         "newton_iterations": found.newton_iterations,
@@ -62,7 +60,7 @@ def spline(options: Namespace) -> None:
     }
     if options.at is not None:
         s = np.atleast_1d(_within("--at", options.at, curve.length_mm, unit))
-        result["points"] = _places(curve, s)
+        result["points"] = curve.axes_point(s).tolist()
         result["tangents"] = coordinates(curve.tangent(s)).tolist()
         result["curvatures"] = curve.curvature(s).tolist()
         if isinstance(curve, SpatialPHSpline):
@@ -86,7 +84,7 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64], uni
     columns = [(f"curvature /{unit}", curve.curvature(s))]
     if isinstance(curve, SpatialPHSpline):
         columns.append((f"torsion /{unit}", curve.torsion(s)))
-    points = np.array(_places(curve, s))
+    points = curve.axes_point(s)
     first = 1 if unit == "mm" else 4
     own = [f"{axis} mm" for axis in "xyz"] if unit == "mm" else []
     own += [f"axis {first + k}" for k in range(len(own), points.shape[1])]
@@ -94,13 +92,6 @@ def _print_places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64], uni
     print(f"{f's {unit}':>12} " + " ".join(f"{name:>16}" for name in names))
     for at, row in zip(s, np.column_stack((points, *(v for _, v in columns))), strict=True):
         print(f"{at:12.6g} " + " ".join(f"{value:16.9f}" for value in row))
-
-
-def _places(curve: PHSpline | SpatialPHSpline, s: NDArray[np.float64]) -> list[list[float]]:
-    """Points at arc lengths, with the extra axes after x, y, z."""
-    points = curve.axes_point(s) if isinstance(curve, SpatialPHSpline) else curve.point(s)
-    found: list[list[float]] = coordinates(points).tolist()
-    return found
 
 
 def _within(what: str, values: list[float], end: float, unit: str) -> np.ndarray:
@@ -236,20 +227,6 @@ def _warn_of_size(image: bytes, machine: Machine) -> None:
             f"takes {needed} bytes of a controller with its precomputed coefficients, more than the {room} of {whose}: "
             "upload will refuse it; split the path"
         )
-
-
-def read_image(file: Path) -> bytes | None:
-    """The bytes of a program image, None when the file is something else (a path file)."""
-    try:
-        with file.open("rb") as source:
-            if source.read(4) != MAGIC and file.suffix != ".hdgp":
-                return None
-            source.seek(0)
-            return source.read()
-    except FileNotFoundError:
-        raise InputError(f"{file}: no such file") from None
-    except OSError as error:
-        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
 
 
 def decode_file(file: Path, image: bytes) -> Program:

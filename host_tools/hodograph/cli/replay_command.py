@@ -15,9 +15,10 @@ def replay(options: Namespace) -> None:
     from ..bus.analysis import replay as replay_frames
     from ..config import load_machine
     from ..pipeline import load_pipeline
+    from ..program.image import read_image
     from ..simulate import write_trace
     from .motion_commands import print_run
-    from .path_commands import print_notes, read_image
+    from .path_commands import print_notes
 
     check_suffix(options.recording)
     require_places(options.trace, folders=[options.report])

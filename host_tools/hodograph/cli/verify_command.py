@@ -23,6 +23,7 @@ from ..pipeline import (
 )
 from ..program import compile_program, encode
 from ..program.compiler import ProgramOptions
+from ..program.image import read_image
 from ..verify import (
     TOLERANCE,
     BusNoise,
@@ -33,7 +34,7 @@ from ..verify import (
     verify_program,
 )
 from .output import number, print_json
-from .path_commands import decode_file, print_notes, read_image
+from .path_commands import decode_file, print_notes
 from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
 COUNTS_PER_MM = 1_000_000

@@ -27,11 +27,17 @@ class FaultBench:
     """Processes of one case; a context manager that ends them."""
 
     def __init__(
-        self, machine: Machine, bus: BusAddress, drives_bus: BusAddress, rules: str, *, apart: bool
+        self,
+        machine: Machine,
+        bus: BusAddress,
+        drives_bus: BusAddress,
+        rules: str,
+        *,
+        one_process_each: bool,
     ) -> None:
-        """`apart`: each drive is a process of its own."""
+        """`rules`: fault rules as text. `one_process_each`: each drive is a process; else one process has all."""
         self.machine, self.bus, self.drives_bus = machine, bus, drives_bus
-        self._apart = apart
+        self._one_process_each = one_process_each
         self._folder = tempfile.TemporaryDirectory(prefix="hodograph-faults-")
         self._rules = Path(self._folder.name) / "rules"
         self._rules.write_text(rules)
@@ -66,16 +72,16 @@ class FaultBench:
         return process
 
     def start_controller(self) -> None:
-        """A fresh controller."""
+        """Starts a new controller."""
         pace = "fast" if self.clock is None else "real-time"
         command = controller_command(self.machine, self.bus, pace)
         self.controller = self._start(f"controller-{self.machine.node}", command)
 
     def start_drives(self, *, faulty: bool) -> None:
-        """Fresh drives, with the rules or without."""
+        """Starts new drives; `faulty`: with the fault rules."""
         more = ["--faults", str(self._rules)] if faulty else []
         axes = self.machine.axes
-        groups = [(axis,) for axis in axes] if self._apart else [axes]
+        groups = [(axis,) for axis in axes] if self._one_process_each else [axes]
         outputs = [
             self.machine.outputs,
             *[None] * len(axes),
@@ -92,14 +98,14 @@ class FaultBench:
         ]
 
     def injections(self) -> list[dict[str, Any]]:
-        """What injector and drives say they did (sim/faults/fault_log.h), in time."""
+        """The faults that injector and drives have logged (sim/faults/fault_log.h), by time."""
         lines = []
         for process in (self.injector, *self._gone, *self.drives):
             lines += [line for line in process.text().splitlines() if line.startswith("{")]
         return sorted((json.loads(line) for line in lines), key=lambda event: int(event["t_ns"]))
 
     def complaints(self) -> list[str]:
-        """What a process said that ended by itself."""
+        """The last output of each process that ended by itself."""
         return [
             f"a process ended by itself (status {process.child.returncode}): {process.text()[-300:]}"
             for process in (*self._others, *self.drives)

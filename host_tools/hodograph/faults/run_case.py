@@ -40,9 +40,11 @@ def _run(case: Case, bus: BusAddress, drives_bus: BusAddress) -> CaseRun:
     began_s = time.monotonic()
     record = CaseRun(case, load_clean_run(case.scenario.path))
     machine = record.clean_run.machine
-    apart = case.scenario.action == "kill-one-drive"
+    one_process_each = case.scenario.action == "kill-one-drive"
     with (
-        FaultBench(machine, bus, drives_bus, case.rules, apart=apart) as bench,
+        FaultBench(
+            machine, bus, drives_bus, case.rules, one_process_each=one_process_each
+        ) as bench,
         connect(bus, machine.node, machine.bitrate) as controller,
         Recorder(bus, _TAKE_S) as control,
         Recorder(drives_bus, _TAKE_S) as drives,

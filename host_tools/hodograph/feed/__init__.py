@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Feed along a path: profiles, plans inside limits, and the feed pieces of a program."""
+"""Plans the feed along a path inside limits: profiles, plans, and the feed pieces of a program.
+
+Used by `pipeline`, `stream` and `toolpath/fit`. `feed/optimal` plans for least time. It reads
+no files and knows no machine: limits come as `Limits`, `ControllerLimits` and `AxisLimits`.
+"""
 
 from .limits import (
     AxisLimits,

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The browsers of the live page: client slots, and a bounded queue of messages for each.
 
-A socket that has not said hello yet only waits; when too many wait, the one that has waited longest goes. A browser
-that only watches is refused when all slots are taken. One with the token always gets a slot: if need be that of the
-oldest browser with the token.
+A new socket waits until its browser has sent a hello message. At most 64 sockets wait; one more, and the oldest is
+closed. A browser that only watches is refused when all 16 slots are taken. A browser with the token always gets a slot,
+if necessary that of the oldest browser with the token.
 
-All methods but `publish` belong to the event loop.
+Used by `server` and `session`. All methods except `Broadcaster.publish` have to be called in the event loop.
 """
 
 from __future__ import annotations
@@ -17,59 +17,61 @@ from typing import Any, Generic, TypeVar
 from .messages import encode
 
 MOST_CLIENTS = 16
-"""Who look on, and as many again who may command."""
+"""Slots for browsers that only watch, and as many for browsers that may command."""
 MOST_WAITING = 64
+"""Sockets without a hello message."""
 
 Socket = TypeVar("Socket")
 
 
 class ClientSlots(Generic[Socket]):
-    """The sockets of the server by what they are; `enter` and `take_slot` give the one that has to go, if any."""
+    """The sockets of the server by role. `enter` and `take_slot` return the socket that has to be closed, or None."""
 
     def __init__(self) -> None:
         self._waiting: list[Socket] = []
-        self._lookers: list[Socket] = []
+        self._watchers: list[Socket] = []
         self._operators: list[Socket] = []
 
     def enter(self, socket: Socket) -> Socket | None:
-        """Somebody new."""
+        """Adds a new socket, which waits."""
         self._waiting.append(socket)
         return self._waiting.pop(0) if len(self._waiting) > MOST_WAITING else None
 
     def take_slot(self, socket: Socket, *, may_command: bool) -> Socket | None:
-        """It has said hello: a browser that only watches is returned itself when there is no slot."""
+        """Gives a socket its slot after its hello message. Returns a browser that only watches if none is free."""
         if socket in self._waiting:
             self._waiting.remove(socket)
         if may_command:
             self._operators.append(socket)
             return self._operators.pop(0) if len(self._operators) > MOST_CLIENTS else None
-        if len(self._lookers) >= MOST_CLIENTS:
+        if len(self._watchers) >= MOST_CLIENTS:
             return socket
-        self._lookers.append(socket)
+        self._watchers.append(socket)
         return None
 
     def leave(self, socket: Socket) -> None:
-        """It has gone."""
-        for group in (self._waiting, self._lookers, self._operators):
+        """Removes a socket that has been closed."""
+        for group in (self._waiting, self._watchers, self._operators):
             if socket in group:
                 group.remove(socket)
 
     def everybody(self) -> list[Socket]:
-        """All sockets there are."""
-        return [*self._waiting, *self._lookers, *self._operators]
+        """All sockets."""
+        return [*self._waiting, *self._watchers, *self._operators]
 
 
 QUEUE = 100
-"""Messages that wait for one browser: some four seconds."""
+"""Messages that wait for one browser: about four seconds."""
 HISTORY = 1500
-"""Messages of rows kept for browsers that come later: a minute at the machine's own pace."""
+"""Messages of rows that are kept for later browsers: a minute in real time."""
 EVENTS = 50
+"""Events that are kept for later browsers."""
 QUEUED = ("rows", "event")
-"""Types of which every message counts; of the others only the latest."""
+"""Types of which every message is sent; of the other types only the latest."""
 
 
 class Client:
-    """What waits for one browser: the latest message of each type, and a bounded queue of rows and events."""
+    """Messages that wait for one browser: the latest of each type, and a bounded queue of rows and events."""
 
     def __init__(self) -> None:
         self._latest: dict[str, str] = {}
@@ -78,7 +80,7 @@ class Client:
         self.dropped = 0
 
     def put_latest(self, kind: str, text: str) -> None:
-        """Replaces the message of this type that still waits."""
+        """Replaces the waiting message of this type."""
         self._latest[kind] = text
         self._there.set()
 
@@ -91,7 +93,7 @@ class Client:
         self._there.set()
 
     def clear_rows(self) -> None:
-        """What waits belongs to a past that is of no interest any more."""
+        """Empties the queue: its messages belong to a past run."""
         self._queue.clear()
 
     async def get(self) -> str:
@@ -104,8 +106,8 @@ class Client:
         return self._queue.popleft()
 
 
-class Hub:
-    """What every browser sees: rows and events as they come, and the latest message of each other type."""
+class Broadcaster:
+    """Sends messages to every browser: rows and events as they come, and the latest message of each other type."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self._loop = loop
@@ -115,7 +117,7 @@ class Hub:
         self._events: deque[str] = deque(maxlen=EVENTS)
 
     def publish(self, message: dict[str, Any]) -> None:
-        """From any thread. After the loop has ended nothing happens."""
+        """Sends a message to every browser. From any thread; without effect after the event loop has ended."""
         text = encode(message)
         try:
             self._loop.call_soon_threadsafe(self._deliver, str(message["type"]), text)
@@ -138,7 +140,7 @@ class Hub:
                 client.put_latest(kind, text)
 
     def join(self) -> Client:
-        """A new browser; it gets what there is."""
+        """Adds a browser. It gets the latest messages and the history."""
         client = Client()
         for kind, text in self._latest.items():
             client.put_latest(kind, text)
@@ -148,10 +150,10 @@ class Hub:
         return client
 
     def leave(self, client: Client) -> None:
-        """The browser has gone."""
+        """Removes a browser."""
         self._clients.discard(client)
 
     @property
     def count(self) -> int:
-        """Browsers that look on."""
+        """Number of browsers."""
         return len(self._clients)

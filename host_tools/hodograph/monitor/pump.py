@@ -61,8 +61,8 @@ class Layout:
 
 
 @dataclass
-class Tally:
-    """How the pump itself does, for the page's last line."""
+class PumpLoad:
+    """Load of the pump itself in the last second, for the last line of the page."""
 
     frames: int = 0
     dropped: int = 0
@@ -83,7 +83,7 @@ class Pump:
         self._streams = False
         self._ending = threading.Event()
         self._again = threading.Event()
-        self._tally = Tally()
+        self._own_load = PumpLoad()
         self._emergencies = Emergencies()
         self._load = LoadCapture(layout.bitrate)
         self._watch = SetpointWatch(layout.nodes)
@@ -164,7 +164,7 @@ class Pump:
             self._draw_chunks(taken)
             for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
-            self._tally.busy_s += time.thread_time() - begun_s
+            self._own_load.busy_s += time.thread_time() - begun_s
             self._tell(taken)
             if self._again.is_set():
                 self._again.clear()
@@ -174,7 +174,7 @@ class Pump:
             self._ending.wait(due_s - time.monotonic())
 
     def _pass_on(self, taken: Taken) -> None:
-        self._tally.frames += taken.frames.size
+        self._own_load.frames += taken.frames.size
         newest_us = int(taken.frames["time_us"][-1])
         self._load.feed(taken.frames, newest_us / 1e6)
         self._check_setpoints(taken)
@@ -221,7 +221,7 @@ class Pump:
             self._publish({"type": "event", "text": str(jump), "fault": True})
 
     def _drives(self, samples: Samples) -> dict[str, Any]:
-        """Positions and states of the drives by their own words, and the load of the bus."""
+        """Positions and states of the drives from their frames, and the bus load."""
         layout = self._layout
         drives = []
         for axis, (name, node) in enumerate(zip(layout.names, layout.nodes, strict=True)):
@@ -245,19 +245,19 @@ class Pump:
         }
 
     def _tell(self, taken: Taken) -> None:
-        """How the pump does, every second."""
-        tally, now_s = self._tally, time.monotonic()
-        self._tally.dropped = taken.dropped
-        if now_s - tally.since_s < 1.0:
+        """Publishes the load of the pump, every second."""
+        own, now_s = self._own_load, time.monotonic()
+        self._own_load.dropped = taken.dropped
+        if now_s - own.since_s < 1.0:
             return
-        passed_s = now_s - tally.since_s
+        passed_s = now_s - own.since_s
         self._publish(
             {
                 "type": "pump",
-                "frames_per_s": round(tally.frames / passed_s),
-                "busy_percent": round(100 * tally.busy_s / passed_s, 1),
-                "dropped": tally.dropped,
+                "frames_per_s": round(own.frames / passed_s),
+                "busy_percent": round(100 * own.busy_s / passed_s, 1),
+                "dropped": own.dropped,
                 "ended": taken.ended,
             }
         )
-        self._tally = Tally(dropped=tally.dropped)
+        self._own_load = PumpLoad(dropped=own.dropped)

@@ -16,7 +16,7 @@ from typing import Any
 from aiohttp import WSMsgType, web
 
 from ..errors import HodographError, InputError
-from .clients import Client, ClientSlots, Hub
+from .clients import Broadcaster, Client, ClientSlots
 from .messages import encode
 from .security import HEADERS, Guard
 
@@ -43,8 +43,15 @@ Execute = Callable[[dict[str, Any]], Awaitable[str]]
 class Server:
     """The web application; `greeting` is the first message to a page."""
 
-    def __init__(self, guard: Guard, hub: Hub, greeting: dict[str, Any], execute: Execute) -> None:
-        self._guard, self._hub, self._greeting, self._execute = guard, hub, greeting, execute
+    def __init__(
+        self, guard: Guard, broadcaster: Broadcaster, greeting: dict[str, Any], execute: Execute
+    ) -> None:
+        self._guard, self._broadcaster, self._greeting, self._execute = (
+            guard,
+            broadcaster,
+            greeting,
+            execute,
+        )
         self._pages = _load_pages()
         self._slots: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
@@ -106,14 +113,14 @@ class Server:
         await socket.send_str(
             encode({"type": "hello", "may_command": may_command, **self._greeting})
         )
-        client = self._hub.join()
+        client = self._broadcaster.join()
         sender = asyncio.create_task(_send(socket, client))
         try:
             async for message in socket:
                 if message.type is WSMsgType.TEXT:
                     await self._answer(socket, message.data, may_command, client)
         finally:
-            self._hub.leave(client)
+            self._broadcaster.leave(client)
             sender.cancel()
             with suppress(asyncio.CancelledError, ConnectionError):
                 await sender

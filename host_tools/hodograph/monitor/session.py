@@ -16,7 +16,7 @@ from aiohttp import web
 from .. import __version__
 from ..bus.address import BusAddress
 from ..errors import HodographError, InputError
-from .clients import Hub
+from .clients import Broadcaster
 from .link import Link, read_command
 from .pump import Layout, Pump
 from .security import Guard, is_loopback
@@ -80,7 +80,11 @@ class PageAddress:
 
 
 class LivePage:
-    """Serves until SIGINT or SIGTERM. `image` is the program given, None without one."""
+    """Serves the page until SIGINT or SIGTERM.
+
+    image  the program on the command line; None: none was given
+    note   prints a line on the terminal
+    """
 
     def __init__(
         self,
@@ -88,22 +92,25 @@ class LivePage:
         layout: Layout,
         place: PageAddress,
         image: bytes | None,
-        say: Callable[[str], None],
+        note: Callable[[str], None],
     ) -> None:
         self._what, self._layout, self._place = what, layout, place
-        self._image, self._say = image, say
+        self._image, self._note = image, note
 
     async def serve(self) -> None:
-        """Raises InputError when the place is taken, HodographError when a thread has broken down."""
+        """Raises InputError when the address is in use, HodographError when a thread has broken down."""
         loop = asyncio.get_running_loop()
         ending = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, ending.set)
-        hub = Hub(loop)
-        pump = Pump(self._opener(), self._layout, hub.publish)
-        link = self._link(hub, pump)
+        broadcaster = Broadcaster(loop)
+        pump = Pump(self._opener(), self._layout, broadcaster.publish)
+        link = self._link(broadcaster, pump)
         server = Server(
-            Guard(self._place.host, self._place.token), hub, self._greeting(), _execute(link, pump)
+            Guard(self._place.host, self._place.token),
+            broadcaster,
+            self._greeting(),
+            _execute(link, pump),
         )
         runner = web.AppRunner(
             server.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
@@ -115,12 +122,12 @@ class LivePage:
             if self._image is not None:
                 pump.show(self._image)
             pump.start()
-            self._say(f"monitor: {self._place.url}")
+            self._note(f"monitor: {self._place.url}")
             if link is not None:
                 link.start()
             while not ending.is_set():
                 _require_alive(pump, link)
-                hub.publish(usage.message(hub.count))
+                broadcaster.publish(usage.message(broadcaster.count))
                 with_timeout = asyncio.wait_for(ending.wait(), 1.0)
                 try:
                     await with_timeout
@@ -146,14 +153,14 @@ class LivePage:
             return what.open
         return lambda: open_source(what.address, bitrate)
 
-    def _link(self, hub: Hub, pump: Pump) -> Link | None:
+    def _link(self, broadcaster: Broadcaster, pump: Pump) -> Link | None:
         if isinstance(self._what, Replay):
             return None
         return Link(
             self._what.address,
             self._what.node,
             self._layout.bitrate,
-            hub.publish,
+            broadcaster.publish,
             pump.show,
             given=self._image,
         )

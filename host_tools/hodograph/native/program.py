@@ -238,6 +238,12 @@ class NativeProgram:
             points["position_q40"][:, : self.axis_count], counts_per_mm
         )
 
+    def counts_at(self, kernel: str, counts_per_mm: Counts, tick: int = 0) -> list[int]:
+        """The setpoint of one tick, in counts by axis; tick 0 is the start of the program."""
+        _, setpoints = self.setpoints(kernel, counts_per_mm, tick, 1)
+        found: list[int] = setpoints[0].tolist()
+        return found
+
 
 def limits_fields(given: NativeLimits) -> dict[str, object]:
     """As cffi takes a struct program_limits: axes that are not given have all travel that an image can have."""

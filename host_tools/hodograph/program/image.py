@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""The program image as arrays, to and from bytes, and the memory and machine limits that it is made for;
-docs/reference/protocol.md 1.1 to 1.4."""
+"""The program image: read from a file, decoded to arrays, encoded to bytes; and the memory that it takes.
+
+docs/reference/protocol.md 1.1 to 1.4. Used by the compiler, the checks, the commands and the API.
+"""
 
 from __future__ import annotations
 
 import struct
 import zlib
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -371,6 +374,20 @@ class ProgramLimits:
     axis_acceleration_um_s2: tuple[int, ...] = (0, 0)
     axis_jerk_mm_s3: tuple[int, ...] = (0, 0)
     axis_count: int = 0
+
+
+def read_image(file: Path) -> bytes | None:
+    """The bytes of a program image, None when the file is something else (a path file). Raises InputError."""
+    try:
+        with file.open("rb") as source:
+            if source.read(4) != MAGIC and file.suffix != ".hdgp":
+                return None
+            source.seek(0)
+            return source.read()
+    except FileNotFoundError:
+        raise InputError(f"{file}: no such file") from None
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror}") from None
 
 
 @dataclass(frozen=True)

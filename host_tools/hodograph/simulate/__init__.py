@@ -6,7 +6,7 @@
 `Motion`: rows, hashes, maxima.
 """
 
-from .motion import SETTLING_S, Motion, Tally, settling_ticks
+from .motion import SETTLING_S, Motion, MotionTotals, settling_ticks
 from .run_recording import analyse
 from .simulation import simulate, simulate_on
 from .stopping import STOP_ORDERS, StoppedRun, last_tick_s, simulate_stop
@@ -17,8 +17,8 @@ __all__ = [
     "STOP_ORDERS",
     "TRACE_HEADER",
     "Motion",
+    "MotionTotals",
     "StoppedRun",
-    "Tally",
     "analyse",
     "last_tick_s",
     "settling_ticks",

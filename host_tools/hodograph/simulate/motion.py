@@ -191,8 +191,8 @@ class Motion:
         return self._by_axis("volts_mv") / 1000.0
 
 
-class Tally:
-    """Gathers hashes and maxima, chunk by chunk, so that a run of any length needs bounded memory."""
+class MotionTotals:
+    """Hashes and maxima of a run, added chunk by chunk, so that a run of any length needs bounded memory."""
 
     def __init__(
         self,
@@ -203,11 +203,11 @@ class Tally:
         contour: Contour | None = None,
         events: Events | None = None,
     ) -> None:
-        """Of a program with `ticks` ticks and these axes; what is added beyond the ticks counts as settling.
+        """For a program of `ticks` ticks and these axes; rows added beyond the ticks count as settling.
 
         units    of the axes (default mm)
-        contour  of a program with axes behind x, y, z; None: it has none
-        events   of the program; None: it has none
+        contour  of a program with axes after x, y, z; None: it has no such axes
+        events   of the program; None: it has no events
         """
         self._left = ticks
         self._names = names
@@ -227,7 +227,7 @@ class Tally:
         self._event_ticks = np.full(self._events.shape, -1, dtype=np.int64)
 
     def add(self, rows: NDArray[np.void]) -> None:
-        """The next rows, of `native.ROW`."""
+        """Adds the next rows, of `native.ROW`."""
         counted = rows[: self._left]
         self._left -= counted.size
         path = np.s_[:, : len(self._names)]
@@ -266,12 +266,12 @@ class Tally:
         self._event_ticks[due] = rows["tick"][found]
 
     def _greatest_following(self, unit: str) -> float | None:
-        """In thousandths of the unit, of the axes that have it; None: there is none."""
+        """Greatest following error of the axes with this unit, in thousandths of it; None: there is no such axis."""
         every = zip(self._following_counts.tolist(), self._counts, self._units, strict=True)
         return max((most * (1000.0 / own) for most, own, its in every if its == unit), default=None)
 
     def motion(self, *, kernel: str, period_us: int, ticks: int, rows: NDArray[np.void]) -> Motion:
-        """The result, with `rows` as they were kept."""
+        """The result, with the `rows` that were kept."""
         kept = self._orientation if rows.size else []
         error = np.concatenate(kept) if kept else np.zeros((rows.size, self._max_orientation.size))
         return Motion(

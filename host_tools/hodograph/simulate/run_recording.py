@@ -15,7 +15,7 @@ from ..names import AXES
 from ..native import ROW, Contour, NativeProgram
 from ..native.program import Counts
 from .motion import Motion, settling_ticks
-from .simulation import make_tally
+from .simulation import make_totals
 
 
 def analyse(
@@ -63,9 +63,9 @@ def analyse(
     )
     if outputs is not None and latched is not None:
         _put_outputs(rows, program, outputs, latched)
-    tally = make_tally(program, counts_per_mm, tuple(names or AXES[:axes]), units)
-    tally.add(rows)
-    motion = tally.motion(
+    totals = make_totals(program, counts_per_mm, tuple(names or AXES[:axes]), units)
+    totals.add(rows)
+    motion = totals.motion(
         kernel=kernel,
         period_us=program.period_us,
         ticks=program.ticks,

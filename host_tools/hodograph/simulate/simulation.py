@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..names import AXES
 from ..native import ROW, Contour, NativeProgram, OfflineFault, OfflineSimulation
 from ..native.program import Counts
-from .motion import Motion, Tally, settling_ticks
+from .motion import Motion, MotionTotals, settling_ticks
 
 CHUNK_TICKS = 16384
 """Ticks a call of the C side: small enough to stay in cache, and between two checks for Ctrl-C."""
@@ -34,17 +34,17 @@ def names_of_driven(
     return AXES[:count] if names is None else tuple(names)
 
 
-def make_tally(
+def make_totals(
     program: NativeProgram,
     counts_per_mm: Counts,
     names: tuple[str, ...],
     units: Sequence[str] | None,
     ticks: int | None = None,
-) -> Tally:
-    """The tally of a run of a program, or of its first ticks."""
+) -> MotionTotals:
+    """Empty totals for a run of a program, or of its first ticks."""
     contour = Contour(program) if program.axis_count > 3 else None
     own_ticks = program.ticks if ticks is None else ticks
-    return Tally(own_ticks, counts_per_mm, names, units, contour, program.events)
+    return MotionTotals(own_ticks, counts_per_mm, names, units, contour, program.events)
 
 
 def simulate(
@@ -60,29 +60,34 @@ def simulate(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
 ) -> Motion:
-    """Run a program image with the drives of its axes, which begin parked at its start point.
+    """Runs a program with the drives of its axes, which stand at its start point.
 
-    Gives the same setpoints and encoder positions as a run on the bus, bit for bit. `keep_rows=False`
-    bounds the memory of very long runs: hashes and maxima only. `progress(done, all)` is called
-    after each chunk. An image that is run often may be given opened. `faults` act on the axes; nobody supervises them.
-    `names` and `units` are those of the axes (default x, y, … in mm); `counts_per_mm` may be given for each.
+    Gives the same setpoints and encoder positions as a run on the bus, bit for bit.
 
-    Raises InputError: image, kernel or drive figures not acceptable.
+    image          bytes, or a program that is opened already (faster, if it is run often)
+    drives         of the axes of the program, in their order
+    counts_per_mm  of all axes, or of each
+    faults         that act on the axes; no controller supervises them
+    keep_rows      False: hashes and maxima only, which bounds the memory of very long runs
+    progress       called with (ticks done, all ticks) after each chunk
+    names, units   of the axes (default x, y, … in mm)
+
+    Raises InputError: image, kernel or drive figures are not acceptable.
     """
     program = image if isinstance(image, NativeProgram) else NativeProgram(image)
     names = names_of_driven(program, drives, names)
     simulation = OfflineSimulation(program, kernel, drives, counts_per_mm, feedforward, faults)
     total = program.ticks + settling_ticks(program.period_us)
-    tally = make_tally(program, counts_per_mm, names, units)
+    totals = make_totals(program, counts_per_mm, names, units)
     rows = np.empty(total if keep_rows else min(total, CHUNK_TICKS), dtype=ROW)
     for first in range(0, total, CHUNK_TICKS):
         count = min(CHUNK_TICKS, total - first)
         chunk = rows[first : first + count] if keep_rows else rows[:count]
         simulation.run(chunk)
-        tally.add(chunk)
+        totals.add(chunk)
         if progress is not None:
             progress(first + count, total)
-    return tally.motion(
+    return totals.motion(
         kernel=kernel,
         period_us=program.period_us,
         ticks=program.ticks,

@@ -20,7 +20,7 @@ from ..native.offline import OfflineOrder
 from ..native.program import Counts
 from ..program import Program
 from .motion import Motion, settling_ticks
-from .simulation import make_tally, names_of_driven
+from .simulation import make_totals, names_of_driven
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
 """Kinds of a stop, and of the OfflineOrder that asks for it."""
@@ -103,9 +103,9 @@ def simulate_stop(
     if stop is None or stop.rest_tick is None:
         raise HodographError(f"simulation: {kind} at {at_s:g} s never came to rest: report a bug")
     rows = rows[: stop.rest_tick + 1 + settling]
-    tally = make_tally(program, counts_per_mm, names, units, stop.rest_tick + 1)
-    tally.add(rows)
-    motion = tally.motion(
+    totals = make_totals(program, counts_per_mm, names, units, stop.rest_tick + 1)
+    totals.add(rows)
+    motion = totals.motion(
         kernel=kernel,
         period_us=program.period_us,
         ticks=stop.rest_tick + 1,

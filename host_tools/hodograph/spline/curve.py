@@ -65,6 +65,11 @@ class PHSpline(ArcLengthChain):
         end = self.origin[:1] if self.closed else self.position_coefficients[-1:, 5]
         return np.concatenate((self.origin, end))
 
+    @property
+    def axes_nodes(self) -> Real:
+        """The joints as rows of coordinates (N + 1, 2)."""
+        return coordinates(self.nodal_points)
+
     # By segment and parameter
 
     def position(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
@@ -117,6 +122,10 @@ class PHSpline(ArcLengthChain):
     def point(self, s_mm: ArrayLike) -> Complex:
         """Points at arc lengths `s_mm`; mm."""
         return self.position(*self.locate(s_mm))
+
+    def axes_point(self, s_mm: ArrayLike) -> Real:
+        """Points at arc lengths `s_mm` as rows of coordinates (…, 2); mm."""
+        return coordinates(self.point(s_mm))
 
     def tangent(self, s_mm: ArrayLike) -> Complex:
         """Unit tangents at arc lengths `s_mm`."""

@@ -30,7 +30,7 @@ from ..bus.sdo.stream_channel import (
 from ..bus.signals import unbroken
 from ..config import Machine
 from ..errors import HodographError, RunError
-from ..job_run import Operator, at_rest, say, stops
+from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native import NativeProgram
 from .chunk import Chunk
 from .journal import Journal
@@ -144,7 +144,7 @@ class Sender:
             self._job(item[0], item[1])
             item = self._wait_item()
         if self._ahead:
-            at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
+            execute_at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
         else:
             self.at.note("nothing of the job is left")
         if self.journal is not None:
@@ -182,7 +182,7 @@ class Sender:
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
         """Sections that the controller runs as one job, from the one that begins with this chunk."""
         self._to_start(chunk)
-        at_rest(self.at, section.file, section.before, self.operator)
+        execute_at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(chunk)
         begin_q40 = chunk.header.job_start_q40
         self._ahead = deque([section])
@@ -278,8 +278,8 @@ class Sender:
         while len(self._ahead) > 1 and way_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
             self._ahead.popleft()
             section = self._section
-            say(self.at, section.file, section.before)
-            for line, code in () if self.plan.stops else stops(section.before):
+            report_messages(self.at, section.file, section.before)
+            for line, code in () if self.plan.stops else operator_stops_of(section.before):
                 self.at.note(f"{section.file}:{line}: {code}: passed without waiting (--no-stops)")
 
     def _at_program_stop(self) -> None:
@@ -294,7 +294,7 @@ class Sender:
                 raise _GoesOnError
 
         with suppress(_GoesOnError):
-            for line, code in stops(section.before):
+            for line, code in operator_stops_of(section.before):
                 self.operator(f"{section.file}:{line}: {code}", look)
             controller.command(RESUME)
 

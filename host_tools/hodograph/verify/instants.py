@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the motion is at an instant: derivatives of arc length and of the point, by the chain rule.
+"""The motion at given instants: derivatives of arc length and of the point, by the chain rule.
+
+A part of `hodograph verify`: shares no code with the planner (`feed`), which it checks.
 
 In the plane, with the unit tangent T = w / conj(w), N = 2 Im(conj(w) w') and sigma = |w|^2, the curvature is
 kappa = N / sigma^2, and with kappa_s its slope along the arc

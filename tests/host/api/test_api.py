@@ -257,7 +257,7 @@ def test_a_run_has_one_row_a_setpoint(machine: hg.Machine) -> None:
         ),
         (lambda: hg.example_file("nothing"), hg.InputError, "use one of: alpha"),
         (lambda: hg.Machine.example("nothing"), hg.InputError, "use one of: .*paper_alpha"),
-        (lambda: hg.load_program("nothing", hg.Machine.example()), hg.InputError, "No such file"),
+        (lambda: hg.load_program("nothing", hg.Machine.example()), hg.InputError, "no such file"),
         (lambda: hg.Program(b"HDGP", hg.Machine.example()), hg.InputError, "program image"),
     ],
 )

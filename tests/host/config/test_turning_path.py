@@ -138,3 +138,18 @@ def test_the_api_takes_it() -> None:
     assert 59.0 < run.feed_mm_s.max() <= 60.0
     from_file = hg.load_plan(FILE).program()
     assert from_file.simulate().setpoints_counts[-1].tolist() == [2_000_000, 27_000_000]
+
+
+def test_the_api_runs_it_on_a_bus(tmp_path: Path) -> None:
+    """x, y and z go where the path has them; an image alone does not hold where that is."""
+    program = hg.load_plan(FILE).program()
+    program.save(tmp_path / "index.hdgp")
+    loaded = hg.load_program(tmp_path / "index.hdgp", program.machine)
+    with hg.local_bus() as bus, hg.connect(program.machine, bus) as controller:
+        with pytest.raises(hg.InputError, match="turns axes alone"):
+            controller.run(loaded)
+        run = controller.run(program)
+        axes = controller.status()["axes"]
+    assert run.setpoints_sha256 == program.simulate().setpoints_sha256
+    points = load_pipeline(FILE, allow_space=True).standing_mm
+    assert [axis["actual_mm"] for axis in axes[: len(points)]] == pytest.approx(points, abs=0.01)

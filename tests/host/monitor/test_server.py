@@ -16,7 +16,7 @@ from aiohttp import WSMsgType
 from aiohttp.test_utils import TestClient, TestServer
 
 from hodograph.errors import InputError, RefusedError
-from hodograph.monitor.clients import MOST_CLIENTS, MOST_WAITING, Hub
+from hodograph.monitor.clients import MOST_CLIENTS, MOST_WAITING, Broadcaster
 from hodograph.monitor.link import read_command
 from hodograph.monitor.security import Guard
 from hodograph.monitor.server import Server
@@ -32,7 +32,7 @@ class Case:
     def __init__(self, host: str = "127.0.0.1") -> None:
         self.executed: list[dict[str, Any]] = []
         self.guard = Guard(host, TOKEN)
-        self.hub: Hub
+        self.broadcaster: Broadcaster
 
     async def execute(self, request: dict[str, Any]) -> str:
         if request.get("name") == "refuse":
@@ -42,8 +42,8 @@ class Case:
 
     def run(self, scenario: Callable[[Browser], Awaitable[None]]) -> None:
         async def whole() -> None:
-            self.hub = Hub(asyncio.get_running_loop())
-            server = Server(self.guard, self.hub, {"mode": "live"}, self.execute)
+            self.broadcaster = Broadcaster(asyncio.get_running_loop())
+            server = Server(self.guard, self.broadcaster, {"mode": "live"}, self.execute)
             async with TestClient(TestServer(server.app)) as browser:
                 await scenario(browser)
 
@@ -124,7 +124,7 @@ def test_without_the_token_loopback_may_look_on_only() -> None:
             found = await answer(socket, "answer")
             assert not found["ok"]
             assert "token" in found["text"]
-        case.hub.publish({"type": "rows", "i": 1})
+        case.broadcaster.publish({"type": "rows", "i": 1})
         assert (await answer(socket, "rows"))["i"] == 1
 
     case.run(scenario)
@@ -272,7 +272,9 @@ def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
             writer.close()
 
     async def whole() -> None:
-        served = Server(Guard("127.0.0.1", TOKEN), Hub(asyncio.get_running_loop()), {}, nobody)
+        served = Server(
+            Guard("127.0.0.1", TOKEN), Broadcaster(asyncio.get_running_loop()), {}, nobody
+        )
         server = TestServer(served.app)
         await server.start_server(keepalive_timeout=0.2)
         try:
@@ -319,7 +321,7 @@ def test_a_browser_that_leaves_in_the_middle(caplog: pytest.LogCaptureFixture) -
                 writer.write(request)
                 for _ in range(turns):
                     await asyncio.sleep(0)
-                    case.hub.publish({"type": "fill", "text": "x" * 100_000})
+                    case.broadcaster.publish({"type": "fill", "text": "x" * 100_000})
                 leave(writer)
         await asyncio.sleep(0.2)
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Taking frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
+"""Receives frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
 
-About one system call per thousand frames. The frames stay the raw structures of linux/can.h, for numpy to read. What
-the kernel says beside a frame comes along: how many frames it had to drop for this socket (SO_RXQ_OVFL) and when it
-got the frame (SO_TIMESTAMP). A local bus sends the time with each frame.
+For `recorder` and the live page. One system call takes up to about a thousand frames. The frames stay raw structures of
+linux/can.h, which numpy reads. Each frame has the time at which the kernel received it (SO_TIMESTAMP) and the number of
+frames that the kernel dropped for this socket (SO_RXQ_OVFL). A local bus sends the time with each frame.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The load of a bus, measured by listening (docs/reference/bus-time.md section 3): bits of every frame,
-stuff bits computed,
-over the time of the bus. `hodograph status` and the live page show this one.
+"""Measures the load of a bus from captured frames (docs/reference/bus-time.md section 3).
+
+The load is the bits of all frames, with their computed stuff bits, divided by the bit rate and the time. Shown by
+`hodograph status`, `hodograph run` and the live page. Receives only, never sends.
 """
 
 from __future__ import annotations

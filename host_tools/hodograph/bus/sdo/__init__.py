@@ -1,2 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is said to the controller by SDO: its objects, programs, commands, state."""
+"""Access to the controller by SDO: reads its status, writes configuration, programs and commands.
+
+`controller` is the entry point for the commands and the API.
+"""

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The controller's configuration, as a machine file asks for it (docs/reference/protocol.md section 3)."""
+"""The object values that configure a controller for a machine file (docs/reference/protocol.md section 3).
+
+`sdo/controller` writes them; `configuration` is pure.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,7 @@ WINDOW_OFF = 2**32 - 1
 
 
 def configuration(machine: Machine, kernel: str) -> list[tuple[Object, int]]:
-    """What the objects of the controller have to hold."""
+    """Objects of the controller with the values that they need for this machine."""
     supervision = machine.supervision
     wanted: list[tuple[Object, int]] = [
         ((objects.PERIOD, None), machine.period_us),

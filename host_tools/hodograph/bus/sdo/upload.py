@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Sending a program image to the controller."""
+"""Sends a program image to the controller by SDO block download.
+
+Called by `sdo/controller`; `stream_channel` sends chunks in the same way.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,14 @@ from .objects import PROGRAM, PROGRAM_MEMORY, STATE
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 _GAP_S = 0.01
-"""Between two blocks the bus is left to heartbeats, over which SDO has right of way. A tick of a bus as full as
-`require_fit` allows leaves room for one or two frames.
+"""Pause between two blocks, so that heartbeats are sent in time.
+
+They have a lower priority than SDO. The fullest bus that `require_fit` allows has room for one or two more frames in a
+period.
 """
 
 _FATE_S = 1.0
-"""Patience with a controller after an upload that broke off."""
+"""How long the state of the program is asked for after an upload that broke off."""
 
 Progress = Callable[[int], None]
 

@@ -7,7 +7,7 @@ import asyncio
 import json
 from typing import Any
 
-from hodograph.monitor.clients import EVENTS, HISTORY, QUEUE, Client, Hub
+from hodograph.monitor.clients import EVENTS, HISTORY, QUEUE, Broadcaster, Client
 
 
 async def taken(client: Client) -> list[Any]:
@@ -25,12 +25,12 @@ def run(scenario: Any) -> Any:
 
 def test_a_slow_browser_loses_the_oldest_rows_and_no_state() -> None:
     async def scenario() -> tuple[list[Any], int]:
-        hub = Hub(asyncio.get_running_loop())
-        client = hub.join()
+        broadcaster = Broadcaster(asyncio.get_running_loop())
+        client = broadcaster.join()
         for i in range(QUEUE + 50):
-            hub.publish({"type": "rows", "i": i})
-            hub.publish({"type": "status", "i": i})
-        hub.publish({"type": "path", "i": 0})
+            broadcaster.publish({"type": "rows", "i": i})
+            broadcaster.publish({"type": "status", "i": i})
+        broadcaster.publish({"type": "path", "i": 0})
         await asyncio.sleep(0)
         await asyncio.sleep(0)
         return await taken(client), client.dropped
@@ -45,17 +45,17 @@ def test_a_slow_browser_loses_the_oldest_rows_and_no_state() -> None:
 
 def test_who_comes_later_gets_the_latest_and_a_bounded_past() -> None:
     async def scenario() -> list[Any]:
-        hub = Hub(asyncio.get_running_loop())
+        broadcaster = Broadcaster(asyncio.get_running_loop())
         for i in range(HISTORY + 100):
-            hub.publish({"type": "rows", "i": i})
+            broadcaster.publish({"type": "rows", "i": i})
         for i in range(EVENTS + 10):
-            hub.publish({"type": "event", "text": str(i)})
-        hub.publish({"type": "path", "x": []})
+            broadcaster.publish({"type": "event", "text": str(i)})
+        broadcaster.publish({"type": "path", "x": []})
         await asyncio.sleep(0)
-        client = hub.join()
-        assert hub.count == 1
-        hub.leave(client)
-        assert hub.count == 0
+        client = broadcaster.join()
+        assert broadcaster.count == 1
+        broadcaster.leave(client)
+        assert broadcaster.count == 0
         return await taken(client)
 
     path, history = run(scenario)
@@ -66,13 +66,13 @@ def test_who_comes_later_gets_the_latest_and_a_bounded_past() -> None:
 
 def test_a_restart_forgets_the_past() -> None:
     async def scenario() -> list[Any]:
-        hub = Hub(asyncio.get_running_loop())
-        client = hub.join()
-        hub.publish({"type": "rows", "i": 1})
-        hub.publish({"type": "restart"})
-        hub.publish({"type": "rows", "i": 2})
+        broadcaster = Broadcaster(asyncio.get_running_loop())
+        client = broadcaster.join()
+        broadcaster.publish({"type": "rows", "i": 1})
+        broadcaster.publish({"type": "restart"})
+        broadcaster.publish({"type": "rows", "i": 2})
         await asyncio.sleep(0)
-        return await taken(client) + await taken(hub.join())
+        return await taken(client) + await taken(broadcaster.join())
 
     found = run(scenario)
     assert found[:2] == [{"type": "restart"}, {"type": "rows", "i": 2}]
@@ -80,7 +80,7 @@ def test_a_restart_forgets_the_past() -> None:
 
 
 def test_after_the_end_publishing_does_nothing() -> None:
-    async def scenario() -> Hub:
-        return Hub(asyncio.get_running_loop())
+    async def scenario() -> Broadcaster:
+        return Broadcaster(asyncio.get_running_loop())
 
     run(scenario).publish({"type": "rows"})

@@ -6,14 +6,14 @@
 
 #define PERIOD_US 1000u
 
-static struct tpdo_monitor answers;
+static struct tpdo_monitor monitor;
 static uint32_t now_us;
 static uint32_t wait_us;
 static uint8_t missed_max;
 
 void setUp(void)
 {
-    tpdo_monitor_init(&answers);
+    tpdo_monitor_init(&monitor);
     now_us = UINT32_MAX - 3u * PERIOD_US; /* soon to wrap */
     wait_us = 0;
     missed_max = 1;
@@ -28,10 +28,10 @@ static uint32_t sync(unsigned count)
 {
     const uint32_t sync_us = now_us;
     for (unsigned i = 0; i < count; ++i) {
-        tpdo_monitor_take(&answers, sync_us + 300u);
+        tpdo_monitor_take(&monitor, sync_us + 300u);
     }
     now_us += PERIOD_US;
-    return tpdo_monitor_close_sync(&answers, now_us, sync_us, wait_us, missed_max);
+    return tpdo_monitor_close_sync(&monitor, now_us, sync_us, wait_us, missed_max);
 }
 
 /* What the tick uses has to do exactly what tpdo_monitor_close_sync does, wherever it says that it has done it. */
@@ -41,14 +41,14 @@ static void test_the_quick_end_of_a_sync_is_the_same_as_the_thorough_one(void)
     uint32_t quick_ones = 0;
     wait_us = 2u * PERIOD_US;
     for (uint32_t i = 0; i < sizeof counts; ++i) {
-        struct tpdo_monitor quick = answers;
+        struct tpdo_monitor quick = monitor;
         for (unsigned k = 0; k < counts[i]; ++k) {
             tpdo_monitor_take(&quick, now_us + 300u);
         }
         const struct tpdo_monitor before = quick;
         const bool done = tpdo_monitor_close_answered(&quick);
         const uint32_t missed = sync(counts[i]);
-        TEST_ASSERT_EQUAL_MEMORY(done ? &answers : &before, &quick, sizeof quick);
+        TEST_ASSERT_EQUAL_MEMORY(done ? &monitor : &before, &quick, sizeof quick);
         TEST_ASSERT_TRUE(!done || missed == 0u);
         quick_ones += done ? 1u : 0u;
     }
@@ -60,8 +60,8 @@ static void test_nothing_is_missed_before_the_first_answer(void)
     for (unsigned i = 0; i < 20; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(0));
     }
-    TEST_ASSERT_FALSE(answers.present);
-    TEST_ASSERT_FALSE(answers.lost);
+    TEST_ASSERT_FALSE(monitor.present);
+    TEST_ASSERT_FALSE(monitor.lost);
 }
 
 static void test_without_patience_absent_is_missed(void)
@@ -69,8 +69,8 @@ static void test_without_patience_absent_is_missed(void)
     TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     TEST_ASSERT_EQUAL_UINT32(1, sync(0));
     TEST_ASSERT_EQUAL_UINT32(0, sync(1));
-    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
-    TEST_ASSERT_FALSE(answers.lost);
+    TEST_ASSERT_EQUAL_UINT32(1, monitor.missed);
+    TEST_ASSERT_FALSE(monitor.lost);
 }
 
 static void test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer(void)
@@ -79,12 +79,12 @@ static void test_one_more_than_permitted_in_a_row_is_lost_until_the_next_answer(
         (void)sync(1);
         for (unsigned i = 0; i < missed_max; ++i) {
             TEST_ASSERT_EQUAL_UINT32(1, sync(0));
-            TEST_ASSERT_FALSE(answers.lost);
+            TEST_ASSERT_FALSE(monitor.lost);
         }
         TEST_ASSERT_EQUAL_UINT32(1, sync(0));
-        TEST_ASSERT_TRUE(answers.lost);
-        tpdo_monitor_take(&answers, now_us);
-        TEST_ASSERT_FALSE(answers.lost);
+        TEST_ASSERT_TRUE(monitor.lost);
+        tpdo_monitor_take(&monitor, now_us);
+        TEST_ASSERT_FALSE(monitor.lost);
     }
 }
 
@@ -99,7 +99,7 @@ static void test_late_answers_are_not_counted(void)
     for (unsigned i = 0; i < 20; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     }
-    TEST_ASSERT_EQUAL_UINT32(0, answers.missed);
+    TEST_ASSERT_EQUAL_UINT32(0, monitor.missed);
 }
 
 /* Two absent, only one of them comes later. */
@@ -116,7 +116,7 @@ static void test_what_does_not_come_in_time_is_missed(void)
     for (unsigned i = 0; i < 20; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(1));
     }
-    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+    TEST_ASSERT_EQUAL_UINT32(1, monitor.missed);
 }
 
 /* One is missed for good; another, four SYNCs later, comes late. */
@@ -133,7 +133,7 @@ static void test_each_absent_one_has_its_own_time(void)
     for (unsigned i = 0; i < 20; ++i) {
         (void)sync(1);
     }
-    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+    TEST_ASSERT_EQUAL_UINT32(1, monitor.missed);
 }
 
 static void test_more_than_can_be_remembered_are_missed(void)
@@ -141,16 +141,16 @@ static void test_more_than_can_be_remembered_are_missed(void)
     wait_us = 100000;
     missed_max = 100;
     (void)sync(1);
-    for (unsigned i = 0; i < TPDO_MONITOR_UNSETTLED; ++i) {
+    for (unsigned i = 0; i < TPDO_MONITOR_PENDING_MAX; ++i) {
         TEST_ASSERT_EQUAL_UINT32(0, sync(0));
     }
     TEST_ASSERT_EQUAL_UINT32(1, sync(0));
     TEST_ASSERT_EQUAL_UINT32(1, sync(0));
-    (void)sync(1u + TPDO_MONITOR_UNSETTLED);
+    (void)sync(1u + TPDO_MONITOR_PENDING_MAX);
     for (unsigned i = 0; i < 200; ++i) {
         (void)sync(1);
     }
-    TEST_ASSERT_EQUAL_UINT32(2, answers.missed);
+    TEST_ASSERT_EQUAL_UINT32(2, monitor.missed);
 }
 
 static void test_lost_takes_the_patience_too(void)
@@ -159,11 +159,11 @@ static void test_lost_takes_the_patience_too(void)
     (void)sync(1);
     for (unsigned i = 0; i < 4; ++i) {
         (void)sync(0);
-        TEST_ASSERT_FALSE(answers.lost);
+        TEST_ASSERT_FALSE(monitor.lost);
     }
     (void)sync(0);
-    TEST_ASSERT_TRUE(answers.lost);
-    TEST_ASSERT_EQUAL_UINT32(5, answers.missed);
+    TEST_ASSERT_TRUE(monitor.lost);
+    TEST_ASSERT_EQUAL_UINT32(5, monitor.missed);
 }
 
 /* Doubled frames make up for nothing that is missed later. */
@@ -176,7 +176,7 @@ static void test_a_doubled_answer_is_one(void)
     for (unsigned i = 0; i < 6; ++i) {
         (void)sync(1);
     }
-    TEST_ASSERT_EQUAL_UINT32(1, answers.missed);
+    TEST_ASSERT_EQUAL_UINT32(1, monitor.missed);
 }
 
 static void test_restart_keeps_the_presence_only(void)
@@ -184,14 +184,14 @@ static void test_restart_keeps_the_presence_only(void)
     (void)sync(1);
     (void)sync(0);
     (void)sync(0);
-    tpdo_monitor_restart(&answers);
-    TEST_ASSERT_TRUE(answers.present);
-    TEST_ASSERT_FALSE(answers.lost);
-    TEST_ASSERT_EQUAL_UINT32(0, answers.missed);
+    tpdo_monitor_restart(&monitor);
+    TEST_ASSERT_TRUE(monitor.present);
+    TEST_ASSERT_FALSE(monitor.lost);
+    TEST_ASSERT_EQUAL_UINT32(0, monitor.missed);
     (void)sync(0);
-    TEST_ASSERT_FALSE(answers.lost);
+    TEST_ASSERT_FALSE(monitor.lost);
     (void)sync(0);
-    TEST_ASSERT_TRUE(answers.lost);
+    TEST_ASSERT_TRUE(monitor.lost);
 }
 
 int main(void)
