@@ -372,6 +372,20 @@ def _with_outputs(
     )
 
 
+def missing_axes(machine: Machine) -> str:
+    """Those of a, b and c that are no axes of the machine's path."""
+    names = [axis.name.lower() for axis in machine.path_axes[3:]]
+    return "".join(name for name in AXES[3:] if name not in names)
+
+
+def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputError:
+    """The refusal of a move that turns a, b or c, which is no axis of the machine's path."""
+    return InputError(
+        f"{file}:{line}: the move turns {name.upper()}, but no axis {name} of {machine.file.name} follows the path: "
+        'name it behind "z" in path = [...] at its top, or leave it out'
+    )
+
+
 def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
     """What a command that the machine does not execute is about; None: it executes it, or it is about motion."""
     if is_output(command, outputs):
@@ -486,21 +500,16 @@ class SectionMaker:
         names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
         columns = [AXES.index(name) - 3 if name in AXES[3:] else None for name in names]
         try:
-            return with_turning(fitted, columns, section.tolerance_mm)
+            return with_turning(fitted, columns, section.tolerance_mm, section.tied)
         except PlanError as error:
             raise PlanError(f"{self.file}: {error}") from None
 
     def _check_turning(self, angles: Real, lines: Int) -> None:
         """Raises InputError, naming the line, where a, b or c turns, which is no axis of the machine's path."""
-        names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
         for k, name in enumerate(AXES[3:]):
-            if name not in names and angles[:, k].any():
+            if name in missing_axes(self.machine) and angles[:, k].any():
                 line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
-                raise InputError(
-                    f"{self.file}:{line}: the move turns {name.upper()}, but no axis {name} of "
-                    f'{self.machine.file.name} follows the path: name it behind "z" in path = [...] at its top, '
-                    "or leave it out"
-                )
+                raise no_such_axis(self.file, int(line), name, self.machine)
 
     def _section(self, section: Section, fitted: FittedPath) -> JobSection:
         machine = self._moving(section)

@@ -25,7 +25,7 @@ from ..bus.sdo.controller import connect
 from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
-from ..config import Machine, load_machine, load_paths
+from ..config import SPACE_AXES, Machine, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
@@ -306,11 +306,16 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     )
     if found.distance_mm > machine.start_tolerance_mm:
         point = [number(one) for one in found.point_mm]
-        more = f" --z {point[2]}" if len(point) > 2 else ""
+        more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
+        turned = [
+            f"{axis.name} {at}"
+            for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
+        ]
+        along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
         raise RefusedError(
             f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
             f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
-            f"--to {point[0]} {point[1]}{more}, then hodograph stream --continue"
+            f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue"
         )
     return found.place
 

@@ -455,6 +455,7 @@ class SectionChunks:
             start_q40=path.start_q40[first:end] - base,
             point_q40=path.point_q40[:, first:end],
             a_q44=path.a_q44[:, first:end],
+            extra_q40=path.extra_q40[:, first:end],
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=int(pieces.start_q40[0]) != self._feed.begin_q40,

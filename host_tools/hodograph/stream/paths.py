@@ -46,10 +46,6 @@ class _BegunPipeline(Pipeline):
         found = super().found_spline
         if self.begin_mm <= 0.0:
             return found
-        if found.spline.axes > 3:
-            raise PlanError(
-                f"{self.file.file}: a path with extra axes cannot go on in its middle: stream the job from its start"
-            )
         curve = curve_behind(found.spline, self.begin_mm)[1]
         if isinstance(curve, PHSpline):  # two branches, so that each has the type of its curve
             return FoundSpline(curve, 0)

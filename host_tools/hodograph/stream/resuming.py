@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import SPACE_AXES, load_paths
+from ..config import load_paths
 from ..errors import InputError
 from ..names import is_toolpath
 from ..pipeline import Pipeline
+from ..spline import PHSpline
 from .geometry import Block, Curve, points_at
 from .journal import Entry
 from .plan import JobFiles, Place
@@ -43,14 +44,13 @@ class Nearest:
 def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Nearest:
     """The place nearest to the axes between the one that the journal has last and the end of what had been sent.
 
-    at_mm  (A,) of the axes that the path moves, machine coordinates; those behind x, y, z do not count
+    at_mm  (A,) of the axes that the path moves, machine coordinates; a degree counts as a mm
     Raises InputError and PlanError as reading the job does.
     """
     starts = dict(entry.starts) or {entry.section: 0}
     low_q40 = starts.get(entry.section, 0) + entry.way_q40
-    drawn = min(len(at_mm), SPACE_AXES)
-    offset_mm = np.array(job.machine.offset_mm[:drawn])
-    target = np.array(at_mm[:drawn]) - offset_mm
+    offset_mm = np.array(job.machine.offset_mm[: len(at_mm)])
+    target = np.array(at_mm) - offset_mm
     found: list[Nearest] = []
     for number, blocks in _sections(job):
         if number > max(starts):
@@ -99,7 +99,7 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
 def _found(
     block: Block, way_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
 ) -> Nearest:
-    point = points_at(block.curve, np.array([way_mm]))[0, : target.size]
+    point = _places(block.curve, np.array([way_mm]))[0]
     segment, _ = block.curve.locate(way_mm)
     return Nearest(
         Place(number, round((begin_mm + way_mm) * 2.0**40)),
@@ -128,4 +128,9 @@ def _refined(curve: Curve, target: Real, s: Real, k: int) -> float:
 
 
 def _distances(curve: Curve, s: Real, target: Real) -> Real:
-    return np.asarray(np.linalg.norm(points_at(curve, s)[:, : target.size] - target, axis=1))
+    return np.asarray(np.linalg.norm(_places(curve, s) - target, axis=1))
+
+
+def _places(curve: Curve, s: Real) -> Real:
+    """All axes (n, A) at arc lengths (n,)."""
+    return points_at(curve, s) if isinstance(curve, PHSpline) else curve.axes_point(s)

@@ -309,16 +309,6 @@ def test_what_is_not_executed_is_not_refused(tmp_path: Path, machine: Machine) -
     require_outputs(file, load_machine(ROOT / "examples" / "machines" / "mill.toml"), ReadOptions())
 
 
-@pytest.mark.parametrize("line", ["G1 X3 A90", "G0 b-1", "N7 g1 x3 c [45]", "G1 X3 A#1"])
-def test_a_late_turning_move_is_refused_before_anything_moves(tmp_path: Path, line: str) -> None:
-    mill = load_machine(ROOT / "examples" / "machines" / "mill_five_axes.toml")
-    file = tmp_path / "job.ngc"
-    file.write_text(HEAD + f"#1=9\nG1 X1 A0 (A90)\n{line}\nG1 X2\nM2\n")
-    first = HEAD.count("\n")
-    with pytest.raises(InputError, match=f"job.ngc:{first + 3}: the move turns A, B or C.*use run"):
-        require_outputs(file, mill, ReadOptions())
-
-
 # -- path files -------------------------------------------------------------------------------------
 
 PATHS = """

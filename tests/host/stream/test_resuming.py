@@ -78,6 +78,17 @@ def test_work_offset(job: JobFiles, machine: Machine) -> None:
     assert found.distance_mm < 2e-6
 
 
+def test_axes_that_turn_count(tmp_path: Path) -> None:
+    """There and back on one line, while A goes on: the place is where A is too."""
+    five = load_machine(ROOT / "examples" / "machines" / "mill_five_axes.toml")
+    file = tmp_path / "part.ngc"
+    file.write_text("G61\nF600\nG1 X10 A10\nG1 X0 A20\n")
+    job = JobFiles((file,), five, 0.01, ReadOptions())
+    found = nearest_place(job, _entry(0, 0.0, 20.0), (4.0, 0.0, 0.0, 16.5, 0.0))
+    assert (found.place.section, found.line) == (1, 4)
+    assert abs(found.distance_mm - 0.5**0.5 / 2.0) < 1e-4
+
+
 def test_a_path_file(machine: Machine) -> None:
     two = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
     job = JobFiles((ROOT / "examples" / "paths.toml",), two, 0.01, ReadOptions())
