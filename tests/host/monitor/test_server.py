@@ -12,10 +12,11 @@ from typing import Any
 
 import aiohttp
 import pytest
-from aiohttp import WSMsgType
+from aiohttp import WSMsgType, web
 from aiohttp.test_utils import TestClient, TestServer
 
 from hodograph.errors import InputError, RefusedError
+from hodograph.monitor import server as server_module
 from hodograph.monitor.clients import MOST_CLIENTS, MOST_WAITING, Broadcaster
 from hodograph.monitor.link import read_command
 from hodograph.monitor.security import Guard
@@ -257,17 +258,19 @@ def test_commands_are_the_controllers() -> None:
 
 
 def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor one that comes a byte at a time: the session serves with this time-out."""
+    """Nor one that comes a byte at a time."""
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.2)
 
-    async def scenario(server: TestServer) -> None:
-        streams = [await asyncio.open_connection(server.host, server.port) for _ in range(20)]
+    async def scenario(host: str, port: int) -> None:
+        streams = [await asyncio.open_connection(host, port) for _ in range(20)]
         for _, writer in streams:
             writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX:")
         # A byte that comes after the end resets the connection: then it is an error that ends it.
-        while not all(reader.at_eof() or reader.exception() for reader, _ in streams):
-            for _, writer in streams:
-                writer.write(b"x")
-            await asyncio.sleep(0.05)
+        async with asyncio.timeout(20.0):
+            while not all(reader.at_eof() or reader.exception() for reader, _ in streams):
+                for _, writer in streams:
+                    writer.write(b"x")
+                await asyncio.sleep(0.05)
         for _, writer in streams:
             writer.close()
 
@@ -275,12 +278,13 @@ def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
         served = Server(
             Guard("127.0.0.1", TOKEN), Broadcaster(asyncio.get_running_loop()), {}, nobody
         )
-        server = TestServer(served.app)
-        await server.start_server(keepalive_timeout=0.2)
+        runner = served.runner()
+        await runner.setup()
         try:
-            await scenario(server)
+            await web.TCPSite(runner, "127.0.0.1", 0).start()
+            await scenario(*runner.addresses[0])
         finally:
-            await server.close()
+            await runner.cleanup()
 
     asyncio.run(whole())
 
