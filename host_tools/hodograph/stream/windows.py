@@ -2,7 +2,7 @@
 """The feed of a section in windows: each begins where the kept part of the last one ends, in motion, and is planned to
 rest at its own end; docs/theory/numerics.md 5.6.
 
-Pieces that are kept never change again. What follows a joint until the next chunk comes is a tail: the fastest way
+Pieces that are kept never change again. What follows a joint until the next chunk comes is a tail: the fastest brake
 to rest at the end of a segment not far behind the joint.
 """
 
@@ -559,7 +559,7 @@ def _begun(ends: Ends, state: State | None) -> Ends:
 
 
 def _braking_mm(state: State, limits: PlanLimits) -> float:
-    """About the shortest way to rest."""
+    """About the shortest distance to rest."""
     feed = state.q**0.5
     pull = min(0.7 * limits.least_acceleration, (limits.least_jerk * feed) ** 0.5)
     lead_s = max(0.5 * state.slope, 0.0) / limits.least_jerk
