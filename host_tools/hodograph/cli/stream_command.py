@@ -211,14 +211,14 @@ def _run(
         if continued:
             assert entry is not None
             note(
-                f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
+                f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * 2.0**-40)} mm of it"
             )
             entry = replace(
                 entry,
                 job0=job_number,
                 section=begin.section,
-                way_q40=begin.way_q40,
-                committed_q40=begin.way_q40,
+                arc_q40=begin.arc_q40,
+                committed_q40=begin.arc_q40,
                 first=begin.section,
                 starts=((begin.section, 0),),
             )
@@ -355,6 +355,7 @@ def _print(done: StreamedJob, options: Namespace) -> None:
             ("chunks", f"{done.chunks}, {size_text(done.bytes)}"),
             ("motion", f"{duration_text(done.motion_s)} in {duration_text(done.took_s)}"),
             ("rests for want of chunks", str(done.underruns)),
+            ("rests of the plan", done.rests.text),
         ]
     )
 
@@ -380,6 +381,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
         counted = {"chunks": plan.chunks, "bytes": plan.byte_count}
+        rests = plan.rests
     took_s = time.perf_counter() - begin_s
     for line in notes:
         note(line)
@@ -390,6 +392,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 "wall_s": took_s,
                 "greatest_bytes_per_s": rate,
                 **counted,
+                "rests": asdict(rests),
                 "job": [asdict(one) for one in found],
             }
         )
@@ -403,6 +406,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}",
             ),
             ("bytes a second", f"{number(rate)} at most, over 3 s"),
+            ("rests of the plan", rests.text),
         ]
     )
     for k, one in enumerate(found, 1):

@@ -101,8 +101,8 @@ class PathsJob:
             yield made
             header = made.chunk.header
             program = made.chunk.program
-            way_q40 = header.job_start_q40 + program.length_q40
-            place = JobPlace(Rest(), header.sequence + 1, way_q40, end_point_q40(program))
+            arc_q40 = header.job_start_q40 + program.length_q40
+            place = JobPlace(Rest(), header.sequence + 1, arc_q40, end_point_q40(program))
 
     def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
         length_mm = Pipeline(listed.file, self.machine).curve.length_mm
@@ -126,7 +126,7 @@ class PathsJob:
             last=last,
             job=job,
             sequence=0 if place is None else place.sequence,
-            job_start_q40=begin_q40 if place is None else place.way_q40,
+            job_start_q40=begin_q40 if place is None else place.arc_q40,
             line=number + 1,
             rest=None if place is None else (rest if self.stops else Rest(listed.dwell_ms)),
             joined=not last,

@@ -48,7 +48,7 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
     Raises InputError and PlanError as reading the job does.
     """
     starts = dict(entry.starts) or {entry.section: 0}
-    low_q40 = starts.get(entry.section, 0) + entry.way_q40
+    low_q40 = starts.get(entry.section, 0) + entry.arc_q40
     offset_mm = np.array(job.machine.offset_mm[: len(at_mm)])
     target = np.array(at_mm) - offset_mm
     found: list[Nearest] = []
@@ -63,9 +63,9 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
                 low = (low_q40 - start_q40) * 2.0**-40 - _BESIDE_MM - begin_mm
                 high = (entry.committed_q40 - start_q40) * 2.0**-40 + _BESIDE_MM - begin_mm
                 if high > 0.0 and low < length_mm:
-                    ways = _nearest_ways(block.curve, target, max(low, 0.0), min(high, length_mm))
+                    arcs = _nearest_arcs(block.curve, target, max(low, 0.0), min(high, length_mm))
                     found += [
-                        _found(block, way, begin_mm, number, target, offset_mm) for way in ways
+                        _found(block, arc, begin_mm, number, target, offset_mm) for arc in arcs
                     ]
             begin_mm += length_mm
     if not found:
@@ -97,19 +97,19 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
 
 
 def _found(
-    block: Block, way_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
+    block: Block, arc_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
 ) -> Nearest:
-    point = _places(block.curve, np.array([way_mm]))[0]
-    segment, _ = block.curve.locate(way_mm)
+    point = _places(block.curve, np.array([arc_mm]))[0]
+    segment, _ = block.curve.locate(arc_mm)
     return Nearest(
-        Place(number, round((begin_mm + way_mm) * 2.0**40)),
+        Place(number, round((begin_mm + arc_mm) * 2.0**40)),
         int(block.line[int(segment)]),
         tuple((point + offset_mm).tolist()),
         float(np.linalg.norm(point - target)),
     )
 
 
-def _nearest_ways(curve: Curve, target: Real, low: float, high: float) -> list[float]:
+def _nearest_arcs(curve: Curve, target: Real, low: float, high: float) -> list[float]:
     """Arc lengths of the places nearest to a point, of several about as near, in their order."""
     count = int(np.clip(np.ceil((high - low) / _STEP_MM) + 1, 2, _MOST_SAMPLES))
     s = np.linspace(low, high, count)

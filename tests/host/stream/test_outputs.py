@@ -206,16 +206,16 @@ def test_a_job_that_goes_on_begins_with_what_is_on(
     wave: Path, waves: list[list[Chunk]], machine: Machine, share: float
 ) -> None:
     program = concatenated(waves[1])
-    way_q40 = round(share * program.length_q40)
+    arc_q40 = round(share * program.length_q40)
     before = SwitchedOutputs()
-    before.act(program.events[program.events["place"] <= way_q40])
-    begun = _chunks(wave, machine, begin=Place(0, way_q40))[0].program.events
+    before.act(program.events[program.events["place"] <= arc_q40])
+    begun = _chunks(wave, machine, begin=Place(0, arc_q40))[0].program.events
     at_start = SwitchedOutputs()
     at_start.act(begun[begun["place"] == 0])
     assert at_start.begin().tolist() == before.begin().tolist()
-    later = program.events[program.events["place"] > way_q40][: np.count_nonzero(begun["place"])]
+    later = program.events[program.events["place"] > arc_q40][: np.count_nonzero(begun["place"])]
     moved = begun[begun["place"] > 0]
-    assert np.abs(moved["place"] + way_q40 - later["place"]).max() < 2**14
+    assert np.abs(moved["place"] + arc_q40 - later["place"]).max() < 2**14
     assert (moved["value"] == later["value"]).all()
 
 

@@ -64,7 +64,7 @@ def test_nearest_places(
     """Only between the last place of the journal and the end of what was sent; of equal places the first."""
     found = nearest_place(job, entry, at)
     assert found.place.section == section
-    assert abs(found.place.way_q40 / Q40 - way) < 1e-5
+    assert abs(found.place.arc_q40 / Q40 - way) < 1e-5
     assert abs(found.distance_mm - distance) < 1e-5
     assert found.line == 3 + section
     off = np.linalg.norm(np.subtract(found.point_mm, at))
@@ -74,7 +74,7 @@ def test_nearest_places(
 def test_work_offset(job: JobFiles, machine: Machine) -> None:
     moved = replace(job, machine=replace(machine, offset_mm=(5.0, -3.0, 1.0)))
     found = nearest_place(moved, _entry(0, 1.0, 10.0), (9.0, -3.0, 1.0))
-    assert abs(found.place.way_q40 / Q40 - 4.0) < 1e-5
+    assert abs(found.place.arc_q40 / Q40 - 4.0) < 1e-5
     assert found.distance_mm < 2e-6
 
 
