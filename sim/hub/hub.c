@@ -9,13 +9,14 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
 
 #include "hub/frame_bits.h"
 
-enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
+enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, LOOK_ALL_MS = 20 };
 
 #define NS_PER_S      1000000000u
 #define PACE_AHEAD_NS 2e6 /* of virtual time before real time, where its speed is limited */
@@ -95,7 +96,7 @@ static bool in_use(const struct hub *hub, size_t at)
 static void take_connection(struct hub *hub, unsigned bus)
 {
     const int bytes = BUFFER_BYTES;
-    const int fd = accept4(hub->listeners[bus], NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+    const int fd = accept4(hub->listeners[bus], NULL, NULL, SOCK_CLOEXEC);
     size_t at = 0;
     while (at < HUB_CONNECTIONS && in_use(hub, at)) {
         at++;
@@ -116,6 +117,9 @@ static void take_connection(struct hub *hub, unsigned bus)
     fresh->deferred_count = 0;
     fresh->tracked_count = 0;
     fresh->queue.count = 0;
+    fresh->held.first = 0;
+    fresh->held.count = 0;
+    hub->used = at < hub->used ? hub->used : at + 1u;
 }
 
 /* Whether the packet has left: a connection that has ended is dropped later. In virtual time nothing is lost, so a process that
@@ -146,10 +150,10 @@ static void send_control(const struct hub *hub, int fd, uint16_t kind, uint32_t 
     (void)send_packet(hub, fd, &control, sizeof control);
 }
 
-static const struct hub_connection *participant_connection(const struct hub *hub, uint32_t number)
+static struct hub_connection *participant_connection(struct hub *hub, uint32_t number)
 {
-    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
-        const struct hub_connection *each = &hub->connections[i];
+    for (size_t i = 0; i < hub->used; ++i) {
+        struct hub_connection *each = &hub->connections[i];
         if (each->fd >= 0 && each->role == HUB_PARTICIPANT && each->number == number) {
             return each;
         }
@@ -177,7 +181,7 @@ static void take_packets(struct hub *hub, struct hub_connection *from, size_t mo
 /* What a participant has sent is on the bus before time goes on. */
 static void take_sent(struct hub *hub, uint32_t number)
 {
-    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+    for (size_t i = 0; i < hub->used; ++i) {
         struct hub_connection *each = &hub->connections[i];
         if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == number) {
             take_packets(hub, each, SIZE_MAX);
@@ -211,17 +215,68 @@ static bool matches(const struct can_filter *filters, size_t count, const struct
     return false;
 }
 
-/* A suspended process takes nothing, and is not waited for: what its socket has no room for is lost to it, as to a processor
- * that stands still. */
-static bool send_frame(struct hub *hub, const struct hub_connection *to,
+/* The first frames that are held for a member as one packet. False: it has no room now. One without a participant is waited for.
+ * What a connection that has ended does not take is gone. */
+static bool send_held(struct hub *hub, struct hub_connection *to)
+{
+    struct hub_held *held = &to->held;
+    const size_t straight = HUB_HELD - held->first;
+    size_t count = held->count < LOCAL_BUS_PACKET ? held->count : LOCAL_BUS_PACKET;
+    count = count < straight ? count : straight;
+    const struct local_bus_frame *packet = &held->frames[held->first];
+    const size_t size = count * sizeof *packet;
+    if (to->number == 0u) {
+        hub->lost += send_packet(hub, to->fd, packet, size) ? 0u : count;
+    } else if (send(to->fd, packet, size, MSG_DONTWAIT | MSG_NOSIGNAL) < 0 && errno == EAGAIN) {
+        return false;
+    }
+    held->first = (held->first + count) % HUB_HELD;
+    held->count -= count;
+    return true;
+}
+
+/* Members of this participant find all that was sent up to now; 0: members of none. True: some had no room for it. */
+static bool flush_all(struct hub *hub, uint32_t number)
+{
+    bool remains = false;
+    for (size_t i = 0; i < hub->used; ++i) {
+        struct hub_connection *to = &hub->connections[i];
+        if (to->fd >= 0 && to->role == HUB_MEMBER && to->number == number) {
+            while (to->held.count > 0u && send_held(hub, to)) {
+            }
+            remains = remains || to->held.count > 0u;
+        }
+    }
+    return remains;
+}
+
+/* Until the next grant. A process for which nothing was due has to take its frames before they fill the room. */
+static void hold_frame(struct hub *hub, struct hub_connection *to,
                        const struct local_bus_frame *frame)
 {
+    struct hub_held *held = &to->held;
     const struct participant *owner = virtual_time_find(&hub->time, to->number);
-    if (owner != NULL && owner->suspended) {
-        (void)send(to->fd, frame, sizeof *frame, MSG_DONTWAIT | MSG_NOSIGNAL);
-        return true;
+    if (held->count == HUB_HELD) {
+        hub->lost += owner == NULL || owner->suspended ? 0u : 1u;
+        return;
     }
-    return send_packet(hub, to->fd, frame, sizeof *frame);
+    held->frames[(held->first + held->count) % HUB_HELD] = *frame;
+    held->count++;
+    if (to->number == 0u && held->count >= LOCAL_BUS_PACKET) {
+        (void)send_held(hub, to);
+    } else if (held->count >= HUB_HELD / 2u) {
+        virtual_time_wake(&hub->time, to->number);
+    }
+}
+
+static void send_frame(struct hub *hub, struct hub_connection *to,
+                       const struct local_bus_frame *frame)
+{
+    if (hub->options.is_virtual) {
+        hold_frame(hub, to, frame);
+    } else {
+        hub->lost += send_packet(hub, to->fd, frame, sizeof *frame) ? 0u : 1u;
+    }
 }
 
 /* To all other members of the bus of connection `sender`; those that are to be woken are. */
@@ -232,13 +287,13 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
     memset(&out, 0, sizeof out);
     out.frame = *frame;
     out.time_ns = now_ns;
-    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
-        const struct hub_connection *to = &hub->connections[i];
+    for (size_t i = 0; i < hub->used; ++i) {
+        struct hub_connection *to = &hub->connections[i];
         if (i == sender || to->fd < 0 || to->role != HUB_MEMBER || to->bus != bus ||
             (to->filter_count > 0u && !matches(to->filters, to->filter_count, frame))) {
             continue;
         }
-        hub->lost += send_frame(hub, to, &out) ? 0u : 1u;
+        send_frame(hub, to, &out);
         if (!matches(to->deferred, to->deferred_count, frame)) {
             virtual_time_wake(&hub->time, to->number);
         }
@@ -249,7 +304,7 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
 /* Back to its sender, if that tracks it, which finds it when it wakes for something else. */
 static void deliver_back(struct hub *hub, size_t sender, const struct can_frame *frame)
 {
-    const struct hub_connection *to = &hub->connections[sender];
+    struct hub_connection *to = &hub->connections[sender];
     struct local_bus_frame out;
     if (to->fd < 0 || to->role != HUB_MEMBER || !matches(to->tracked, to->tracked_count, frame)) {
         return;
@@ -258,7 +313,7 @@ static void deliver_back(struct hub *hub, size_t sender, const struct can_frame 
     out.frame = *frame;
     out.frame.__res0 = LOCAL_BUS_OWN;
     out.time_ns = hub->time.now_ns;
-    hub->lost += send_frame(hub, to, &out) ? 0u : 1u;
+    send_frame(hub, to, &out);
     virtual_time_note_frame(&hub->time, to->number);
 }
 
@@ -300,7 +355,7 @@ static size_t arbitrate(const struct hub *hub, unsigned bus)
 {
     size_t best = HUB_CONNECTIONS;
     uint32_t lowest = UINT32_MAX;
-    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+    for (size_t i = 0; i < hub->used; ++i) {
         const struct hub_connection *each = &hub->connections[i];
         if (each->bus != bus || each->queue.count == 0u) {
             continue;
@@ -392,16 +447,21 @@ static int pace_ms(struct hub *hub, uint64_t next_ns)
     return left_ns < 1e9 ? (int)(left_ns / 1e6) : 1000;
 }
 
-static void grant(const struct hub *hub, struct participant *next)
+/* Its members, and recorders if it may ask one, find all frames up to now. */
+static void grant(struct hub *hub, struct participant *next)
 {
-    const struct hub_connection *to = participant_connection(hub, next->number);
+    struct hub_connection *to = participant_connection(hub, next->number);
     struct local_bus_control granted = {.mark = LOCAL_BUS_MARK,
                                         .version = LOCAL_BUS_VERSION,
                                         .kind = LOCAL_BUS_GRANT,
                                         .number = next->grant,
                                         .time_ns = hub->time.now_ns};
     granted.flags = next->frames ? LOCAL_BUS_FRAMES : 0;
-    next->frames = false;
+    next->frames = flush_all(hub, next->number);
+    if (next->watches) {
+        (void)flush_all(hub, 0);
+    }
+    hub->granted = next->watches ? NULL : to;
     (void)send_packet(hub, to->fd, &granted, sizeof granted);
 }
 
@@ -433,6 +493,7 @@ static int go_on(struct hub *hub)
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
 {
+    const struct timeval look_all = {.tv_usec = LOOK_ALL_MS * 1000};
     if (hello->kind == LOCAL_BUS_HELLO_MEMBER) {
         from->role = HUB_MEMBER;
         from->number = hub->options.is_virtual ? hello->number : 0u;
@@ -443,6 +504,7 @@ static void greet(struct hub *hub, struct hub_connection *from,
         from->number =
             virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_NOTICES) != 0u);
         from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_UNKNOWN;
+        (void)setsockopt(from->fd, SOL_SOCKET, SO_RCVTIMEO, &look_all, sizeof look_all);
         if (from->number == 0u) {
             drop_connection(hub, from);
             return;
@@ -560,7 +622,7 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     for (size_t i = 0; i < hub->bus_count; ++i) {
         wait[count++] = (struct pollfd){.fd = hub->listeners[i], .events = POLLIN};
     }
-    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+    for (size_t i = 0; i < hub->used; ++i) {
         const struct hub_connection *each = &hub->connections[i];
         const bool quiet = each->role == HUB_MEMBER && each->number != 0u && !all;
         if (each->fd >= 0 && !quiet) {
@@ -571,15 +633,42 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     return count;
 }
 
+/* The next message of the participant that alone computes, without a look at the others: nothing that they do changes what
+ * happens until it waits. False: it takes long, or it is time to look at all. */
+static bool take_granted(struct hub *hub)
+{
+    union packet packet;
+    struct hub_connection *from = hub->granted;
+    hub->granted = NULL;
+    if (from == NULL || ++hub->unpolled >= HUB_UNPOLLED) {
+        hub->unpolled = 0;
+        return false;
+    }
+    const ssize_t size = recv(from->fd, &packet, sizeof packet, 0);
+    if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+        return false;
+    }
+    if (size <= 0 || !take_packet(hub, from, &packet, (size_t)size)) {
+        drop_connection(hub, from);
+    }
+    return true;
+}
+
 bool hub_step(struct hub *hub, int end)
 {
     struct pollfd wait[1u + HUB_BUSES + HUB_CONNECTIONS];
     size_t who[1u + HUB_BUSES + HUB_CONNECTIONS];
     const int limit_ms = hub->options.is_virtual ? go_on(hub) : -1;
     const bool held = hub->options.is_virtual && virtual_time_is_held(&hub->time);
+    if (take_granted(hub)) {
+        return true;
+    }
+    if (!held) {
+        (void)flush_all(hub, 0);
+    }
     const bool all = !held || hub->poll_all;
     const size_t count = fill(hub, end, wait, who, all);
-    const int ready = poll(wait, count, all ? limit_ms : POLL_ALL_MS);
+    const int ready = poll(wait, count, all ? limit_ms : LOOK_ALL_MS);
     if (ready < 0) {
         return errno == EINTR;
     }
@@ -600,6 +689,7 @@ bool hub_step(struct hub *hub, int end)
 
 void hub_close(struct hub *hub)
 {
+    (void)flush_all(hub, 0);
     for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
         if (hub->connections[i].fd >= 0) {
             (void)close(hub->connections[i].fd);

@@ -12,6 +12,11 @@
  * goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN controller; equal identifiers keep their
  * order. What is sent when a frame has ended comes after what has waited for that. Nothing is lost but what a member sends beyond
  * HUB_QUEUE frames ahead of the bus. Time goes on when every participant waits (virtual_time.h).
+ *
+ * A process that waits takes nothing. So the hub holds the frames for its members until its grant, and wakes it when they fill half of
+ * HUB_HELD. It never waits for room in the socket of a member that has a participant: what has no room is held until the next grant.
+ * A suspended process loses what comes when HUB_HELD is full. A member without a participant, as a recorder, reads at any time: the
+ * hub waits for it.
  */
 #ifndef HUB_HUB_H
 #define HUB_HUB_H
@@ -26,6 +31,8 @@
 #define HUB_BUSES       4u
 #define HUB_CONNECTIONS 64u
 #define HUB_QUEUE       2048u
+#define HUB_HELD        2048u /* frames for a member, before its participant wakes */
+#define HUB_UNPOLLED    64u   /* grants between two looks at all connections, at most */
 
 struct hub_options {
     bool is_virtual;
@@ -36,6 +43,13 @@ struct hub_options {
 /* Frames of a member that wait for the bus. */
 struct hub_queue {
     struct can_frame frames[HUB_QUEUE];
+    size_t first;
+    size_t count;
+};
+
+/* Virtual time: frames for a member that it finds with the next grant of its participant. */
+struct hub_held {
+    struct local_bus_frame frames[HUB_HELD];
     size_t first;
     size_t count;
 };
@@ -54,6 +68,7 @@ struct hub_connection {
     struct can_filter tracked[LOCAL_BUS_FILTERS]; /* frames of its own that come back to it */
     size_t tracked_count;
     struct hub_queue queue;
+    struct hub_held held;
 };
 
 /* A bus in virtual time. */
@@ -70,11 +85,14 @@ struct hub {
     size_t bus_count;
     struct hub_bus buses[HUB_BUSES];
     struct hub_connection connections[HUB_CONNECTIONS];
+    size_t used; /* connections from this one on are not in use */
     struct virtual_time time;
-    uint64_t pace_real_ns;    /* where speed is limited: an instant of real time, */
-    uint64_t pace_virtual_ns; /* and that of virtual time which may not come before it */
-    bool poll_all;            /* members of participants that compute, too */
-    uint64_t lost;            /* frames that found no room */
+    uint64_t pace_real_ns;          /* where speed is limited: an instant of real time, */
+    uint64_t pace_virtual_ns;       /* and that of virtual time which may not come before it */
+    bool poll_all;                  /* members of participants that compute, too */
+    struct hub_connection *granted; /* that alone computes, and waits for no process; or NULL */
+    unsigned unpolled;              /* grants since the last look at all connections */
+    uint64_t lost;                  /* frames that found no room */
 };
 
 /* Serves a bus at each of these paths, which are made and must not be there. 0, or a negative errno with the index of the path that

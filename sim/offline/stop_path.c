@@ -98,6 +98,17 @@ static void by_arc_length(const double d[3], const double sigma[3], uint32_t axi
     bend->by_mm[2][axis] = rest / (sigma[0] * sigma[0] * sigma[0]);
 }
 
+/* The third derivative of the path across its tangent: along it, it is the square of the curvature with a minus sign. */
+static double across(const struct stop_bend *bend, double curvature)
+{
+    double square = 0.0;
+    for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
+        const double part = bend->by_mm[2][axis] + curvature * curvature * bend->by_mm[0][axis];
+        square += part * part;
+    }
+    return sqrt(square);
+}
+
 static void spatial_row(const struct program_segment *segment, const struct preimage *w, double xi,
                         struct stop_row *row, struct stop_bend *bend)
 {
@@ -120,6 +131,7 @@ static void spatial_row(const struct program_segment *segment, const struct prei
         by_arc_length(d, sigma, axis, bend);
         row->curvature = hypot(row->curvature, bend->by_mm[1][axis]);
     }
+    row->slope = across(bend, row->curvature);
     for (uint32_t i = 0; i < program_extra_axes(segment->axis_count); i++) {
         double d[3];
         extra_at(&segment->extra[i], xi, d);
@@ -203,12 +215,12 @@ static void stretch_add_row(struct stop_stretch *stretch, const struct stop_row 
 {
     const struct stop_row *row = &rows[at];
     stretch->feed_mm_s = stop_lesser(stretch->feed_mm_s, row->feed_mm_s);
+    stretch->curvature = stop_greater(stretch->curvature, fabs(row->curvature));
+    stretch->slope = stop_greater(stretch->slope, fabs(row->slope));
     if (axes != PROGRAM_PLANE) {
         stretch_add_bend(&stretch->bend, &bends[at], axes);
         return;
     }
-    stretch->curvature = stop_greater(stretch->curvature, fabs(row->curvature));
-    stretch->slope = stop_greater(stretch->slope, fabs(row->slope));
     for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
         stretch->tangent[k] = stop_greater(stretch->tangent[k], fabs(row->tangent[k]));
     }
@@ -218,12 +230,12 @@ static void stretch_add(struct stop_stretch *stretch, const struct stop_stretch 
                         uint32_t axes)
 {
     stretch->feed_mm_s = stop_lesser(stretch->feed_mm_s, other->feed_mm_s);
+    stretch->curvature = stop_greater(stretch->curvature, other->curvature);
+    stretch->slope = stop_greater(stretch->slope, other->slope);
     if (axes != PROGRAM_PLANE) {
         stretch_add_bend(&stretch->bend, &other->bend, axes);
         return;
     }
-    stretch->curvature = stop_greater(stretch->curvature, other->curvature);
-    stretch->slope = stop_greater(stretch->slope, other->slope);
     for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
         stretch->tangent[k] = stop_greater(stretch->tangent[k], other->tangent[k]);
     }

@@ -203,3 +203,13 @@ int stop_overridden_state(const struct stop_piece *piece, const struct stop_over
     from->v *= rate;
     return 1;
 }
+
+void stop_overridden_most(const struct stop_piece *piece, uint32_t r, double little, double *speed,
+                          double *rise, double *fall)
+{
+    const double rate = stop_override_at(piece, r);
+    const double a = rate * rate * piece->extreme.a;
+    *speed = rate * piece->extreme.v;
+    *rise = a + fmin(slope_at(piece, rate, 1) * piece->extreme.v, little);
+    *fall = a + slope_at(piece, rate, -1) * piece->extreme.v;
+}

@@ -66,4 +66,8 @@ double stop_greatest_slope(const struct stop_piece *piece);
 int stop_overridden_state(const struct stop_piece *piece, const struct stop_overridden *which,
                           double little, struct stop_state *from);
 
+/* Bounds of these states for all instants at override number r: speed, acceleration, and deceleration. */
+void stop_overridden_most(const struct stop_piece *piece, uint32_t r, double little, double *speed,
+                          double *rise, double *fall);
+
 #endif

@@ -177,7 +177,8 @@ static void search_quickly(const struct stop_setting *setting, struct stop_piece
     *best = none;
     int found = better(setting, piece, near, after_s, 1, best);
     for (int down = 0; down <= STOP_FEWER && !found; down += 4) {
-        for (size_t i = 0; i < sizeof shapes / sizeof shapes[0] && !found; i++) {
+        const size_t count = down > 0 ? sizeof shapes / sizeof shapes[0] : 1u;
+        for (size_t i = 0; i < count && !found; i++) {
             const int quarters[3] = {down * shapes[i][0], down * shapes[i][1], down * shapes[i][2]};
             found = lower_by(setting, piece, piece->most, quarters, after_s, best);
         }
@@ -240,6 +241,18 @@ static void choose(const struct stop_setting *setting, struct stop_piece *piece,
     }
 }
 
+/* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the same
+ * override. They are looked at first; what is found does not depend on that. */
+static void suspect_as_behind(struct stop_piece *piece, const struct stop_overridden behind[2])
+{
+    piece->suspect = piece->count - 1u;
+    piece->close->suspect = piece->close->count - 1u;
+    piece->suspect_override = behind[0];
+    piece->suspect_override.instant = piece->count - 1u;
+    piece->suspect_before = behind[1];
+    piece->suspect_before.instant = piece->count - 1u;
+}
+
 void stop_search(const struct program *p, const struct stop_limits *limits,
                  const struct stop_path *path, struct stop_found *found)
 {
@@ -250,6 +263,7 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     double left_s = 0.0;
     stop_setting_open(&setting, p, limits, path);
     int warm[3] = {setting.most[0], setting.most[1], setting.most[2]};
+    struct stop_overridden behind[2] = {{0, 0, -1}, {0, 0, 0}};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
         stop_piece_look(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
@@ -261,7 +275,10 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
                 piece.before[k] = found[i - 1u].before[k];
             }
             piece.close = &close;
+            suspect_as_behind(&piece, behind);
             choose(&setting, &piece, warm, after_s, &best);
+            behind[0] = piece.suspect_override;
+            behind[1] = piece.suspect_before;
         }
         for (int k = 0; k < 3; k++) {
             found[i - 1u].codes[k] = (uint8_t)best.codes[k];

@@ -111,19 +111,32 @@ static double component(double along, double across, double tangent)
     return fmin(hypot(along, across), along * tangent + across);
 }
 
-static double planar_share(const struct stop_inverse *inverse, const struct stop_extent *extent)
+/* Acceleration and jerk along the path and across it, at most. */
+struct parts {
+    double normal, jerk_along, jerk_across;
+};
+
+static struct parts parts_of(const struct stop_extent *extent)
 {
     const struct stop_stretch *path = &extent->path;
     const double normal = path->curvature * extent->speed * extent->speed;
     const double bent = path->slope * extent->speed * extent->speed;
-    const double jerk_along = extent->jerk + path->curvature * normal * extent->speed;
-    const double jerk_across =
-        (3.0 * path->curvature * extent->acceleration + bent) * extent->speed;
+    const struct parts out = {
+        .normal = normal,
+        .jerk_along = extent->jerk + path->curvature * normal * extent->speed,
+        .jerk_across = (3.0 * path->curvature * extent->acceleration + bent) * extent->speed,
+    };
+    return out;
+}
+
+static double planar_share(const struct stop_inverse *inverse, const struct stop_extent *extent)
+{
+    const struct parts parts = parts_of(extent);
     double most = 0.0;
     for (uint32_t k = 0; k < PROGRAM_PLANE; k++) {
-        const double tangent = path->tangent[k];
-        const double acceleration = component(extent->acceleration, normal, tangent);
-        const double jerk = component(jerk_along, jerk_across, tangent);
+        const double tangent = extent->path.tangent[k];
+        const double acceleration = component(extent->acceleration, parts.normal, tangent);
+        const double jerk = component(parts.jerk_along, parts.jerk_across, tangent);
         most =
             stop_greater(most, axis_share(inverse, k, extent->speed * tangent, acceleration, jerk));
     }
@@ -133,16 +146,23 @@ static double planar_share(const struct stop_inverse *inverse, const struct stop
 static double spatial_share(const struct stop_road *road, const struct stop_inverse *inverse,
                             const struct stop_extent *extent)
 {
+    const struct parts parts = parts_of(extent);
+    const double acceleration = hypot(extent->acceleration, parts.normal);
+    const double jerk = hypot(parts.jerk_along, parts.jerk_across);
     const double v = extent->speed;
     double most = 0.0;
     for (uint32_t k = 0; k < road->axis_count; k++) {
         const double first = extent->path.bend.by_mm[0][k];
         const double second = extent->path.bend.by_mm[1][k];
         const double third = extent->path.bend.by_mm[2][k];
-        const double acceleration = extent->acceleration * first + v * v * second;
-        const double jerk =
+        double own = extent->acceleration * first + v * v * second;
+        double own_jerk =
             extent->jerk * first + v * (3.0 * extent->acceleration * second + v * v * third);
-        most = stop_greater(most, axis_share(inverse, k, v * first, acceleration, jerk));
+        if (k < PROGRAM_SPACE) { /* a component is no more than the whole */
+            own = fmin(own, acceleration);
+            own_jerk = fmin(own_jerk, jerk);
+        }
+        most = stop_greater(most, axis_share(inverse, k, v * first, own, own_jerk));
     }
     return most;
 }

@@ -52,9 +52,25 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
     return 1;
 }
 
-/* Bounds of all brakes that begin in the piece, at any rate. */
-static void piece_extent(const struct stop_setting *setting, const struct stop_piece *piece,
-                         const struct path_brake_numbers *numbers, struct stop_extent *extent)
+/* Bounds of the states in which brakes begin: greatest speed, and greatest acceleration of either sign. */
+struct begun {
+    double speed, rise, fall;
+};
+
+/* Bounds of all brakes that begin in the piece in states within these; returns the arc length that they do not pass. */
+static double begun_extent(const struct stop_setting *setting, const struct stop_piece *piece,
+                           const struct path_brake_numbers *numbers, const struct begun *begun,
+                           struct stop_extent *extent)
+{
+    const struct stop_state most = {piece->at[piece->count - 1u].s, begun->speed, begun->rise};
+    const double to_mm = stop_brake_extent(setting, numbers, &most, begun->fall, extent);
+    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent->path);
+    return to_mm;
+}
+
+/* The states at any rate. */
+static struct begun begun_at_any_rate(const struct stop_setting *setting,
+                                      const struct stop_piece *piece)
 {
     const struct stop_piece *close = piece->close;
     const double rate = stop_greater(piece->factor, 1.0);
@@ -62,18 +78,25 @@ static void piece_extent(const struct stop_setting *setting, const struct stop_p
     const double a = stop_greater(piece->extreme.a, close->extreme.a) * rate * rate;
     const double change = stop_greatest_slope(piece) * v;
     const double little = setting->rise_is_cut ? 0.25 * setting->deceleration : HUGE_VAL;
-    const struct stop_state most = {piece->at[piece->count - 1u].s, v * rate,
-                                    a + fmin(change, little)};
-    const double to_mm = stop_brake_extent(setting, numbers, &most, a + change, extent);
-    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent->path);
+    const struct begun out = {v * rate, a + fmin(change, little), a + change};
+    return out;
+}
+
+/* Whether bounds alone show that all brakes out of such states keep the limits. */
+static int begun_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
+                      const struct stop_piece *piece, const struct path_brake_numbers *numbers,
+                      const struct begun *begun)
+{
+    struct stop_extent extent;
+    (void)begun_extent(setting, piece, numbers, begun, &extent);
+    return stop_extent_keeps(&setting->road, inverse, &extent);
 }
 
 int stop_all_keep(const struct stop_setting *setting, struct stop_piece *piece,
                   const struct stop_times *times, const struct path_brake_numbers *numbers)
 {
-    struct stop_extent extent;
-    piece_extent(setting, piece, numbers, &extent);
-    if (stop_extent_keeps(&setting->road, &setting->inverse, &extent)) {
+    const struct begun begun = {piece->extreme.v, piece->extreme.a, piece->extreme.a};
+    if (begun_keep(setting, &setting->inverse, piece, numbers, &begun)) {
         return 1;
     }
     for (uint32_t n = 0; n < piece->count; n++) {
@@ -126,15 +149,34 @@ static int overridden_keeps(const struct stop_setting *setting, const struct sto
            state_keeps(setting, keeping, &from, row, numbers);
 }
 
+/* Fills for each feed override whether bounds alone show that brakes at it keep the limits: most do at low ones. */
+static void rates_surely_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
+                              const struct stop_piece *piece,
+                              const struct path_brake_numbers *numbers,
+                              uint8_t surely[2u * STOP_SHARES])
+{
+    const double little = setting->rise_is_cut ? quarter(setting, numbers) : HUGE_VAL;
+    for (uint32_t rate = 0; rate < 2u * STOP_SHARES; rate++) {
+        struct begun begun;
+        stop_overridden_most(piece, rate, little, &begun.speed, &begun.rise, &begun.fall);
+        surely[rate] = (uint8_t)begun_keep(setting, inverse, piece, numbers, &begun);
+    }
+}
+
 /* The same limits at other feed overrides, also while the override changes. */
 static int overrides_keep(const struct stop_setting *setting, struct stop_piece *piece,
-                          const struct keeping *keeping, const struct path_brake_numbers *numbers)
+                          const struct keeping *all, const struct path_brake_numbers *numbers)
 {
     struct stop_overridden which = piece->suspect_override;
+    uint8_t surely[2u * STOP_SHARES];
+    if (!all->surely) {
+        rates_surely_keep(setting, all->inverse, piece, numbers, surely);
+    }
     for (uint32_t n = 0; n < piece->count; n++) {
         for (which.rate = 0; which.rate < 2u * STOP_SHARES; which.rate++) {
+            const struct keeping keeping = {all->inverse, all->surely || surely[which.rate]};
             for (which.slope = -1; which.slope <= 1; which.slope++) {
-                if (!overridden_keeps(setting, piece, keeping, &which, numbers)) {
+                if (!overridden_keeps(setting, piece, &keeping, &which, numbers)) {
                     piece->suspect_override = which;
                     return 0;
                 }
@@ -147,10 +189,12 @@ static int overrides_keep(const struct stop_setting *setting, struct stop_piece 
 
 /* The same at the rate 1 from instants close to each other. */
 static int close_keep(const struct stop_setting *setting, struct stop_piece *close,
-                      const struct path_brake_numbers *numbers, const struct stop_extent *extent)
+                      const struct path_brake_numbers *numbers, int surely)
 {
-    const struct keeping keeping = {&setting->inverse,
-                                    stop_extent_keeps(&setting->road, &setting->inverse, extent)};
+    const struct begun begun = {close->extreme.v, close->extreme.a, close->extreme.a};
+    const struct keeping keeping = {
+        &setting->inverse,
+        surely || begun_keep(setting, &setting->inverse, close, numbers, &begun)};
     for (uint32_t n = 0; n < close->count; n++) {
         uint32_t i = (n + close->suspect) % close->count;
         if (!state_keeps(setting, &keeping, &close->at[i], close->row[i], numbers)) {
@@ -194,13 +238,51 @@ static int out_of_overridden_keeps(const struct stop_setting *setting,
            out_of_brake_keeps(setting, &from, piece->row[which->instant], before, numbers);
 }
 
-/* From some instants, at all overrides, also while the override changes; the one that broke a limit last is looked at first. */
+/* Whether bounds alone show the same for all states at a feed override. */
+static int out_of_brakes_surely_keep(const struct stop_setting *setting,
+                                     const struct stop_piece *piece, uint32_t rate,
+                                     const struct path_brake_numbers *before,
+                                     const struct path_brake_numbers *numbers)
+{
+    struct stop_extent extent;
+    struct begun begun;
+    stop_overridden_most(piece, rate, quarter(setting, before), &begun.speed, &begun.rise,
+                         &begun.fall);
+    const double from_mm = begun_extent(setting, piece, before, &begun, &extent);
+    const struct stop_state most = {from_mm, extent.speed, begun.rise};
+    const double fall = extent.acceleration;
+    const double to_mm = stop_brake_extent(setting, numbers, &most, fall, &extent);
+    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent.path);
+    return stop_extent_keeps(&setting->road, &setting->at_any_rate, &extent);
+}
+
+/* From some instants at a feed override, also while it changes. */
+static int out_of_rate_keeps(const struct stop_setting *setting, struct stop_piece *piece,
+                             uint32_t rate, const struct path_brake_numbers *before,
+                             const struct path_brake_numbers *numbers)
+{
+    struct stop_overridden which = {0, rate, 0};
+    const uint32_t each = 1u + piece->count / BRAKE_INSTANTS;
+    if (out_of_brakes_surely_keep(setting, piece, rate, before, numbers)) {
+        return 1;
+    }
+    for (; which.instant < piece->count; which.instant += each) {
+        for (which.slope = -1; which.slope <= 1; which.slope++) {
+            if (!out_of_overridden_keeps(setting, piece, &which, before, numbers)) {
+                piece->suspect_before = which;
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
+/* At all overrides; the state that broke a limit last is looked at first. */
 static int brakes_keep(const struct stop_setting *setting, struct stop_piece *piece,
                        const int codes[3])
 {
     struct path_brake_numbers numbers;
     struct path_brake_numbers before;
-    struct stop_overridden which = {0, 0, 0};
     if (piece->before[1] == 0 || !stop_numbers_of(setting, piece->before, &before)) {
         return 1;
     }
@@ -208,15 +290,9 @@ static int brakes_keep(const struct stop_setting *setting, struct stop_piece *pi
         !out_of_overridden_keeps(setting, piece, &piece->suspect_before, &before, &numbers)) {
         return 0;
     }
-    const uint32_t each = 1u + piece->count / BRAKE_INSTANTS;
-    for (; which.instant < piece->count; which.instant += each) {
-        for (which.rate = 0; which.rate < 2u * STOP_SHARES; which.rate++) {
-            for (which.slope = -1; which.slope <= 1; which.slope++) {
-                if (!out_of_overridden_keeps(setting, piece, &which, &before, &numbers)) {
-                    piece->suspect_before = which;
-                    return 0;
-                }
-            }
+    for (uint32_t rate = 0; rate < 2u * STOP_SHARES; rate++) {
+        if (!out_of_rate_keeps(setting, piece, rate, &before, &numbers)) {
+            return 0;
         }
     }
     return 1;
@@ -243,13 +319,15 @@ int stop_strictly(const struct stop_setting *setting, struct stop_piece *piece, 
 {
     const struct stop_inverse *inverse = &setting->at_any_rate;
     struct path_brake_numbers numbers;
-    struct stop_extent extent;
     if (!stop_numbers_of(setting, codes, &numbers) ||
         !stop_suspect_keeps(setting, piece, &numbers)) {
         return 0;
     }
-    piece_extent(setting, piece, &numbers, &extent);
+    const struct begun begun = begun_at_any_rate(setting, piece);
+    struct stop_extent extent;
+    (void)begun_extent(setting, piece, &numbers, &begun, &extent);
     const struct keeping keeping = {inverse, stop_extent_keeps(&setting->road, inverse, &extent)};
-    return close_keep(setting, piece->close, &numbers, &extent) &&
+    const int surely = stop_extent_keeps(&setting->road, &setting->inverse, &extent);
+    return close_keep(setting, piece->close, &numbers, surely) &&
            overrides_keep(setting, piece, &keeping, &numbers) && brakes_keep(setting, piece, codes);
 }

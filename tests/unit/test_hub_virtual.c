@@ -45,7 +45,7 @@ static int open_connection(uint16_t kind, uint32_t number, const char *name,
     return fd;
 }
 
-static void say_wait(struct other *who, uint64_t until_ns)
+static void say_wait(const struct other *who, uint64_t until_ns)
 {
     const struct local_bus_control wait = {.mark = LOCAL_BUS_MARK,
                                            .version = LOCAL_BUS_VERSION,
@@ -203,6 +203,151 @@ static void test_an_answer_comes_behind_what_waits_already(void)
     TEST_ASSERT_EQUAL(0x301, got[1].id);
     TEST_ASSERT_EQUAL(0x080, got[2].id);
     TEST_ASSERT_EQUAL(0x302, got[3].id);
+}
+
+/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too long. */
+static int frames_in(int fd)
+{
+    struct local_bus_frame packet[LOCAL_BUS_PACKET + 1u];
+    int count = 0;
+    for (ssize_t size = 1; size > 0;) {
+        size = recv(fd, packet, sizeof packet, MSG_DONTWAIT);
+        TEST_ASSERT_LESS_OR_EQUAL((ssize_t)(LOCAL_BUS_PACKET * sizeof packet[0]), size);
+        for (size_t i = 0; size > 0 && i < (size_t)size / sizeof packet[0]; ++i) {
+            TEST_ASSERT_EQUAL(0x100 + count, packet[i].frame.can_id);
+            count++;
+        }
+    }
+    return count;
+}
+
+static void test_many_frames_come_in_packets_and_in_order(void)
+{
+    enum { FRAMES = 2 * CAN_SOCKET_BATCH + 3 };
+    struct local_bus_control welcome;
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const int recorder = open_connection(LOCAL_BUS_HELLO_MEMBER, 0, "", &welcome);
+    const struct can_match all = {0x000, 0x000};
+    int more = 1;
+    int count = 0;
+    TEST_ASSERT_EQUAL(0, can_socket_defer(&mine, &all, 1));
+    for (uint32_t i = 0; i < FRAMES; ++i) {
+        send_frame(&other, 0x100 + i, 0);
+    }
+    say_wait(&other, LOCAL_BUS_NEVER);
+    while (clock_ns() < VIRTUAL_TIME_BEGIN_NS + CLOCK_NS_PER_S) {
+        TEST_ASSERT_GREATER_OR_EQUAL(0, clock_poll(NULL, 0, 0, CLOCK_NS_PER_S));
+    }
+    while (more != 0) {
+        const int some = can_socket_receive(&mine, got, &more);
+        for (int i = 0; i < some; ++i) {
+            TEST_ASSERT_EQUAL(0x100 + count + i, got[i].id);
+        }
+        count += some;
+    }
+    TEST_ASSERT_EQUAL(FRAMES, count);
+    hub_thread_end();
+    TEST_ASSERT_EQUAL(FRAMES, frames_in(recorder));
+    (void)close(recorder);
+}
+
+/* Of the hub to the members of a participant: room for a few packets only. */
+static void make_little_room(uint32_t number)
+{
+    const int bytes = 1;
+    for (size_t i = 0; i < HUB_CONNECTIONS; ++i) {
+        const struct hub_connection *each = &hub_thread_hub.connections[i];
+        if (each->fd >= 0 && each->role == HUB_MEMBER && each->number == number) {
+            TEST_ASSERT_EQUAL(0, setsockopt(each->fd, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes));
+        }
+    }
+}
+
+static void suspend_or_continue(enum local_bus_kind kind, const char *name)
+{
+    struct local_bus_control control = {
+        .mark = LOCAL_BUS_MARK, .version = LOCAL_BUS_VERSION, .kind = (uint16_t)kind};
+    memcpy(control.name, name, strlen(name));
+    TEST_ASSERT_EQUAL(sizeof control, send(other.fd, &control, sizeof control, 0));
+}
+
+/* Of the kind; notices of other kinds may come before it. */
+static struct local_bus_control next_of_kind(const struct other *who, uint16_t kind)
+{
+    struct local_bus_control got = next_message(who);
+    while (got.kind != kind) {
+        got = next_message(who);
+    }
+    return got;
+}
+
+/* The other sends so many frames, and waits until an instant at which the last one has gone. */
+static void send_and_wait(uint32_t count, uint64_t until_ns)
+{
+    for (uint32_t i = 0; i < count; ++i) {
+        send_frame(&other, 0x100, (uint8_t)(i % 8u));
+    }
+    say_wait(&other, until_ns);
+    other.grant = next_of_kind(&other, LOCAL_BUS_GRANT).number;
+}
+
+static struct other open_sleeper(void)
+{
+    struct local_bus_control welcome;
+    struct other sleeper = {.grant = 0};
+    sleeper.fd = open_connection(LOCAL_BUS_HELLO_PARTICIPANT, 0, "sleeper", &welcome);
+    sleeper.number = welcome.number;
+    sleeper.member = open_connection(LOCAL_BUS_HELLO_MEMBER, sleeper.number, "", &welcome);
+    return sleeper;
+}
+
+/* It empties its full socket only after the grant: so the grant may not wait for room. */
+static void test_one_that_slept_beside_a_busy_bus_gets_its_grant(void)
+{
+    struct local_bus_frame packet[LOCAL_BUS_PACKET];
+    const struct other sleeper = open_sleeper();
+    make_little_room(sleeper.number);
+    clock_leave();
+    suspend_or_continue(LOCAL_BUS_SUSPEND, "sleeper");
+    say_wait(&sleeper, LOCAL_BUS_NEVER);
+    for (uint64_t i = 1; i <= HUB_HELD / 1000u + 1u; ++i) {
+        send_and_wait(1000, VIRTUAL_TIME_BEGIN_NS + i * CLOCK_NS_PER_S);
+    }
+    suspend_or_continue(LOCAL_BUS_CONTINUE, "sleeper");
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(LOCAL_BUS_FRAMES, next_of_kind(&sleeper, LOCAL_BUS_GRANT).flags);
+    TEST_ASSERT_EQUAL(sizeof packet, recv(sleeper.member, packet, sizeof packet, MSG_DONTWAIT));
+    for (uint8_t i = 0; i < LOCAL_BUS_PACKET; ++i) {
+        TEST_ASSERT_EQUAL(i, packet[i].frame.can_dlc);
+    }
+    TEST_ASSERT_EQUAL(0, hub_thread_hub.lost); /* it was suspended */
+    (void)close(sleeper.fd);
+    (void)close(sleeper.member);
+}
+
+/* Nobody else ends its wait: so it is woken before there is no room any more. */
+static void test_frames_that_wake_nobody_are_not_lost_however_many(void)
+{
+    const struct can_match all = {0x000, 0x000};
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    uint32_t count = 0;
+    TEST_ASSERT_EQUAL(0, can_socket_defer(&mine, &all, 1));
+    for (uint32_t i = 0; i < HUB_QUEUE; ++i) {
+        send_frame(&other, i, 0);
+    }
+    say_wait(&other, LOCAL_BUS_NEVER);
+    while (count < HUB_HELD / 2u) {
+        int more = 1;
+        TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+        while (more != 0) {
+            const int some = can_socket_receive(&mine, got, &more);
+            for (int i = 0; i < some; ++i) {
+                TEST_ASSERT_EQUAL(count++, got[i].id);
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL(0, hub_thread_hub.lost);
 }
 
 static void test_filters_and_deferred_frames_do_not_wake(void)
@@ -385,6 +530,9 @@ int main(void)
     RUN_TEST(test_a_frame_takes_its_bits_and_wakes);
     RUN_TEST(test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_order);
     RUN_TEST(test_an_answer_comes_behind_what_waits_already);
+    RUN_TEST(test_many_frames_come_in_packets_and_in_order);
+    RUN_TEST(test_one_that_slept_beside_a_busy_bus_gets_its_grant);
+    RUN_TEST(test_frames_that_wake_nobody_are_not_lost_however_many);
     RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
     RUN_TEST(test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once);

@@ -233,19 +233,29 @@ static bool is_own(const struct can_socket *socket, const struct mmsghdr *header
                          : (header->msg_hdr.msg_flags & MSG_CONFIRM) != 0;
 }
 
-/* Of the frames that have come: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
-static int sort_out(struct can_socket *socket, const struct mmsghdr *headers,
-                    const struct local_bus_frame *frames, int got,
-                    struct can_msg messages[CAN_SOCKET_BATCH])
+static size_t frame_bytes(const struct can_socket *socket)
 {
-    const size_t size = socket->local ? sizeof frames[0] : sizeof frames[0].frame;
+    return socket->local ? sizeof(struct local_bus_frame) : sizeof(struct can_frame);
+}
+
+/* Only a hub in virtual time puts several frames into a packet. */
+static size_t frames_in_packet(const struct can_socket *socket)
+{
+    return socket->local && clock_is_virtual() ? LOCAL_BUS_PACKET : 1u;
+}
+
+/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
+static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
+                    const struct local_bus_frame *frames, struct can_msg *messages)
+{
+    const size_t size = frame_bytes(socket);
     int count = 0;
-    for (int i = 0; i < got; ++i) {
-        if (headers[i].msg_len != size || !plain_frame(&frames[i].frame)) {
+    for (size_t i = 0; i < header->msg_len / size && header->msg_len % size == 0u; ++i) {
+        if (!plain_frame(&frames[i].frame)) {
             continue;
         }
         convert(&messages[count], &frames[i].frame);
-        if (is_own(socket, &headers[i], &frames[i])) {
+        if (is_own(socket, header, &frames[i])) {
             can_socket_untrack(socket, (uint16_t)messages[count].id);
         } else {
             count += passes(socket, &messages[count]) ? 1 : 0;
@@ -266,21 +276,25 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     struct local_bus_frame frames[CAN_SOCKET_BATCH];
     struct iovec vectors[CAN_SOCKET_BATCH];
     struct mmsghdr headers[CAN_SOCKET_BATCH];
-    const size_t size = socket->local ? sizeof frames[0] : sizeof frames[0].frame;
-    memset(headers, 0, sizeof headers);
-    for (size_t i = 0; i < CAN_SOCKET_BATCH; ++i) {
-        vectors[i].iov_base = &frames[i];
-        vectors[i].iov_len = size;
+    const size_t each = frames_in_packet(socket);
+    const size_t packets = CAN_SOCKET_BATCH / each;
+    memset(headers, 0, packets * sizeof headers[0]);
+    for (size_t i = 0; i < packets; ++i) {
+        vectors[i].iov_base = &frames[i * each];
+        vectors[i].iov_len = each * frame_bytes(socket);
         headers[i].msg_hdr.msg_iov = &vectors[i];
         headers[i].msg_hdr.msg_iovlen = 1;
     }
     *more = 0;
-    const int got = recvmmsg(socket->fd, headers, CAN_SOCKET_BATCH, MSG_DONTWAIT, NULL);
+    const int got = recvmmsg(socket->fd, headers, (unsigned)packets, MSG_DONTWAIT, NULL);
     if (got < 0) {
         return errno == EAGAIN || errno == EINTR ? 0 : -errno;
     }
-    const int count = sort_out(socket, headers, frames, got, messages);
-    *more = got == (int)CAN_SOCKET_BATCH;
+    int count = 0;
+    for (int i = 0; i < got; ++i) {
+        count += sort_out(socket, &headers[i], &frames[(size_t)i * each], messages + count);
+    }
+    *more = got == (int)packets;
     return count == 0 && socket->local && at_end(headers, got) ? -ENETDOWN : count;
 }
 
@@ -291,5 +305,5 @@ uint32_t can_socket_waiting_bytes(const struct can_socket *socket)
     if (getsockopt(socket->fd, SOL_SOCKET, SO_MEMINFO, memory, &size) != 0) {
         return 0;
     }
-    return memory[SK_MEMINFO_RMEM_ALLOC];
+    return memory[SK_MEMINFO_RMEM_ALLOC] * (uint32_t)frames_in_packet(socket);
 }

@@ -74,7 +74,8 @@ int can_socket_send_many(struct can_socket *socket, const struct can_msg *messag
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
                        int *more);
 
-/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not report them. */
+/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not report them. Where frames
+ * come in packets: what it would keep about if each came by itself. */
 uint32_t can_socket_waiting_bytes(const struct can_socket *socket);
 
 #endif

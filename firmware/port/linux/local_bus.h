@@ -6,7 +6,8 @@
  * the machine. There are two kinds of connection:
  *
  *   member       sends and receives the frames of one bus. It sends struct can_frame of linux/can.h, and receives
- *                struct local_bus_frame. It may set filters at any time.
+ *                one to LOCAL_BUS_PACKET struct local_bus_frame in a packet: one in real time, in virtual time what its
+ *                participant finds when it wakes. It may set filters at any time.
  *   participant  takes part in virtual time. One for each thread of control of a simulation.
  *
  * The first message on a connection is a hello, and the hub answers it with a welcome. In real time the hub passes frames on as
@@ -22,9 +23,10 @@
 #include <linux/can.h>
 
 #define LOCAL_BUS_MARK    0xFFFFFFFFu /* no identifier of a frame: so this is no frame */
-#define LOCAL_BUS_VERSION 2u
+#define LOCAL_BUS_VERSION 3u
 #define LOCAL_BUS_NAME    32u /* bytes of a name with its end */
 #define LOCAL_BUS_FILTERS 48u
+#define LOCAL_BUS_PACKET  8u /* frames */
 #define LOCAL_BUS_NEVER   UINT64_MAX
 
 /* The name of a participant, where the program that started it wants to know it by one. */

@@ -26,12 +26,14 @@ from ..errors import BusError
 
 NAME_VARIABLE = "HODOGRAPH_PARTICIPANT"
 """Of the environment: what a process is called in virtual time."""
+MOST_FRAMES = 8
+"""In a packet from the hub to a member."""
 _NAME_BYTES = 32
 _MARK = 0xFFFFFFFF
 _NEVER_NS = 2**64 - 1
 _CONTROL = struct.Struct(f"=IHHIIQ{_NAME_BYTES}s")
-_WATCHES, _VIRTUAL, _SENT = 1, 2, 4
-_VERSION = 2
+_WATCHES, _VIRTUAL, _SENT, _FRAMES = 1, 2, 4, 8
+_VERSION = 3
 _HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
 _WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
 _LOOK_S = 0.05
@@ -103,6 +105,7 @@ class VirtualClock:
         self._now_ns = now_ns
         self._grant = 0
         self._waiting = False
+        self._has_frames = False  # some came, and are not in the inboxes yet
         self._users = 0
         self._thread = threading.get_ident()
         self._signals = _signal_pipe().listen()
@@ -162,8 +165,10 @@ class VirtualClock:
     def _await_grant(self) -> None:
         while self._waiting:
             self._take()
-        for inbox in tuple(self._inboxes):
-            inbox.fill()
+        if self._has_frames:
+            for inbox in tuple(self._inboxes):
+                inbox.fill()
+            self._has_frames = False
 
     def _take(self) -> None:
         """The next message; its kinds other than grants are kept.
@@ -190,11 +195,12 @@ class VirtualClock:
             _signal_pipe().drain()
 
     def _act_on(self, data: bytes) -> None:
-        _, kind, _, number, _, now_ns, name = _CONTROL.unpack(data)
+        _, kind, flags, number, _, now_ns, name = _CONTROL.unpack(data)
         if kind != _GRANT:
             self._notices.append((kind, name.partition(b"\0")[0].decode(errors="replace")))
         elif number != self._grant:
             self._now_ns = now_ns
+            self._has_frames = self._has_frames or bool(flags & _FRAMES)
             self._waiting = False
             self._grant = number  # last: by this it is known to have been taken
 

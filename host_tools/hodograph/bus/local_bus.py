@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A local bus: what hodograph-hub (sim/hub) serves to processes of one machine, whose kernel need not have CAN.
 
-A member sends struct can_frame of linux/can.h and receives the same with a time stamp
-(firmware/port/linux/local_bus.h).
+A member sends struct can_frame of linux/can.h and receives the same with a time stamp, in virtual time several in a
+packet (firmware/port/linux/local_bus.h).
 """
 
 from __future__ import annotations
@@ -15,7 +15,15 @@ from typing import Any
 
 import can
 
-from .clock import REAL_CLOCK, Clock, VirtualClock, filter_message, hub_clock, member_connection
+from .clock import (
+    MOST_FRAMES,
+    REAL_CLOCK,
+    Clock,
+    VirtualClock,
+    filter_message,
+    hub_clock,
+    member_connection,
+)
 
 _FRAME = struct.Struct("=IB3x8s")
 _STAMPED = struct.Struct("=IB3x8sQ")
@@ -85,8 +93,8 @@ class LocalBus(can.BusABC):
 
     def fill(self) -> None:
         """Takes what lies in the socket: in virtual time the hub waits for those who do not."""
-        while (data := self._next()) is not None:
-            self._waiting.append(data)
+        while self._take_packet():
+            pass
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """See can.BusABC, which counts the time-out by this computer's clock."""
@@ -95,10 +103,12 @@ class LocalBus(can.BusABC):
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if self._virtual is not None:
             data = self._await_virtually(self._virtual, timeout)
-        elif select.select([self.socket], [], [], timeout)[0]:
-            data = self._next()
         else:
-            data = None
+            if not self._waiting:
+                select.select([self.socket], [], [], timeout)
+            while not self._waiting and self._take_packet():
+                pass
+            data = self._waiting.popleft() if self._waiting else None
         return (None if data is None else _message(data)), True
 
     def _await_virtually(self, clock: VirtualClock, timeout: float | None) -> bytes | None:
@@ -108,22 +118,23 @@ class LocalBus(can.BusABC):
             clock.wait(limit_s)
         return self._waiting.popleft() if self._waiting else None
 
-    def _next(self) -> bytes | None:
-        """The next frame that passes the filters; None: there is none now. No message is made of the others: a full bus
-        has some thousand a second.
+    def _take_packet(self) -> bool:
+        """Keeps the frames of the next packet that pass the filters; false: there is none now. No message is made of
+        the others: a full bus has some thousand a second.
         """
-        while True:
-            try:
-                data = self.socket.recv(_STAMPED.size, socket.MSG_DONTWAIT)
-            except BlockingIOError:
-                return None
-            except OSError as error:
-                raise can.CanOperationError(str(error), error.errno) from error
-            if len(data) < _STAMPED.size:
-                raise can.CanOperationError("the local bus has ended")
-            identifier = int.from_bytes(data[:4], "little")
+        try:
+            packet = self.socket.recv(MOST_FRAMES * _STAMPED.size, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            raise can.CanOperationError(str(error), error.errno) from error
+        if len(packet) < _STAMPED.size:
+            raise can.CanOperationError("the local bus has ended")
+        for start in range(0, len(packet), _STAMPED.size):
+            identifier = int.from_bytes(packet[start : start + 4], "little")
             if not self._wanted or any((identifier ^ i) & m == 0 for i, m in self._wanted):
-                return data
+                self._waiting.append(packet[start : start + _STAMPED.size])
+        return True
 
     def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
         self._wanted = [(each["can_id"], each["can_mask"]) for each in filters or ()]

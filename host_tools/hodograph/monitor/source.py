@@ -84,7 +84,7 @@ class SocketSource:
         chunks: list[Frames] = []
         count = BATCH
         try:
-            while count == BATCH and len(chunks) < MOST_FRAMES // BATCH:
+            while count == BATCH and sum(chunk.size for chunk in chunks) < MOST_FRAMES:
                 count = self._batch.receive(self._socket.fileno())
                 if count:
                     chunks.append(self._batch.records(count))

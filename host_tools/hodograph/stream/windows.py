@@ -29,7 +29,7 @@ from ..feed.optimal.knots import first_estimate
 from ..feed.optimal.plan_limits import PlanLimits, gather
 from ..feed.optimal.sequence import kept, measured, stopping_s, trusted_to
 from ..feed.optimal.track import Ends, Track, ends_of, make_track, piece_usage
-from ..feed.optimal.window import Solution, State, plan_window, tightened
+from ..feed.optimal.window import Effort, Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.plan import FeedCurve
@@ -65,10 +65,13 @@ _BRAKE_DISTANCES = (1.1, 1.2, 1.3, 1.4, 1.5)
 _TAIL_DISTANCES = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
 """Of tails that are tried, in times the distance that braking takes at least: some, and then those between them."""
 
-_MOST_LOWERED, _LOWERED = 8, 1.01
-"""How often, and by which share, the limits of an interval are lowered that the controller would refuse."""
+_EFFORT = Effort(gain=1e-3, patience=9)
+"""Of windows: less than for a plan that is made once. What that costs is about 0.05 % of the time."""
 
-_TAIL_LOWERED = (2, 1.04)
+_LOWERED = (1.01, 1.01, 1.02, 1.04, 1.08)
+"""By which factors, one after the other, the limits of an interval are lowered that the controller would refuse."""
+
+_TAIL_LOWERED = (1.04, 1.04)
 """The same of a tail, which need not be the fastest."""
 
 _TAIL_EXCESS = 1.0075
@@ -251,7 +254,9 @@ class SectionFeed:
         if found is None:
             return self._to_rest(limits, given)
         made, bad = self._lowered(
-            found, lambda one: self._window(one, limits, given, high, stop_s), lambda w: w.stretch
+            found,
+            lambda one: self._window(one, limits, given, high, stop_s),
+            lambda window: (window.stretch, window.count),
         )
         if self._moving is not None and bad[: made.count].any():
             return self._to_rest(limits, given)
@@ -261,24 +266,25 @@ class SectionFeed:
         self,
         found: Solution,
         made: Callable[[Solution], _Made],
-        stretch_of: Callable[[_Made], Stretch],
-        steps: tuple[int, float] = (_MOST_LOWERED, _LOWERED),
+        stretch_of: Callable[[_Made], tuple[Stretch, int]],
+        steps: Sequence[float] = _LOWERED,
     ) -> tuple[_Made, NDArray[np.bool_]]:
         """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
-        pieces that it still would refuse.
+        pieces that it still would refuse. `stretch_of`: its pieces, and how many of them are kept.
         """
         tight, out = np.ones(found.grid.size), made(found)
-        for _ in range(steps[0]):
-            bad = self._exceeded(stretch_of(out))
-            if not bad.any():
+        for step in steps:
+            stretch, count = stretch_of(out)
+            bad = self._exceeded(stretch)
+            if not bad[:count].any():
                 return out, bad
-            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= steps[1]
+            tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= step
             lower = tightened(found, tight)
             if lower is None:
                 break
             found = lower
             out = made(found)
-        return out, self._exceeded(stretch_of(out))
+        return out, self._exceeded(stretch_of(out)[0])
 
     def _window(
         self,
@@ -396,7 +402,8 @@ class SectionFeed:
         curve, low, moving = self.path.curve, self._low_mm, self._moving
         held = self._held
         if moving is None:
-            check_feasible(curve, limits, LONGEST_S)
+            # Zones are no slower than a feed may be, and there are many of them.
+            check_feasible(curve, replace(limits, zones=()), LONGEST_S)
             limits = within_reach(curve, limits)
         limits = replace(limits, zones=_touched(limits.zones, low, high))
         known_to = 0.0 if held is None else trusted_to(held, stop_s)
@@ -413,6 +420,7 @@ class SectionFeed:
                     held,
                     known_to,
                     before_s=self._before_s,
+                    effort=_EFFORT,
                 )
                 if found is not None:
                     return measured(curve, found)
@@ -485,7 +493,7 @@ class SectionFeed:
                 return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
 
             yield made(one)
-            yield self._lowered(one, made, lambda tail: tail, _TAIL_LOWERED)[0]
+            yield self._lowered(one, made, _whole, _TAIL_LOWERED)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
 
@@ -516,6 +524,11 @@ class SectionFeed:
                 continue
             tried.add(at)
             yield float(ends[at])
+
+
+def _whole(stretch: Stretch) -> tuple[Stretch, int]:
+    """All of its pieces are kept."""
+    return stretch, len(stretch.pieces)
 
 
 def last_s(pieces: FeedPieces, count: int) -> float:

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from ...errors import BusError
 from ..address import BusAddress
-from ..clock import member_connection
+from ..clock import MOST_FRAMES, member_connection
 from .frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 
 __all__ = ["BATCH", "FRAME_DTYPE", "RECORD_DTYPE", "FrameBatch", "Frames", "open_socket"]
 
 BATCH = 1024
+"""Packets of a call, at most: of one frame each, on a local bus of up to MOST_FRAMES."""
 _LOCAL_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_ns", "<u8")])
 _CONTROL_BYTES = 64
 _BUFFER_BYTES = 64 * 2**20
@@ -98,9 +99,10 @@ class FrameBatch:
 
     def __init__(self, address: BusAddress) -> None:
         dtype = _LOCAL_DTYPE if address.is_local else FRAME_DTYPE
-        frame_bytes = dtype.itemsize
-        self.frames = bytearray(BATCH * frame_bytes)
-        self._rows = np.frombuffer(self.frames, dtype=dtype)
+        most = MOST_FRAMES if address.is_local else 1
+        packet_bytes = most * dtype.itemsize
+        self.frames = bytearray(BATCH * packet_bytes)
+        self._rows = np.frombuffer(self.frames, dtype=dtype).reshape(BATCH, most)
         self._control = bytearray(BATCH * _CONTROL_BYTES)
         frames = (ctypes.c_char * len(self.frames)).from_buffer(self.frames)
         control = (ctypes.c_char * len(self._control)).from_buffer(self._control)
@@ -115,9 +117,16 @@ class FrameBatch:
             offset=_MsgHdr.control_length.offset,
             strides=(ctypes.sizeof(_MMsgHdr),),
         )
+        self._lengths = np.ndarray(
+            BATCH,
+            dtype=np.uint32,
+            buffer=memoryview(self._messages).cast("B"),
+            offset=_MMsgHdr.length.offset,
+            strides=(ctypes.sizeof(_MMsgHdr),),
+        )
         for i in range(BATCH):
-            self._vectors[i].base = ctypes.addressof(frames) + i * frame_bytes
-            self._vectors[i].length = frame_bytes
+            self._vectors[i].base = ctypes.addressof(frames) + i * packet_bytes
+            self._vectors[i].length = packet_bytes
             header = self._messages[i].header
             header.vectors = ctypes.pointer(self._vectors[i])
             header.vector_count = 1
@@ -126,7 +135,7 @@ class FrameBatch:
         self._call = ctypes.CDLL(None, use_errno=True).recvmmsg
 
     def receive(self, descriptor: int) -> int:
-        """Fills the buffers with what is there; the number of frames, 0 when there is none. Raises OSError."""
+        """Fills the buffers with what is there; the number of packets, 0 when there is none. Raises OSError."""
         count = int(self._call(descriptor, self._messages, BATCH, _MSG_DONTWAIT, None))
         if count < 0:
             error = ctypes.get_errno()
@@ -138,19 +147,22 @@ class FrameBatch:
         return count
 
     def records(self, count: int) -> Frames:
-        """The first `count` frames and when they came (`RECORD_DTYPE`); 0 where the socket has no time stamps."""
-        rows = self._rows[:count]
-        records = np.zeros(count, dtype=RECORD_DTYPE)
+        """The frames of the first `count` packets and when they came (`RECORD_DTYPE`); 0 where the socket has no time
+        stamps.
+        """
+        filled = self._lengths[:count, None] // self._rows.dtype.itemsize
+        rows = self._rows[:count][np.arange(self._rows.shape[1]) < filled]
+        records = np.zeros(rows.size, dtype=RECORD_DTYPE)
         for name in ("id", "length", "data"):
             records[name] = rows[name]
-        if rows.dtype is _LOCAL_DTYPE:
+        if rows.dtype == _LOCAL_DTYPE:
             records["time_us"] = rows["time_ns"] // 1000
         else:
             records["time_us"] = self._stamps_us(count)
         return records
 
     def dropped(self, last: int) -> int | None:
-        """The kernel's drop count that came with frame `last`; None when none did."""
+        """The kernel's drop count that came with packet `last`; None when none did."""
         for kind, data in self._words_beside(last):
             if kind == _SO_RXQ_OVFL:
                 return int(struct.unpack_from("<I", data)[0])

@@ -53,8 +53,9 @@ class Recorder:
                 ending = self._ending.is_set()
                 count = batch.receive(descriptor)
                 if count:
-                    self._chunks.append(batch.records(count))
-                    self._count += count
+                    records = batch.records(count)
+                    self._chunks.append(records)
+                    self._count += records.size
                     self._dropped = batch.dropped(count - 1) or self._dropped
                     batch.rearm(count)
                 if count < BATCH:

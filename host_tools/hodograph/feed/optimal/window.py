@@ -29,13 +29,12 @@ ALLOWED = 5e-4
 """Excess that a plan may have, as a share of a limit."""
 
 _MOST_ROUNDS = 9
-_GAIN, _HURRIED_GAIN = 1e-4, 0.1
+_HURRIED_GAIN = 0.1
 _BESIDE = 1e-7
 _LEAST_Q = 1e-14
 _LEAST_TYPICAL = 1e-12
 _LEAST_P = 1e-300
 _LEAST_FALL = 0.1
-_PATIENCE = 6
 _MOST_TRIALS = 3
 _TRUSTED = 2
 _TOLERABLE = 5e-3
@@ -48,6 +47,21 @@ _PENALTY = 30.0
 
 Feed = Callable[[Real], Real]
 """q at arc lengths."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How far a plan is improved.
+
+    gain      share of the time that a further round has to gain
+    patience  rounds before all points have rows, which takes some ten times as long
+    """
+
+    gain: float = 1e-4
+    patience: int = 6
+
+
+_WHOLE = Effort()
 
 
 @dataclass(frozen=True)
@@ -97,6 +111,7 @@ class _Setting:
     gauss: tuple[
         Index, Real, Real
     ]  # interval, arc length and basis of p at the points of quadrature
+    effort: Effort
     tight: Real | None = None  # (n,): what the limits of each interval are divided by,
     reserved: Real | None = None  # (n,): and for reserve zones alone
 
@@ -113,12 +128,14 @@ def plan_window(
     *,
     hurried: bool = False,
     before_s: float | None = None,
+    effort: Effort = _WHOLE,
 ) -> Solution | None:
     """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
 
     known     an earlier solution that is good up to arc length known_to
     hurried   the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
               hundred slower
+    effort    how far the feed is improved
     before_s  how long the interval before `low` lasts, where intervals follow at the end too; None: the window is a
               whole program
     """
@@ -134,8 +151,8 @@ def plan_window(
             knots = _same_knots(knots, known, known_to)
         last = hurried or trial == _MOST_TRIALS - 1
         even = partial(_even, guess, known_to, period_s)
-        setting = _setting(spline, limits, knots, start)
-        gain = _HURRIED_GAIN if hurried else _GAIN
+        setting = _setting(spline, limits, knots, start, effort)
+        gain = _HURRIED_GAIN if hurried else effort.gain
         best = _Rounds(setting, about).run(None if last else even, gain)
         if best is None or last or even(best):
             break
@@ -154,7 +171,9 @@ def _without_brief(
         if keep.all():
             break
         setting = found.setting
-        joined = _setting(spline, setting.limits, found.grid.s[keep], setting.start)
+        joined = _setting(
+            spline, setting.limits, found.grid.s[keep], setting.start, setting.effort
+        )
         again = _Rounds(joined, found.squared_feed).run(None, gain)
         if again is None:
             break
@@ -183,7 +202,8 @@ def tightened(found: Solution, tight: Real) -> Solution | None:
     reserved = found.setting.reserved
     if reserved is not None:
         tight = tight * reserved
-    return _Rounds(replace(found.setting, tight=tight), found.squared_feed, found).run()
+    setting = replace(found.setting, tight=tight)
+    return _Rounds(setting, found.squared_feed, found).run(None, setting.effort.gain)
 
 
 def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
@@ -239,7 +259,9 @@ def _retimed(found: Solution, guess: FirstEstimate, period_s: float) -> tuple[Re
     return s, t, np.maximum(step, 1.7 * period_s)
 
 
-def _setting(spline: Curve, limits: PlanLimits, knots: Real, start: State | None) -> _Setting:
+def _setting(
+    spline: Curve, limits: PlanLimits, knots: Real, start: State | None, effort: Effort
+) -> _Setting:
     grid = make_grid(knots, start is None)
     zones = _interval_zones(limits, knots)
     joints = spline.segment_starts_mm
@@ -275,6 +297,7 @@ def _setting(spline: Curve, limits: PlanLimits, knots: Real, start: State | None
         us < 1.0,
         most,
         _gauss(grid),
+        effort,
         reserved,
         reserved,
     )
@@ -353,7 +376,7 @@ class _Rounds:
             self.typical_q, self.duration_s = known.q, known.duration_s
 
     def run(
-        self, even: Callable[[Solution], bool] | None = None, least_gain: float = _GAIN
+        self, even: Callable[[Solution], bool] | None, least_gain: float
     ) -> Solution | None:
         """The last solution; None where there is none, or only one above the limits.
 
@@ -368,7 +391,7 @@ class _Rounds:
             assert self.best is not None
             if rounds == _TRUSTED and even is not None and not even(self.best):
                 return self.best
-            self.select.everything = rounds >= _PATIENCE
+            self.select.everything = rounds >= self.setting.effort.patience
             if self.best.excess <= ALLOWED and abs(gain) < least_gain * self.duration_s:
                 break
         moving = self.setting.start is not None
