@@ -212,22 +212,6 @@ def decode(image: bytes) -> Program:
     extra = [segments[f"extra{k}"] for k in range(axes - SPACE_AXES)]
     points = [segments["point"].T, *(one["start"][None] for one in extra)]
     a = segments["a"] if axes == PLANE_AXES else _from_i48(segments["a"])
-    raw = np.frombuffer(image, _PIECE, piece_count, after)
-    pieces = FeedPieces(
-        raw["duration"].astype(np.int64),
-        raw["start"].astype(np.int64),
-        raw["c"].astype(np.int64),
-        raw["factor"].astype(np.uint32),
-        raw["rate"].copy(),
-        raw["second"].copy(),
-    )
-    table = np.frombuffer(image, _STOP, piece_count, after + PIECE_SIZE * piece_count)
-    stops = Stops(
-        table["codes"].copy(),
-        table["bound_us"].astype(np.uint32),
-        (head[19], head[21]),
-        (head[20], head[22]),
-    )
     stops_end = after + (PIECE_SIZE + STOP_SIZE) * piece_count
     return Program(
         name=head[18].rstrip(b"\0").decode(errors="replace"),
@@ -247,12 +231,37 @@ def decode(image: bytes) -> Program:
         start_q40=segments["start"].astype(np.int64),
         point_q40=np.concatenate(points).astype(np.int64),
         a_q44=np.ascontiguousarray(np.moveaxis(a, 2, 0), dtype=np.int64),
-        pieces=pieces,
-        stops=stops,
+        pieces=_decode_pieces(image, after, piece_count),
+        stops=_decode_stops(image, after + PIECE_SIZE * piece_count, piece_count),
         extra_q40=np.array([_from_i48(one["b"]) for one in extra], dtype=np.int64).reshape(
             max(axes - SPACE_AXES, 0), segment_count, 5
         ),
         events=np.frombuffer(image, EVENT, head[17], stops_end).copy(),
+    )
+
+
+def _decode_pieces(image: bytes, at: int, count: int) -> FeedPieces:
+    """The feed pieces, which begin at byte `at`."""
+    raw = np.frombuffer(image, _PIECE, count, at)
+    return FeedPieces(
+        raw["duration"].astype(np.int64),
+        raw["start"].astype(np.int64),
+        raw["c"].astype(np.int64),
+        raw["factor"].astype(np.uint32),
+        raw["rate"].copy(),
+        raw["second"].copy(),
+    )
+
+
+def _decode_stops(image: bytes, at: int, count: int) -> Stops:
+    """The stop table, which begins at byte `at`."""
+    table = np.frombuffer(image, _STOP, count, at)
+    head = _HEADER.unpack_from(image)
+    return Stops(
+        table["codes"].copy(),
+        table["bound_us"].astype(np.uint32),
+        (head[19], head[21]),
+        (head[20], head[22]),
     )
 
 
