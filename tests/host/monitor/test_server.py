@@ -22,6 +22,7 @@ from hodograph.monitor.link import read_command
 from hodograph.monitor.security import Guard
 from hodograph.monitor.server import Server
 
+HANGS_S = 600.0  # of real time: none of these takes a second
 TOKEN = "a-token-for-these-tests"
 
 Browser = TestClient[Any, Any]
@@ -63,7 +64,7 @@ async def hello(browser: Browser, **more: Any) -> aiohttp.ClientWebSocketRespons
 
 async def answer(socket: aiohttp.ClientWebSocketResponse, kind: str) -> Any:
     while True:
-        message = await socket.receive_json(timeout=5)
+        message = await socket.receive_json(timeout=HANGS_S)
         if message["type"] == kind:
             return message
 
@@ -137,7 +138,7 @@ def test_without_the_token_loopback_may_look_on_only() -> None:
 def test_a_wrong_token_is_refused(host: str, token: Any) -> None:
     async def scenario(browser: Browser) -> None:
         socket = await hello(browser, token=token)
-        message = await socket.receive(timeout=5)
+        message = await socket.receive(timeout=HANGS_S)
         assert message.type is WSMsgType.CLOSE
         assert socket.close_code == 4401
 
@@ -149,7 +150,7 @@ def test_an_open_server_shows_nothing_without_the_token() -> None:
 
     async def scenario(browser: Browser) -> None:
         socket = await hello(browser)
-        assert (await socket.receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await socket.receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
         assert socket.close_code == 4401
         socket = await hello(browser, token=TOKEN)
         assert (await answer(socket, "hello"))["may_command"] is True
@@ -168,7 +169,7 @@ def test_nonsense_ends_the_connection_and_not_the_server(text: str) -> None:
                 await socket.send_json({"type": "hello", "token": TOKEN})
                 await answer(socket, "hello")
             await socket.send_str(text)
-            while (message := await socket.receive(timeout=5)).type is WSMsgType.TEXT:
+            while (message := await socket.receive(timeout=HANGS_S)).type is WSMsgType.TEXT:
                 assert json.loads(message.data)["type"] == "history"
             assert message.type is WSMsgType.CLOSE
             too_big = len(text) > 4096
@@ -184,7 +185,7 @@ def test_several_browsers_but_not_any_number() -> None:
         for socket in sockets:
             await answer(socket, "hello")
         one_more = await hello(browser)
-        assert (await one_more.receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await one_more.receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
         await sockets[0].close()
         await asyncio.sleep(0.1)
         assert (await answer(await hello(browser), "hello"))["mode"] == "live"
@@ -204,8 +205,8 @@ def test_who_has_the_token_always_gets_in() -> None:
             assert (await answer(socket, "hello"))["may_command"] is True
         await answer(operators[0], "hello")
         await answer(operators[0], "history")
-        assert (await operators[0].receive(timeout=5)).type is WSMsgType.CLOSE
-        assert (await idle[0].receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await operators[0].receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
+        assert (await idle[0].receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
 
     Case().run(scenario)
 
