@@ -277,7 +277,7 @@ class _Rest:
             return None
         curve = self.next_part.section.pipeline.curve
         if isinstance(curve, PHSpline):
-            return coordinates(curve.nodal_points[:1])[0]
+            return np.asarray(coordinates(curve.nodal_points[:1])[0])
         return np.asarray(curve.axes_nodes[0])
 
     def blocks(self) -> Iterator[Block]:
