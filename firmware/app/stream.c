@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "app/machine/path_counts.h"
+#include "core/first_axis.h"
 #include "core/qmath.h"
 #include "port/port.h"
 
@@ -100,10 +101,10 @@ static int check_program(const struct stream *stream, struct chunk *chunk,
 {
     const struct chunk *previous = opens_a_job(stream, chunk) ? NULL : &stream->newest->chunk;
     struct program_limits limits;
-    if (chunk->program.header.axis_count > config->axis_count) {
+    if (first_axis_end(&chunk->program.header) > config->axis_count) {
         return PROGRAM_ERR_AXES;
     }
-    config_limits(config, 0, &limits);
+    config_limits(config, first_axis(&chunk->program.header), &limits);
     limits.attend = stream->attend;
     limits.self = stream->self;
     return chunk_check(chunk, previous, &limits, fault);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "core/crc32.h"
+#include "core/first_axis.h"
 #include "core/little_endian.h"
 #include "core/override_ramp.h"
 #include "core/qmath.h"
@@ -109,8 +110,10 @@ static int check_follows(const struct chunk *next, const struct chunk *previous)
     if (!chunk_begins_at_rest(next) && chunk_is_joined(previous)) {
         return PROGRAM_ERR_CHUNK_REST;
     }
-    return next->program.header.period_us == previous->program.header.period_us &&
-                   next->program.header.axis_count == previous->program.header.axis_count
+    const struct program_header *h = &next->program.header;
+    const struct program_header *before = &previous->program.header;
+    return h->period_us == before->period_us && h->axis_count == before->axis_count &&
+                   first_axis(h) == first_axis(before)
                ? 0
                : PROGRAM_ERR_CHUNK_PROGRAM;
 }

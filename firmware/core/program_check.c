@@ -48,8 +48,8 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    const uint32_t flags =
-        PROGRAM_FLAG_CLOSED | (limits->chunk != 0 ? PROGRAM_FLAG_MOVING : FIRST_AXIS_FLAGS);
+    const uint32_t flags = PROGRAM_FLAG_CLOSED | FIRST_AXIS_FLAGS |
+                           (limits->chunk != 0 ? (uint32_t)PROGRAM_FLAG_MOVING : 0u);
     if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }
@@ -161,7 +161,8 @@ static const struct text texts[] = {
     {PROGRAM_ERR_CHUNK_JOB, "chunk: of another job, or job 0"},
     {PROGRAM_ERR_CHUNK_SEQUENCE, "chunk: sequence number is not the next one"},
     {PROGRAM_ERR_CHUNK_FIRST, "chunk: its flag 'first' contradicts its predecessor or its start"},
-    {PROGRAM_ERR_CHUNK_PROGRAM, "chunk: period or axis count is not that of its predecessor"},
+    {PROGRAM_ERR_CHUNK_PROGRAM,
+     "chunk: period, axis count or first axis is not that of its predecessor"},
     {PROGRAM_ERR_CHUNK_SHARED, "chunk: shifts or shared counts do not fit its predecessor"},
     {PROGRAM_ERR_CHUNK_SEGMENT, "chunk: a shared segment is not that of its predecessor"},
     {PROGRAM_ERR_CHUNK_PIECE, "chunk: a shared piece is not that of its predecessor"},

@@ -93,7 +93,7 @@ enum program_error {
         -83, /* sequence is not one more than the predecessor's; of a first chunk not 0 */
     PROGRAM_ERR_CHUNK_FIRST =
         -84, /* flag FIRST, but a predecessor, shared parts or a start in motion; or none of them */
-    PROGRAM_ERR_CHUNK_PROGRAM = -85, /* period or axis count is not the predecessor's */
+    PROGRAM_ERR_CHUNK_PROGRAM = -85, /* period, axis count or first axis is not the predecessor's */
     PROGRAM_ERR_CHUNK_SHARED = -86,  /* shifts or shared counts do not fit the predecessor */
     PROGRAM_ERR_CHUNK_SEGMENT =
         -87, /* a shared segment is not the predecessor's; index = the segment */

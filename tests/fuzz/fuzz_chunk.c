@@ -17,15 +17,17 @@
 #include "fuzz.h"
 #include "golden.h"
 
-#define JOBS       4u
-#define COMMANDS   16u
-#define TICKS_MAX  2500u
-#define NEVER      255u
-#define CACHE_SIZE 8192u
-#define FAULT      2.0  /* codes of a fault stop are twice those of a hold (stop_table.h) */
-#define NOISE_MM   4e-9 /* of the double kernel, and of an arc length at a takeover */
-#define STEPS      1.02 /* what joints of pieces may add (docs/guides/limits.md) */
-#define BACK_MM 0.0002  /* a feed may run back by 2^-14 mm, and the next setpoint come from there */
+#define JOBS        7u /* in the plane, one of them with events; in space; with six axes */
+#define WITH_EVENTS 4u /* the first job that has events, as all after it */
+#define EVENTS      40u
+#define COMMANDS    16u
+#define TICKS_MAX   2500u
+#define NEVER       255u
+#define CACHE_SIZE  8192u
+#define FAULT       2.0  /* codes of a fault stop are twice those of a hold (stop_table.h) */
+#define NOISE_MM    4e-9 /* of the double kernel, and of an arc length at a takeover */
+#define STEPS       1.02 /* what joints of pieces may add (docs/guides/limits.md) */
+#define BACK_MM 0.0002 /* a feed may run back by 2^-14 mm, and the next setpoint come from there */
 #define Q40     1099511627776.0
 
 static struct job {
@@ -50,19 +52,23 @@ struct run {
     struct coefficient_cache cache;
     double period_s;
     double arc_mm[4];
-    double place_mm[2][2];
+    double place_mm[2][PROGRAM_SPACE];
     unsigned known;
 };
 
 static void make_jobs(void)
 {
-    static const char *const names[JOBS] = {"alpha_minimax.hdgp", "line.hdgp", "heart_minimax.hdgp",
-                                            "alpha_exponential.hdgp"};
+    static const char *const names[JOBS] = {
+        "alpha_minimax.hdgp",     "line.hdgp",   "heart_minimax.hdgp", "alpha_exponential.hdgp",
+        "alpha_exponential.hdgp", "space3.hdgp", "space6.hdgp"};
     uint64_t random = 5;
     for (unsigned i = 0; i < JOBS && jobs[JOBS - 1u].cuts.count == 0u; i++) {
         override_program_golden(&jobs[i].whole, names[i]);
         chunked_refine(&jobs[i].whole, 0.03);
         override_program_limits(&jobs[i].whole, &random);
+        if (i >= WITH_EVENTS) {
+            chunked_add_events(&jobs[i].whole, EVENTS, &random);
+        }
         while (chunked_random(&jobs[i].cuts, &jobs[i].whole, &random) == 0) {
         }
     }
@@ -165,19 +171,22 @@ static void keeps(struct run *run, const struct interpolator_point *point,
     const double h = run->period_s;
     const double *s = run->arc_mm;
     const double noise = NOISE_MM / h;
+    const struct program_header *header = &run->parts[run->now].chunk.program.header;
+    const uint32_t axes = program_curve_axes(header->axis_count);
     const double job_mm = (double)run->parts[run->now].chunk.job_start_q40_mm / Q40;
     memmove(run->arc_mm, run->arc_mm + 1, 3 * sizeof *run->arc_mm);
     memcpy(run->place_mm[0], run->place_mm[1], sizeof run->place_mm[0]);
     run->arc_mm[3] = (double)point->arc_length_q40_mm / Q40 + job_mm;
-    for (int axis = 0; axis < 2; axis++) {
+    double square = 0;
+    for (uint32_t axis = 0; axis < axes; axis++) {
         run->place_mm[1][axis] = (double)point->position_q40[axis] / Q40;
+        const double step_mm = run->place_mm[1][axis] - run->place_mm[0][axis];
+        square += step_mm * step_mm;
     }
     if (++run->known < 4u) {
         return;
     }
-    const double step_mm =
-        hypot(run->place_mm[1][0] - run->place_mm[0][0], run->place_mm[1][1] - run->place_mm[0][1]);
-    FUZZ_CHECK(step_mm <= (1e-3 * STEPS * limits->feed_um_s + noise) * h + BACK_MM);
+    FUZZ_CHECK(sqrt(square) <= (1e-3 * STEPS * limits->feed_um_s + noise) * h + BACK_MM);
     FUZZ_CHECK(s[3] - s[2] >= -BACK_MM);
     FUZZ_CHECK((s[3] - s[2]) / h <= 1e-3 * STEPS * limits->feed_um_s + noise);
     FUZZ_CHECK(fabs(s[3] - 2 * s[2] + s[1]) / (h * h) <=

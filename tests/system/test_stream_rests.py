@@ -82,3 +82,25 @@ def test_run_streams_what_no_bank_can_hold(
     found = result(capsys, *words)
     assert (found["sections"], found["chunks"]) == (3, 3)
     assert found["underruns"] == 0
+
+
+def test_axes_that_turn_alone_are_jobs_between_the_others(
+    hub: LocalHub, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On five axes: the setpoints on the bus end each job where it ends, and no step is above the limits."""
+    file, log = tmp_path / "turned.ngc", tmp_path / "bus.log"
+    file.write_text("G21 G90 G61 F6000\nG0 A6 C20\nG1 X6 C23\nG4 P0.1\nG1 A3\nM2\n")
+    machine = EXAMPLES / "machines" / "mill_five_axes.toml"
+    journal = str(tmp_path / "stream.json")
+    found = result(
+        capsys,
+        *("stream", str(file), "--machine", str(machine), "--journal", journal, "--json"),
+        *("--record", str(log)),
+    )
+    assert (found["sections"], found["underruns"]) == (3, 0)
+    frames = read_recording(log, None)
+    ends = []
+    for node in range(2, 7):
+        own = frames["data"][frames["id"] == RPDO1 + node][:, 2:6].copy().view("<i4")[:, 0]
+        ends.append(int(own[-1]))
+    assert ends == [6_000_000, 0, 0, 300_000, 2_300_000]

@@ -58,7 +58,8 @@ static void shift(double out[8], const double c[8], double t)
 /* Where the pieces of a program with such an image begin. */
 static uint8_t *pieces_of(const struct program *p, uint8_t *image)
 {
-    return image + PROGRAM_HEADER_SIZE + (size_t)p->header.segment_count * PROGRAM_SEGMENT_SIZE;
+    return image + p->header.header_size +
+           (size_t)p->header.segment_count * program_segment_size(p->header.axis_count);
 }
 
 void chunked_refine(struct override_program *p, double longest_s)
@@ -274,7 +275,8 @@ static const uint8_t *piece_bytes(const struct override_program *w, uint32_t i)
 
 static const uint8_t *segment_bytes(const struct program *p, uint32_t i)
 {
-    return p->image + PROGRAM_HEADER_SIZE + (size_t)i * PROGRAM_SEGMENT_SIZE;
+    return p->image + p->header.header_size +
+           (size_t)i * program_segment_size(p->header.axis_count);
 }
 
 static int64_t arc_of(const struct program *p, const struct chunked_cut *cut)
@@ -296,10 +298,11 @@ static void write_body(uint8_t *at, const struct override_program *w, const stru
 {
     const struct program *p = &w->program;
     const uint64_t arc = (uint64_t)arc_of(p, cut);
+    const uint32_t segment_size = program_segment_size(p->header.axis_count);
     for (uint32_t i = cut->segment; i < cut->segments; i++) {
-        memcpy(at, segment_bytes(p, i), PROGRAM_SEGMENT_SIZE);
+        memcpy(at, segment_bytes(p, i), segment_size);
         put(at, (uint64_t)program_segment_start(p, i) - arc, 8);
-        at += PROGRAM_SEGMENT_SIZE;
+        at += segment_size;
     }
     for (uint32_t i = cut->first; i < cut->joint + cut->tail_count; i++) {
         const uint8_t *from = i < cut->joint ? piece_bytes(w, i) : cut->tail[i - cut->joint];
@@ -351,20 +354,20 @@ static void write_image(uint8_t *image, uint32_t size, const struct override_pro
     uint32_t events;
     uint8_t codes[6];
     (void)events_of(p, cut, &events);
-    memcpy(image, p->image, PROGRAM_HEADER_SIZE);
+    memcpy(image, p->image, p->header.header_size);
     memcpy(image, "HDGP", 4);
     put(image + 4, PROGRAM_VERSION, 2);
-    put(image + 6, PROGRAM_HEADER_SIZE, 2);
+    put(image + 6, p->header.header_size, 2);
     put(image + 8, size, 4);
     put(image + 16, p->header.period_us, 4);
     put(image + 20, cut->segments - cut->segment, 4);
     put(image + 24, cut->joint - cut->first + cut->tail_count, 4);
     put(image + 28, cut->first > 0 ? PROGRAM_FLAG_MOVING : 0u, 2);
-    put(image + 30, PROGRAM_PLANE, 2);
+    put(image + 30, p->header.axis_count, 2);
     put(image + 32, time_of(p, cut->joint) - time_of(p, cut->first) + tail_time(cut), 8);
     put(image + 40, (uint64_t)(end_q40 - arc_of(p, cut)), 8);
     put(image + 76, events, 4);
-    write_body(image + PROGRAM_HEADER_SIZE, w, cut);
+    write_body(image + p->header.header_size, w, cut);
     write_events(image + size - (size_t)events * PROGRAM_EVENT_SIZE, p, cut);
     override_program_codes(&w->limit, codes);
     stop_table_write(image, size, codes);
@@ -408,8 +411,10 @@ static void write_chunk(struct chunked *c, uint32_t i)
     const struct chunked_cut *cut = &c->cuts[i];
     uint32_t events;
     (void)events_of(&c->whole->program, cut, &events);
+    const struct program_header *header = &c->whole->program.header;
     const uint32_t image =
-        PROGRAM_HEADER_SIZE + (cut->segments - cut->segment) * PROGRAM_SEGMENT_SIZE +
+        header->header_size +
+        (cut->segments - cut->segment) * program_segment_size(header->axis_count) +
         (cut->joint - cut->first + cut->tail_count) * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
         events * PROGRAM_EVENT_SIZE;
     c->sizes[i] = CHUNK_HEADER_SIZE + image;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * chunked: a planar program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
+ * chunked: a program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
  * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has the
  * events of the program on its segments.
  */

@@ -30,8 +30,9 @@ static void put(uint8_t *at, uint64_t value, int bytes)
 
 static uint8_t *piece_at(const struct override_program *p, uint32_t i)
 {
-    return p->image + PROGRAM_HEADER_SIZE +
-           (size_t)p->program.header.segment_count * PROGRAM_SEGMENT_SIZE +
+    const struct program_header *header = &p->program.header;
+    return p->image + header->header_size +
+           (size_t)header->segment_count * program_segment_size(header->axis_count) +
            (size_t)i * PROGRAM_PIECE_SIZE;
 }
 
@@ -341,6 +342,10 @@ double override_distance_q40(struct interpolator *exact, const struct interpolat
         TEST_ASSERT_TRUE(exact->segment->to_q40_mm != INT64_MAX);
         (void)interpolator_at_arc_length(exact, exact->segment->to_q40_mm, &right);
     }
-    return hypot((double)(right.position_q40[0] - point->position_q40[0]),
-                 (double)(right.position_q40[1] - point->position_q40[1]));
+    double sum = 0;
+    for (uint32_t axis = 0; axis < exact->program->header.axis_count; axis++) {
+        const double off = (double)(right.position_q40[axis] - point->position_q40[axis]);
+        sum += off * off;
+    }
+    return sqrt(sum);
 }

@@ -37,8 +37,8 @@ static struct stop_bound write_bounds(const struct program *p, uint8_t *image, u
 void stop_table_fill(struct program *p, uint8_t *image, const uint8_t codes[6])
 {
     const uint32_t count = p->header.piece_count;
-    uint8_t *table = image + PROGRAM_HEADER_SIZE +
-                     (size_t)p->header.segment_count * PROGRAM_SEGMENT_SIZE +
+    uint8_t *table = image + p->header.header_size +
+                     (size_t)p->header.segment_count * program_segment_size(p->header.axis_count) +
                      (size_t)count * PROGRAM_PIECE_SIZE;
     for (uint32_t i = 0; i < count; i++) {
         memcpy(table + (size_t)i * PROGRAM_STOP_SIZE, codes, 6);

@@ -299,6 +299,31 @@ static void test_a_program_in_motion_is_accepted_in_a_chunk_only(void)
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FIRST, check_chunk(0, &fault));
 }
 
+static int code_with_first_axes(uint8_t first, uint8_t next)
+{
+    struct program_fault fault;
+    const uint8_t axes[2] = {first, next};
+    for (uint32_t i = 0; i < 2; i++) {
+        chain.bytes[i][CHUNK_HEADER_SIZE + 29] = axes[i];
+        chunked_seal(chain.bytes[i], chain.sizes[i]);
+    }
+    const int code = check_chunk(0, &fault);
+    return code != 0 ? code : check_chunk(1, &fault);
+}
+
+static void test_all_chunks_of_a_job_have_one_first_axis(void)
+{
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, code_with_first_axes(0, 0));
+    TEST_ASSERT_EQUAL_INT(0, code_with_first_axes(2, 2));
+    TEST_ASSERT_EQUAL_INT(0, code_with_first_axes(4, 4));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PROGRAM, code_with_first_axes(0, 2));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PROGRAM, code_with_first_axes(2, 3));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PROGRAM, code_with_first_axes(2, 0));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_AXES, code_with_first_axes(5, 5));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_FLAGS, code_with_first_axes(8, 8));
+}
+
 /* --- The motion --- */
 
 struct motion {
@@ -668,6 +693,7 @@ int main(void)
     RUN_TEST(test_events_of_the_shared_part_are_the_predecessors);
     RUN_TEST(test_one_event_more_or_less_is_refused);
     RUN_TEST(test_a_program_in_motion_is_accepted_in_a_chunk_only);
+    RUN_TEST(test_all_chunks_of_a_job_have_one_first_axis);
     RUN_TEST(test_a_takeover_at_every_tick_changes_no_setpoint);
     RUN_TEST(test_chains_give_the_setpoints_of_the_whole);
     RUN_TEST(test_no_takeover_while_a_stop_or_a_search_is_under_way);

@@ -24,10 +24,12 @@
 #define CASES      10000u
 #define WHOLES     12u
 #define LINES      4u /* of them: one for each period */
+#define IN_SPACE   4u /* more of them: with three axes and with six */
+#define SPACE_PART 8u /* of the cuts there is one in space for so many in the plane */
 #define CHAINS     6u /* of each whole program */
 #define MOST_TICKS 6000u
 #define LONGEST    20000u /* until rest */
-#define CACHE_MOST 65536u
+#define CACHE_MOST 131072u
 #define EVENTS     40u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
 
@@ -36,6 +38,7 @@
 
 static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp", "line.hdgp",
                                      "alpha_exponential.hdgp"};
+static const char *const GOLDEN_IN_SPACE[] = {"space3.hdgp", "space6.hdgp"};
 
 /* The motion with the number of its chunk and of its next setpoint. */
 struct motion {
@@ -60,7 +63,7 @@ static struct {
     struct interpolator_point right[MOST_TICKS]; /* its setpoints at 100 % */
     uint32_t ticks;
     uint32_t chain_count;
-} wholes[WHOLES];
+} wholes[WHOLES + IN_SPACE];
 
 static struct {
     const struct override_program *p;
@@ -192,7 +195,8 @@ static void make_whole(uint32_t w, uint64_t *random)
     if (w < LINES) {
         override_program_random(p, 1000u << w, random);
     } else {
-        override_program_golden(p, GOLDEN[w % (sizeof GOLDEN / sizeof *GOLDEN)]);
+        override_program_golden(p, w < WHOLES ? GOLDEN[w % (sizeof GOLDEN / sizeof *GOLDEN)]
+                                              : GOLDEN_IN_SPACE[w % 2u]);
         chunked_refine(p, override_random(random, 0.012, 0.03));
     }
     chunked_add_events(p, EVENTS, random);
@@ -244,7 +248,8 @@ static void check_same(void)
         const struct interpolator_point *right =
             &wholes[now.which].right[now.m.tick < last ? now.m.tick : last];
         TEST_ASSERT_EQUAL_MEMORY_MESSAGE(right, &now.point,
-                                         offsetof(struct interpolator_point, position_q40[2]),
+                                         offsetof(struct interpolator_point, position_q40) +
+                                             now.p->program.header.axis_count * sizeof(int64_t),
                                          where("the same setpoint", 0, 0));
         seen.same++;
     }
@@ -405,26 +410,28 @@ static void try_to_take_over(void)
 static void begin_cache(uint64_t *random)
 {
     const struct kernel *fixed = kernel_find(KERNEL_FIXED);
+    const uint32_t axes = now.p->program.header.axis_count;
     const uint32_t least =
         2u * COEFFICIENT_CACHE_LEAST *
-            (coefficients_piece_size(fixed) + coefficients_segment_size(fixed, PROGRAM_PLANE)) +
+            (coefficients_piece_size(fixed) + coefficients_segment_size(fixed, axes)) +
         COEFFICIENTS_ALIGNMENT;
     const uint32_t size = least << golden_random(random) % 4u;
+    TEST_ASSERT_TRUE(2u * size <= CACHE_MOST);
     coefficient_cache_init(&now.cache, (uint8_t *)cache_memory,
                            size + (uint32_t)(golden_random(random) % size));
-    TEST_ASSERT_TRUE(coefficient_cache_fits(&now.cache, fixed, PROGRAM_PLANE));
+    TEST_ASSERT_TRUE(coefficient_cache_fits(&now.cache, fixed, axes));
     (void)feed_override_use(&now.m.feed, &now.m.it,
                             coefficient_cache_begin(&now.cache, now.m.feed.clock.program, fixed));
     use_records(make_records());
     now.late = size >= CACHE_LATE ? (uint32_t)(golden_random(random) % 2u) : 0u;
 }
 
-static void begin(uint64_t *random)
+static void begin(uint64_t *random, uint32_t first, uint32_t count)
 {
     const unsigned number = now.number;
     memset(&now, 0, sizeof now);
     now.number = number;
-    now.which = (uint32_t)(golden_random(random) % WHOLES);
+    now.which = first + (uint32_t)(golden_random(random) % count);
     now.p = &wholes[now.which].program;
     now.chain = &wholes[now.which].chains[golden_random(random) % wholes[now.which].chain_count];
     now.m = now.chain->begun[golden_random(random) % now.chain->cuts.count];
@@ -465,10 +472,11 @@ static uint32_t some_ticks(uint64_t *random)
     return (uint32_t)(golden_random(random) % most);
 }
 
-static void run_case(uint64_t seed)
+/* A cut of one of `count` wholes from the first on. */
+static void run_case(uint64_t seed, uint32_t first, uint32_t count)
 {
     uint64_t random = seed;
-    begin(&random);
+    begin(&random, first, count);
     const uint32_t arrivals = 1u + (uint32_t)(golden_random(&random) % 3u);
     const int quiet = golden_random(&random) % 4u == 0;
     for (uint32_t i = 0; i < arrivals && !over(); i++) {
@@ -498,7 +506,7 @@ static unsigned setting(const char *name, unsigned otherwise)
 
 static void free_all(void)
 {
-    for (uint32_t w = 0; w < WHOLES; w++) {
+    for (uint32_t w = 0; w < WHOLES + IN_SPACE; w++) {
         for (uint32_t i = 0; i < wholes[w].chain_count; i++) {
             struct chain *c = &wholes[w].chains[i];
             for (uint32_t k = 0; k < c->cuts.count; k++) {
@@ -516,15 +524,18 @@ static void test_cuts_at_any_instant(void)
     const unsigned cases = setting("HODOGRAPH_CASES", CASES);
     uint64_t seed = setting("HODOGRAPH_SEED", 1);
     uint64_t random = seed;
-    for (uint32_t w = 0; w < WHOLES; w++) {
+    for (uint32_t w = 0; w < WHOLES + IN_SPACE; w++) {
         make_whole(w, &random);
     }
     for (unsigned i = setting("HODOGRAPH_FIRST", 0); i < cases; i++) {
         now.number = i;
-        run_case(seed * 0x100000001u + i);
+        run_case(seed * 0x100000001u + i, 0, WHOLES);
+        if (i % SPACE_PART == 0u) {
+            run_case(seed * 0x100000001u + i, WHOLES, IN_SPACE);
+        }
     }
     now.number = HOLD_IN_A_RISE;
-    run_case(seed * 0x100000001u + HOLD_IN_A_RISE);
+    run_case(seed * 0x100000001u + HOLD_IN_A_RISE, 0, WHOLES);
     printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
            "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
            "the whole; %u windows of records; jerk %.4f of the limit\n",

@@ -11,6 +11,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -368,7 +369,6 @@ def _processes(options: Namespace) -> int:
 def _simulate(job: JobFiles, options: Namespace) -> None:
     """All chunks through the controller's core, without a bus."""
     machine = job.machine
-    limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
     kernel = options.kernel or machine.kernel
     found: list[StreamedMotion] = []
     begin_s = time.perf_counter()
@@ -377,7 +377,10 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():
-            found.append(simulate_chunks(chunks, limits, kernel, machine.counts_per_mm))
+            first = next(chunks)
+            moved = machine.turning if first.program.first_axis else machine
+            limits = NativeLimits(**asdict(program_limits(moved)), chunk=1)
+            found.append(simulate_chunks(chain([first], chunks), limits, kernel, moved.path_counts))
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
         counted = {"chunks": plan.chunks, "bytes": plan.byte_count}

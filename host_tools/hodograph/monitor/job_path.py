@@ -47,12 +47,14 @@ class JobPath:
         self._last_point: Floats | None = None
 
     def add(self, chunk: Chunk) -> None:
-        """The next chunk of the job; one of another job begins anew."""
+        """The next chunk of the job; one of another job begins anew. One that turns axes alone has no path in mm."""
         program = chunk.program
         if chunk.header.first or chunk.header.job != self._job:
             self._job = chunk.header.job
             self._parts.clear()
             self._last_mm = self._last_point = None
+        if program.first_axis:
+            return
         begin_mm = chunk.header.job_start_q40 * 2.0**-40
         while self._parts and self._parts[-1].begin_mm >= begin_mm:
             self._parts.pop()

@@ -81,9 +81,15 @@ def path_message(
     return message
 
 
-def job_message(job: int, points_mm: Floats) -> dict[str, Any]:
-    """The path of a streamed job as far as it is known, points (n, 2) or (n, 3), in place of that of a program."""
+def job_message(
+    job: int, points_mm: Floats, marks: Sequence[dict[str, Any]] = ()
+) -> dict[str, Any]:
+    """The path of a streamed job as far as it is known, points (n, 2) or (n, 3), in place of that of a program.
+    `marks`: places where outputs switch.
+    """
     message: dict[str, Any] = {"type": "path", "note": "", "name": f"job {job}"}
+    if marks:
+        message["marks"] = list(marks)
     return message | {
         name: numbers(column, 5) for name, column in zip("xyz", points_mm.T, strict=False)
     }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of the program on the live page: where they switch on its path, and when its setpoints passed these places.
+"""Outputs of the program, or of a streamed job, on the live page: where they switch on its path, and when its setpoints
+passed these places.
 
 The times are those of the setpoints on the bus, not of the frames of the I/O module: a feed override or a hold moves
 them, a stop before a place leaves it out.
@@ -14,11 +15,17 @@ import numpy as np
 
 from ..config.outputs import Outputs, placed_outputs, words_of
 from ..events import Events
+from ..stream.bus_chunks import curve_of
+from ..stream.chunk import Chunk
+from ..stream.geometry import points_at
 from .decoder import Floats
 from .derived import ProgramPath
 
 _BESIDE_MM = 1e-5
 """The arc length of a setpoint on the bus is known so well: setpoints are rounded to counts."""
+
+_MOST = 200
+"""Marks of a streamed job that are kept."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,10 @@ def drawn_marks(marks: tuple[OutputMark, ...], path: ProgramPath) -> list[dict[s
     """The marks with their points on the path, for a message."""
     if not marks:
         return []
-    points = path.points_mm(np.array([mark.place_mm for mark in marks]))
+    return _with_points(marks, path.points_mm(np.array([mark.place_mm for mark in marks])))
+
+
+def _with_points(marks: tuple[OutputMark, ...], points: Floats) -> list[dict[str, Any]]:
     return [
         dict(zip("xyz", np.round(point, 5).tolist(), strict=False)) | {"text": mark.text}
         for mark, point in zip(marks, points, strict=True)
@@ -60,6 +70,12 @@ class PassedMarks:
         """The same marks for another source, whose setpoints do not follow those of this one."""
         return PassedMarks(self._marks)
 
+    def with_marks(self, marks: tuple[OutputMark, ...]) -> PassedMarks:
+        """Other marks for setpoints that go on."""
+        made = PassedMarks(marks)
+        made._last_mm = self._last_mm
+        return made
+
     def feed(self, t_s: Floats, arc_mm: Floats) -> list[tuple[float, str]]:
         """Time and text of each mark that these setpoints (n,) came to or passed; NaN: a setpoint off the path."""
         if not self._marks or not t_s.size:
@@ -73,3 +89,34 @@ class PassedMarks:
                 passed = (before < place) & (arc_mm >= place)
             found += [(float(t_s[row]), mark.text) for row in np.flatnonzero(passed)]
         return sorted(found)
+
+
+class JobMarks:
+    """The marks of a streamed job, as far as its chunks have come: of a long job the last ones."""
+
+    def __init__(self, outputs: Outputs | None) -> None:
+        self._outputs = outputs
+        self._job, self._end_q40 = 0, 0
+        self.marks: tuple[OutputMark, ...] = ()
+        """By arc length of the job."""
+        self.drawn: list[dict[str, Any]] = []
+        """The same with their points, for a message."""
+
+    def add(self, chunk: Chunk) -> None:
+        """Those of another chunk, but for the part that it repeats; the first of another job begins anew."""
+        header, program = chunk.header, chunk.program
+        begin_q40 = header.job_start_q40
+        new = program.events
+        if header.first or header.job != self._job:
+            self._job, self.marks, self.drawn = header.job, (), []
+        elif header.rest is None:
+            new = new[new["place"] + begin_q40 > self._end_q40]
+        self._end_q40 = begin_q40 + program.length_q40
+        if program.first_axis or not len(new):
+            return
+        made = output_marks(self._outputs, new)
+        points = points_at(curve_of(program), np.array([mark.place_mm for mark in made]))
+        begin_mm = begin_q40 * 2.0**-40
+        moved = tuple(OutputMark(begin_mm + mark.place_mm, mark.text) for mark in made)
+        self.marks = (*self.marks, *moved)[-_MOST:]
+        self.drawn = [*self.drawn, *_with_points(made, points)][-_MOST:]

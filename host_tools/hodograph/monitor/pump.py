@@ -27,7 +27,7 @@ from .derived import Derivation, FollowedPath, ProgramPath
 from .emergencies import Emergencies
 from .job_path import JobPath
 from .messages import job_message, path_message, rows_message
-from .output_marks import PassedMarks, drawn_marks, output_marks
+from .output_marks import JobMarks, PassedMarks, drawn_marks, output_marks
 from .source import Source, Taken
 
 LOOK_S = 0.04
@@ -90,6 +90,7 @@ class Pump:
         self._decoder = Decoder(layout.nodes)
         self._derivation = self._fresh_derivation()
         self._chunks, self._job = ChunkCapture(layout.controller), JobPoints()
+        self._job_marks = JobMarks(layout.outputs)
         self._state_due_s = 0.0
         self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
 
@@ -189,7 +190,7 @@ class Pump:
                     age_ms,
                     self._layout.drawn,
                     self._layout.path_axes,
-                    () if self._streams else self._passed.feed(rows.t_s, rows.arc_mm),
+                    self._passed.feed(rows.t_s, rows.arc_mm),
                 )
             )
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
@@ -202,9 +203,12 @@ class Pump:
         for chunk in chunks:
             self._job.add(chunk)
             self._job_path.add(chunk)
+            self._job_marks.add(chunk)
         if chunks:
             self._path, self._streams = None, True
-            self._publish(job_message(self._job.job, self._job.points_mm[:, : self._layout.drawn]))
+            self._passed = self._passed.with_marks(self._job_marks.marks)
+            points_mm = self._job.points_mm[:, : self._layout.drawn]
+            self._publish(job_message(self._job.job, points_mm, self._job_marks.drawn))
 
     def _followed(self) -> FollowedPath | None:
         """The path of the program, or of the job, whichever came last."""

@@ -153,7 +153,7 @@ _TEXTS = {
     ProgramError.CHUNK_JOB: "chunk: of another job, or job 0",
     ProgramError.CHUNK_SEQUENCE: "chunk: sequence number is not the next one",
     ProgramError.CHUNK_FIRST: 'chunk: its flag "first" contradicts its predecessor or its start',
-    ProgramError.CHUNK_PROGRAM: "chunk: period or axis count is not that of its predecessor",
+    ProgramError.CHUNK_PROGRAM: "chunk: period, axis count or first axis is not that of its predecessor",
     ProgramError.CHUNK_SHARED: "chunk: shifts or shared counts do not fit its predecessor",
     ProgramError.CHUNK_SEGMENT: "chunk: a shared segment is not that of its predecessor",
     ProgramError.CHUNK_PIECE: "chunk: a shared piece is not that of its predecessor",

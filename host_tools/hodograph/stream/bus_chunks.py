@@ -112,9 +112,13 @@ class JobPoints:
         self._points: Floats = np.zeros((0, 0))
 
     def add(self, chunk: Chunk) -> None:
-        """The points of another chunk, in place of the tail before it; the first of another job begins anew."""
-        header = chunk.header
-        arc_mm, points = _drawn(chunk.program)
+        """The points of another chunk, in place of the tail before it; the first of another job begins anew. Chunks
+        that turn axes alone draw nothing.
+        """
+        header, program = chunk.header, chunk.program
+        if program.first_axis:
+            return
+        arc_mm, points = _drawn(program)
         arcs = arc_mm + header.job_start_q40 * 2.0**-40
         if header.job != self._job or header.first:
             self._job, self._stride = header.job, 1

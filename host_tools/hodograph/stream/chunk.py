@@ -237,6 +237,8 @@ def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
     """The same of the programs."""
     if one.piece_shift + one.shared_pieces >= old.piece_count + 1 or not one.shared_pieces:
         return "the shared pieces are not in the predecessor"
+    if own.first_axis != old.first_axis or own.axis_count != old.axis_count:
+        return "it moves other axes than its predecessor"
     if one.segment_shift + one.shared_segments != old.segment_count:
         return "the shared segments are not all that the predecessor has"
     if one.shared_segments > own.segment_count or one.shared_pieces > own.piece_count:

@@ -465,6 +465,7 @@ class SectionChunks:
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=int(pieces.start_q40[0]) != self._feed.begin_q40,
+            first_axis=machine.first_axis,
         )
         return with_bounds(program)
 

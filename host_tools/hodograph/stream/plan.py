@@ -87,8 +87,9 @@ class PlanRests:
 class PlannedSection:
     """A section: number in the job, file, what happens at rest before it.
 
-    start_q40  arc length at its start of the job that the controller has
-    rest       what the controller does before it; None: a job of the controller begins with it
+    start_q40    arc length at its start of the job that the controller has
+    rest         what the controller does before it; None: a job of the controller begins with it
+    standing_mm  where the axes before those of its programs stand, without the work offset
     """
 
     number: int
@@ -97,6 +98,7 @@ class PlannedSection:
     before: tuple[Command, ...]
     start_q40: int = 0
     rest: Rest | None = None
+    standing_mm: tuple[float, ...] = ()
 
 
 class _EndedError(Exception):
@@ -331,17 +333,17 @@ class JobPlan:
                 block = next(blocks, None) if number >= self._begin.section else None
                 if block is not None:
                     before = () if begin_q40 else (*carried, *section.before)
+                    made = PlannedSection(
+                        number, file, section.first_line, before, standing_mm=section.standing_mm
+                    )
                     if place is None:
-                        made = PlannedSection(number, file, section.first_line, before)
                         first = number
                         block = begun_with(block, switched.begin())
                     else:
                         place = replace(place, rest=rest_of(before, stops=self.stops))
-                        made = PlannedSection(
-                            number, file, section.first_line, before, place.arc_q40, place.rest
-                        )
+                        made = replace(made, start_q40=place.arc_q40, rest=place.rest)
                     chunks = SectionChunks(
-                        self._job.machine,
+                        section.machine,
                         file.stem,
                         switching(chain([block], blocks), switched),
                         self._number + first,
@@ -395,8 +397,7 @@ class JobPlan:
         start = section.next_start()
         if start is None:
             return False
-        axes = end_q40.size
-        machine_mm = start[:axes] + np.array(self._job.machine.offset_mm[:axes])
+        machine_mm = start + np.array(section.machine.offset_mm[: start.size])
         return bool(np.abs(machine_mm - end_q40 * 2.0**-40).max() < _MEETS_MM)
 
 

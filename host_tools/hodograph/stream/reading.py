@@ -27,6 +27,7 @@ from ..job import (
     toolpath_commands,
 )
 from ..job_outputs import EventMaker, SectionCommands
+from ..spline import PHSpline, coordinates
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
@@ -71,10 +72,6 @@ class _Windows(Divider):
 
     def _move(self, move: Move) -> None:
         super()._move(move)
-        if self.stands_at is not None:
-            raise InputError(
-                f"{self.file}:{move.line}: the move turns A, B or C alone, which stream does not take: use run"
-            )
         while self.builder.count > self.window + self.searched + _SEARCHED:
             chord, turn = _straightest(self.builder, self.window + self.searched, _SEARCHED)
             self.searched += _SEARCHED
@@ -120,7 +117,10 @@ class StreamSection:
     file, first_line  where it begins
     before            commands that happen at rest, before it starts
     blocks            its path; reading them reads the file
-    next_start        where the next section starts, (3,) in mm, once all blocks are read; None: it is the last one
+    next_start        where the next section starts, (A,) in mm and degrees, once all blocks are read; None: it is the
+                      last one, or the next one moves other axes
+    machine           with the axes that its programs move: of a section that turns axes alone those after x and y or z
+    standing_mm       where the axes before those of its programs stand, without the work offset
     """
 
     file: Path
@@ -128,6 +128,8 @@ class StreamSection:
     before: tuple[Command, ...]
     blocks: Iterator[Block]
     next_start: Callable[[], NDArray[np.float64] | None]
+    machine: Machine
+    standing_mm: tuple[float, ...] = ()
 
 
 @dataclass
@@ -159,7 +161,13 @@ class StreamReader:
             rest = _Rest(part, parts)
             first = part.section
             yield StreamSection(
-                self.file, first.first_line, first.before, rest.blocks(), rest.next_start
+                self.file,
+                first.first_line,
+                first.before,
+                rest.blocks(),
+                rest.next_start,
+                first.pipeline.machine,
+                tuple(first.standing_mm.tolist()),
             )
             part = rest.next_part
 
@@ -261,10 +269,16 @@ class _Rest:
         self._part, self._parts = part, parts
 
     def next_start(self) -> NDArray[np.float64] | None:
-        """Where the next section starts."""
-        if self.next_part is None:
+        """Where the next section starts, if it moves the same axes."""
+        if (
+            self.next_part is None
+            or self.next_part.section.stands_at != self._part.section.stands_at
+        ):
             return None
-        return np.asarray(self.next_part.section.fitted.curve.nodal_points[0], dtype=np.float64)
+        curve = self.next_part.section.pipeline.curve
+        if isinstance(curve, PHSpline):
+            return np.asarray(coordinates(curve.nodal_points[:1])[0])
+        return np.asarray(curve.axes_nodes[0])
 
     def blocks(self) -> Iterator[Block]:
         part: _Part | None = self._part

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +50,9 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
     starts = dict(entry.starts) or {entry.section: 0}
     low_q40 = starts.get(entry.section, 0) + entry.arc_q40
     offset_mm = np.array(job.machine.offset_mm[: len(at_mm)])
-    target = np.array(at_mm) - offset_mm
+    at = np.array(at_mm) - offset_mm
     found: list[Nearest] = []
-    for number, blocks in _sections(job):
+    for number, blocks, standing_mm in _sections(job):
         if number > max(starts):
             break
         start_q40 = starts.get(number)
@@ -63,9 +63,17 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
                 low = (low_q40 - start_q40) * 2.0**-40 - _BESIDE_MM - begin_mm
                 high = (entry.committed_q40 - start_q40) * 2.0**-40 + _BESIDE_MM - begin_mm
                 if high > 0.0 and low < length_mm:
-                    arcs = _nearest_arcs(block.curve, target, max(low, 0.0), min(high, length_mm))
+                    own = at[len(standing_mm) :]
+                    arcs = _nearest_arcs(block.curve, own, max(low, 0.0), min(high, length_mm))
                     found += [
-                        _found(block, arc, begin_mm, number, target, offset_mm) for arc in arcs
+                        _found(
+                            block,
+                            arc,
+                            Place(number, round((begin_mm + arc) * 2.0**40)),
+                            at,
+                            standing_mm,
+                        )
+                        for arc in arcs
                     ]
             begin_mm += length_mm
     if not found:
@@ -73,18 +81,21 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
             "the journal names a place that the job does not have: stream it from its start"
         )
     least = min(one.distance_mm for one in found) + _ALIKE_MM
-    return next(one for one in found if one.distance_mm <= least)
+    nearest = next(one for one in found if one.distance_mm <= least)
+    return replace(nearest, point_mm=tuple((np.array(nearest.point_mm) + offset_mm).tolist()))
 
 
-def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
-    """The sections of all files, with the path of each; it may be left unread."""
+def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float, ...]]]:
+    """The sections of all files, with the path of each, which may be left unread, and where the axes before those of
+    the path stand.
+    """
     number = 0
     for file in job.files:
         if is_toolpath(file):
             reader = StreamReader(file, job.machine, job.tolerance_mm, job.reading)
             for section in reader.sections():
                 blocks = section.blocks
-                yield number, blocks
+                yield number, blocks, section.standing_mm
                 for _ in blocks:
                     pass
                 number += 1
@@ -92,21 +103,19 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
             for line, listed in enumerate(load_paths(file), 1):
                 curve = Pipeline(listed.file, job.machine).curve
                 count = curve.segment_count
-                yield number, iter([Block(curve, np.full(count, np.inf), np.full(count, line))])
+                block = Block(curve, np.full(count, np.inf), np.full(count, line))
+                yield number, iter([block]), ()
                 number += 1
 
 
 def _found(
-    block: Block, arc_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
+    block: Block, arc_mm: float, place: Place, at: Real, standing_mm: tuple[float, ...]
 ) -> Nearest:
-    point = _places(block.curve, np.array([arc_mm]))[0]
+    """A place of a block, without the work offset."""
+    point = np.concatenate((standing_mm, _places(block.curve, np.array([arc_mm]))[0]))
     segment, _ = block.curve.locate(arc_mm)
-    return Nearest(
-        Place(number, round((begin_mm + arc_mm) * 2.0**40)),
-        int(block.line[int(segment)]),
-        tuple((point + offset_mm).tolist()),
-        float(np.linalg.norm(point - target)),
-    )
+    line = int(block.line[int(segment)])
+    return Nearest(place, line, tuple(point.tolist()), float(np.linalg.norm(point - at)))
 
 
 def _nearest_arcs(curve: Curve, target: Real, low: float, high: float) -> list[float]:

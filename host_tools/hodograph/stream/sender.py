@@ -183,9 +183,9 @@ class Sender:
 
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
         """Sections that the controller runs as one job, from the one that begins with this chunk."""
-        self._to_start(chunk)
+        self._to_start(section, chunk)
         execute_at_rest(self.at, section.file, section.before, self.operator)
-        self._to_start(chunk)
+        self._to_start(section, chunk)
         begin_q40 = chunk.header.job_start_q40
         self._ahead = deque([section])
         self._note_place(first=section.number, arc_q40=begin_q40, committed_q40=begin_q40)
@@ -203,12 +203,14 @@ class Sender:
             starts = tuple((one.number, one.start_q40) for one in self._ahead)
             self.journal.update(section=self._section.number, starts=starts, **changes)
 
-    def _to_start(self, chunk: Chunk) -> None:
+    def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
-        _, points = NativeProgram(chunk.image).setpoints(
-            self.kernel, self.machine.counts_per_mm, 0, 1
-        )
-        start: list[int] = points[0].tolist()
+        program, machine = NativeProgram(chunk.image), self.machine
+        moved = machine.turning if program.first_axis else machine
+        _, points = program.setpoints(self.kernel, moved.path_counts, 0, 1)
+        standing = zip(section.standing_mm, machine.offset_mm, machine.path_counts, strict=False)
+        start: list[int] = [round((at + offset) * counts) for at, offset, counts in standing]
+        start += points[0].tolist()
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:
             close_stream(self.at.controller)

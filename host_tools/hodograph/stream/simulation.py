@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..errors import RunError
 from ..feed.pieces import FeedPieces
 from ..native.feed_override import State
-from ..native.program import NativeLimits, counts_from_q40_mm
+from ..native.program import Counts, NativeLimits, counts_from_q40_mm
 from ..native.stream import OfflineStream
 from ..program.image import Program
 from ..program.stop_planning import with_bounds
@@ -47,10 +47,12 @@ def simulate_chunks(
     chunks: Iterable[Chunk],
     limits: NativeLimits,
     kernel: str,
-    counts_per_mm: int,
+    counts_per_mm: Counts,
     setpoints: Callable[[NDArray[np.int32]], None] | None = None,
 ) -> StreamedMotion:
     """Runs the chunks of a job through the controller's core: each is given when its predecessor is under way.
+
+    `counts_per_mm`: of all axes of the programs, or of each; of a degree for those that turn.
 
     `setpoints` gets them, (n, A), part by part.
 

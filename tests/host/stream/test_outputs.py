@@ -25,6 +25,8 @@ from hodograph.events import (
     events_of,
 )
 from hodograph.job import load_job
+from hodograph.monitor.messages import job_message
+from hodograph.monitor.output_marks import JobMarks
 from hodograph.native.program import NativeLimits, NativeProgram
 from hodograph.native.stream import OfflineStream
 from hodograph.pipeline import program_limits
@@ -307,6 +309,28 @@ def test_what_is_not_executed_is_not_refused(tmp_path: Path, machine: Machine) -
     require_outputs(file, machine, ReadOptions())
     file.write_text(HEAD + "G1 X1\nM62 P9\nG1 X2\nM2\n")
     require_outputs(file, load_machine(ROOT / "examples" / "machines" / "mill.toml"), ReadOptions())
+
+
+def test_the_live_page_marks_each_place_once(waves: list[list[Chunk]], machine: Machine) -> None:
+    """Whatever the chunks repeat; with the points on the path, and anew with another job."""
+    found = []
+    for chunks in waves:
+        job = JobMarks(machine.outputs)
+        for chunk in chunks:
+            job.add(chunk)
+        found.append(job)
+    places = np.unique(concatenated(waves[0]).events["place"] * 2.0**-40)
+    for job in found:
+        assert np.allclose([mark.place_mm for mark in job.marks], places, atol=1e-6)
+        assert [mark.text for mark in job.marks] == [mark.text for mark in found[0].marks]
+        at = np.array([[mark["x"], mark["y"]] for mark in job.drawn])
+        assert np.all(np.diff(at[:, 0]) >= 0.0)
+        assert np.abs(at[:, 0] / 2.0 - np.round(at[:, 0] / 2.0)).max() < 0.02
+    message = job_message(7, np.zeros((1, 2)), found[0].drawn)
+    assert len(message["marks"]) == len(places)
+    first = waves[0][0]
+    found[0].add(replace(first, header=replace(first.header, job=8)))
+    assert len(found[0].marks) <= len(first.program.events)
 
 
 # -- path files -------------------------------------------------------------------------------------

@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,17 +16,24 @@ from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
 from hodograph.events import SwitchedOutputs
 from hodograph.job import load_job
+from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
+from hodograph.pipeline import program_limits
+from hodograph.program.check import check_image
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream import reading
-from hodograph.stream.chunk import Chunk
+from hodograph.stream.chunk import Chunk, shared_fault
 from hodograph.stream.chunks import SectionChunks
 from hodograph.stream.geometry import Block, blocks_from, curve_behind, with_joints
+from hodograph.stream.journal import Entry
 from hodograph.stream.output_check import require_outputs
+from hodograph.stream.plan import JobFiles, JobPlan, Place, PlannedSection
 from hodograph.stream.reading import StreamReader
-from hodograph.stream.simulation import concatenated
+from hodograph.stream.resuming import nearest_place
+from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.toolpath.files import ReadOptions
 from hodograph.toolpath.fit.turning import Angles
+from hodograph.toolpath.moves import Dwell
 
 MACHINES = ROOT / "examples" / "machines"
 TOLERANCE = 0.01
@@ -189,6 +198,65 @@ def test_parts_of_a_curve_have_its_extra_axes(tmp_path: Path, machine: Machine) 
     assert isinstance(rest, SpatialPHSpline)
     own = s[s > begin_mm]
     assert np.abs(rest.axes_point(own - begin_mm) - curve.axes_point(own)).max() < 1e-10
+
+
+TURNED_ALONE = """G21 G90 G61 F3600
+G0 A6 C20
+G1 X6 C23
+G4 P0.1
+G1 A3
+G1 C30
+M2
+"""
+"""A job of the controller for the first line, one for the second, one for the other two with their exact stop."""
+
+
+def _planned(file: Path, machine: Machine, begin: Place) -> list[tuple[PlannedSection, Chunk]]:
+    job = JobFiles((file,), machine, TOLERANCE, ReadOptions())
+    found = list[tuple[PlannedSection, Chunk]]()
+    with JobPlan(job, MOST, 5, begin, processes=1) as plan, suppress(IndexError):
+        while (item := plan.item(len(found), 100.0)) is not None:
+            found.append(item[:2])
+    return found
+
+
+def test_axes_that_turn_alone_have_jobs_of_their_own(tmp_path: Path, machine: Machine) -> None:
+    found = _planned(_written(tmp_path, TURNED_ALONE), machine, Place())
+    assert [one.number for one, _ in found] == sorted(one.number for one, _ in found)
+    begun = [(one, chunk) for one, chunk in found if chunk.header.first]
+    axes = [(chunk.program.first_axis, chunk.program.axis_count) for _, chunk in begun]
+    assert axes == [(3, 2), (0, 5), (3, 2)]
+    assert [one.standing_mm for one, _ in begun] == [(0.0, 0.0, 0.0), (), (6.0, 0.0, 0.0)]
+    assert [one.before for one, _ in begun] == [(), (), (Dwell(4, 0.1),)]
+    assert [chunk.header.job for _, chunk in begun] == [5, 6, 7]
+    ends = []
+    for _, first in begun:
+        own = [chunk for _, chunk in found if chunk.header.job == first.header.job]
+        moved = machine.turning if first.program.first_axis else machine
+        limits = NativeLimits(**asdict(program_limits(moved)), chunk=1)
+        last: list[np.ndarray] = []
+        for before, chunk in zip([None, *own], own, strict=False):
+            assert check_image(chunk.image, program_limits(moved), chunk=True) is None
+            assert shared_fault(chunk, before) is None
+        simulate_chunks(own, limits, "fixed", moved.path_counts, last.append)
+        ends.append((last[-1][-1] / np.array(moved.path_counts)).tolist())
+    assert ends == [[6.0, 20.0], [6.0, 0.0, 0.0, 6.0, 23.0], [3.0, 30.0]]
+
+
+def test_a_job_goes_on_where_axes_turn_alone(tmp_path: Path, machine: Machine) -> None:
+    file = _written(tmp_path, TURNED_ALONE)
+    number = _planned(file, machine, Place())[-1][0].number
+    first = _planned(file, machine, Place(number, 3 << 40))[0]
+    assert (first[0].number, first[0].before) == (number, ())
+    assert first[1].header.job_start_q40 == 3 << 40
+    start = first[1].program.point_q40[:, 0] * 2.0**-40
+    assert np.allclose(start, [3.0, 26.0], atol=1e-6)
+    entry = Entry((), "", {}, 1, 0, 0, 100 << 40, starts=tuple((k, 0) for k in range(number + 1)))
+    job = JobFiles((file,), machine, TOLERANCE, ReadOptions())
+    found = nearest_place(job, entry, (6.0, 0.0, 0.0, 3.0, 26.5))
+    assert (found.place.section, found.line) == (number, 6)
+    assert abs(found.place.way_q40 * 2.0**-40 - 3.5) < 1e-3
+    assert found.distance_mm < 1e-3
 
 
 @pytest.mark.parametrize("line", ["G1 X3 A90", "G0 b-1 X4", "N7 g1 x3 c [45]", "G1 X3 A#1"])
