@@ -5,6 +5,7 @@ not, or that only a restart gets it out of.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -84,6 +85,24 @@ def test_setpoints_switched_off_at_a_drive(
     other.write(DRIVE, 0x1400, 1, OFF_BIT | 0x202, 4)
     assert settled(bench) == (FAULT_STATE, AWAY, DRIVE)
     assert bench.controller.read(FAULT, 3) > 5000
+    runs_again(path)
+
+
+def test_setpoints_from_another_node(
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour
+) -> None:
+    """Some millimetres away, in between those of the controller, for 0.1 s: the recording shows them as jumps."""
+    bench, path = make_bench(), str(alpha_at(20))
+    recorder = Recorder(bench.bus)
+    assert main(["goto", path]) == 0
+    assert main(["start"]) == 0
+    bench.clock.sleep(1.0005)
+    for _ in range(100):
+        other.send(0x200 + DRIVE, struct.pack("<Hi", 0x0F, 5_000_000))
+        bench.clock.sleep(0.001)
+    assert settled(bench) == (FAULT_STATE, AWAY, DRIVE)
+    assert find_jumps(recorder.so_far(), bench.machine.nodes, step_limits(bench.machine))
+    recorder.stop()
     runs_again(path)
 
 
@@ -213,6 +232,24 @@ def asked_by_hand(other: Hand, request: bytes) -> int:
     while (answer := other.answer())[1:4] != request[1:4]:
         pass
     return int.from_bytes(answer[4:8], "little") if answer[0] == 0x80 else 0
+
+
+def test_answers_to_another_client_and_frames_that_are_no_answers(
+    moving: Moving, other: Neighbour
+) -> None:
+    """What the controller refuses another computer is no refusal of ours, and an SDO has eight bytes."""
+    bench, path = moving(1.0)
+    for index, sub, value in ((0x2004, 1, 1), (0x1010, 1, 0x65766173), (0x1011, 1, 0x64616F6C)):
+        other.write(1, index, sub, value, 4)
+        assert bench.controller.state() == RUNNING
+    for length in range(8):
+        other.send(0x581, bytes([0x80] * length))
+        assert bench.controller.state() == RUNNING
+    for identifier in (0x202, 0x182, 0x602, 0x582, 0x601, 0x702, 0x082, 0x000):
+        other.send(identifier, b"")
+    assert bench.controller.state() == RUNNING
+    assert settled(bench) == (READY, 0, 0)
+    runs_again(path)
 
 
 def test_a_second_client_beside_an_upload(make_bench: MakeBench, hub: LocalHub) -> None:

@@ -34,6 +34,10 @@ BUSY_S = 5.0
 _BUSY_LOOK_S = 0.05
 _NOBODY = b"\xff\xff\xff"
 """No object that anybody asks for."""
+_NO_OBJECT = bytes(3)
+_SDO_BYTES = 8
+_SCS, _NAMING = 0xE0, (0x40, 0x60)
+"""Bits of a server's command byte; those of the first answers to an upload and to a download, which name the object."""
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
 _AGAIN_S = 0.25
@@ -45,7 +49,7 @@ class _SilentError(BusError):
 
 
 class _Answers:
-    """canopen's queue of answers, less the refusals that are meant for another client of the same server."""
+    """canopen's queue of answers, less what is no SDO, and what is meant for another client of the same server."""
 
     def __init__(self, queued: Any) -> None:
         self._queued = queued
@@ -53,11 +57,23 @@ class _Answers:
         """Index and sub-index, as in a frame, of what we ask; empty: not known."""
 
     def put(self, answer: bytes) -> None:
-        if answer == _COMMAND_TAKEN and self.asked != _COMMAND:
-            return  # another client's command to stop, which waits for no transfer
-        refusal = answer[0] == ABORT and answer[4:8] == ABORT_BUSY.to_bytes(4, "little")
-        if not (refusal and self.asked and answer[1:4] != self.asked):
+        if len(answer) != _SDO_BYTES or (answer == _COMMAND_TAKEN and self.asked != _COMMAND):
+            return  # of no SDO server; or another client's command to stop, which waits for no transfer
+        if not (self.asked and self._is_for_another(answer)):
             self._queued.put(answer)
+
+    def _is_for_another(self, answer: bytes) -> bool:
+        """An abort or a first answer that names another object; servers may abort without a name. In the middle of a
+        transfer only the refusal of another client.
+        """
+        named = answer[1:4]
+        if named == self.asked:
+            return False
+        if self.asked == _NOBODY or answer[0] == ABORT:
+            refusal = answer[4:8] == ABORT_BUSY.to_bytes(4, "little")
+            other = self.asked != _NOBODY and named != _NO_OBJECT
+            return answer[0] == ABORT and (refusal or other)
+        return answer[0] & _SCS in _NAMING
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
         return self._queued.get(timeout=timeout) if block else self._queued.get(block=False)
@@ -127,6 +143,13 @@ class Node:
         abort that names it. Until it has come nothing else may be asked: it would be taken for the answer to that.
         """
         nowhere = self._answers.asked = self._nowhere()
+        try:
+            self._wait_for_abort(nowhere, busy_s)
+        finally:
+            self._answers.asked = b""
+
+    def _wait_for_abort(self, nowhere: bytes, busy_s: float) -> None:
+        """Asks for an object that does not exist, until its abort has come."""
         request = bytearray(b"\x40" + nowhere + bytes(4))
         self.sdo.send_request(request)
         begun_s = self.clock.now_s()
