@@ -2,11 +2,11 @@
 """Streaming: how much faster than it runs a job is planned, how soon its first part is there, memory by length, and how
 much motion a ring of 48 KiB holds ahead.
 
-    python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…]
+    python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…] [--files FILE…]
 
 Jobs are a zigzag of short lines over a wavy surface, as finishing passes are, at 50 mm/s on
 examples/machines/mill.toml. Each is planned in a process of its own, by one thread; those of --fit-lines are only read
-and fitted. Wall time has other work on the computer in it; processor time has less of that.
+and fitted; --files are planned too. Wall time has other work on the computer in it; processor time has less of that.
 """
 
 from __future__ import annotations
@@ -48,16 +48,21 @@ def write_job(file: Path, lines: int, step_mm: float = _STEP_MM) -> None:
         out.write("M2\n")
 
 
-def measure(lines: int, fit_only: bool, step_mm: float) -> dict[str, Any]:
-    """Plans one job in this process, as `hodograph stream` does; each chunk is read as soon as it is planned."""
+def measure(
+    lines: int, fit_only: bool, step_mm: float, given: Path | None = None
+) -> dict[str, Any]:
+    """Plans one job in this process, as `hodograph stream` does; each chunk is read as soon as it is planned. `given`:
+    a file in place of the surface.
+    """
     from hodograph.config import load_machine
     from hodograph.stream.chunks import CHUNK_BYTES
     from hodograph.stream.plan import JobFiles, JobPlan, Place
     from hodograph.toolpath.files import ReadOptions
 
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "job.ngc"
-        write_job(file, lines, step_mm)
+        file = given or Path(folder) / "job.ngc"
+        if given is None:
+            write_job(file, lines, step_mm)
         begun, used = time.perf_counter(), time.process_time()
         job = JobFiles((file,), load_machine(MILL), 0.01, ReadOptions())
         first_s, motion_s, chunks, size, samples = None, 0.0, 0, 0, [0.0]
@@ -73,6 +78,7 @@ def measure(lines: int, fit_only: bool, step_mm: float) -> dict[str, Any]:
         processor_s = time.process_time() - used
     return {
         "lines": lines,
+        "file": None if given is None else given.name,
         "fit_only": fit_only,
         "processor_s": processor_s,
         "wall_s": time.perf_counter() - begun,
@@ -158,7 +164,11 @@ def main() -> None:
     parser.add_argument("--lines", type=int, nargs="+", default=list(LINES))
     parser.add_argument("--fit-lines", type=int, nargs="*", default=list(FIT_LINES))
     parser.add_argument("--step", type=float, default=_STEP_MM, help="length of a line in mm")
+    parser.add_argument(
+        "--files", type=Path, nargs="*", default=[], help="toolpaths to plan as well"
+    )
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    parser.add_argument("--one-file", type=Path, help=argparse.SUPPRESS)
     parser.add_argument("--start", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--fit", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--no-ring", action="store_true", help="without the motion ahead in a ring")
@@ -167,11 +177,12 @@ def main() -> None:
         print(json.dumps(measure_start(options.one)))
         return
     if options.one is not None:
-        print(json.dumps(measure(options.one, options.fit, options.step)))
+        print(json.dumps(measure(options.one, options.fit, options.step, options.one_file)))
         return
     step = ("--step", str(options.step))
     rows = [apart(lines, *step) for lines in options.lines]
     rows += [apart(lines, *step, "--fit") for lines in options.fit_lines]
+    rows += [apart(0, "--one-file", str(file.resolve())) for file in options.files]
     apart(START_LINES, "--start")  # writes the bytecode of its modules
     begun = apart(START_LINES, "--start")
     print("| lines | processor s | first chunk s | motion s | times as fast | kB/s | memory MB |")
@@ -183,7 +194,7 @@ def main() -> None:
             )
             continue
         print(
-            f"| {row['lines']} | {row['processor_s']:.2f} | {row['first_chunk_processor_s']:.2f} "
+            f"| {row['file'] or row['lines']} | {row['processor_s']:.2f} | {row['first_chunk_processor_s']:.2f} "
             f"| {row['motion_s']:.2f} | {row['times_as_fast']:.2f} | {row['bytes_per_s'] / 1000:.1f} "
             f"| {row['memory_mb']:.0f} |"
         )

@@ -230,9 +230,9 @@ def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch)
     work: list[int] = []
     solved = solver._solved
 
-    def counted(task: solver._Task) -> np.ndarray | None:
+    def counted(task: solver._Task, tolerance: float) -> np.ndarray | None:
         work[-1] += task.matrix.nnz
-        return solved(task)
+        return solved(task, tolerance)
 
     monkeypatch.setattr(solver, "_solved", counted)
     pieces = []

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from hodograph.config import Drive, load_drive
 from hodograph.feed import AxisLimits, ControllerLimits, FeedRequest, FeedZone, Limits, Plant
-from hodograph.feed.optimal import plan_optimal, replan_optimal, solver
+from hodograph.feed.optimal import plan_optimal, replan_optimal, window
 from hodograph.feed.optimal.track import Track
 from hodograph.program import compile_path
 from hodograph.spline import PHSpline, from_control_polygon
@@ -132,7 +133,8 @@ def test_a_program_that_is_not_solved_to_the_last_digit_is_taken(
     """All end at the bound of iterations here, near their solution, and the plan keeps its limits all the same."""
     limits = Limits(acceleration_mm_s2=54.0, jerk_mm_s3=3600.0, feed_mm_s=5.0)
     whole = plan_optimal(bow(4.0), OPTIMAL, limits)
-    monkeypatch.setattr(solver, "_TOLERANCE", 1e-30)
+    solve = partial(window.solve, tolerance=1e-30)
+    monkeypatch.setattr(window, "solve", lambda problem, penalty, _: solve(problem, penalty))
     plan = plan_optimal(bow(4.0), OPTIMAL, limits)
     assert plan.duration_s == pytest.approx(whole.duration_s, rel=2e-3)
     assert verify_program(compile_path(bow(4.0), plan, replan=replan_optimal).program, limits).kept
