@@ -23,7 +23,7 @@ from .errors import InputError, PlanError
 from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
-from .job_outputs import SectionCommands, is_output, section_events
+from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
 from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
@@ -394,7 +394,8 @@ def load_job(
             f"--tolerance {tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
         )
     reading, notes = reading or ReadOptions(), list[str]()
-    path = divided(toolpath_commands(file, reading, notes), tolerance_mm, str(file))
+    commands = toolpath_commands(file, reading, notes)
+    path = divided(commands, tolerance_mm, str(file), laser_mode=in_laser_mode(machine))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
@@ -420,14 +421,24 @@ def _with_outputs(
     """The sections, with the outputs in their programs."""
     if machine.outputs is None:
         return sections
-    commands = [
-        SectionCommands(one.before, one.events, one.fitted.curve.length_mm) for one in sections
-    ]
+    commands = [section_commands(one) for one in sections]
     every = section_events(commands, after, machine.outputs, file)
     return tuple(
         replace(one, pipeline=replace(one.pipeline, given_events=events))
         for one, events in zip(sections, every, strict=True)
     )
+
+
+def section_commands(section: JobSection) -> SectionCommands:
+    """What switches outputs on a section."""
+    fitted, machine = section.fitted, section.pipeline.machine
+    feeds = programmed_feeds(fitted) if in_laser_mode(machine) else ()
+    return SectionCommands(section.before, section.events, fitted.curve.length_mm, feeds)
+
+
+def in_laser_mode(machine: Machine) -> bool:
+    """Whether S after M4 follows the feed."""
+    return machine.outputs is not None and machine.outputs.codes.laser_mode
 
 
 def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
