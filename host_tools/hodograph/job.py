@@ -33,6 +33,7 @@ from .program.stop_reserve import (
     SPREADS,
     STEPS,
     ReserveStep,
+    late_mostly,
     reserve_zones,
     useful_steps,
     zones_at_places,
@@ -173,16 +174,19 @@ class SectionPipeline(Pipeline):
 
     def _with_places(self, limits: Limits, late: LongStopError) -> Compilation:
         """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
-        lower everywhere; that plan's own, where zones are not enough. Raises `late` where no lower limits are.
+        lower everywhere; the first of these plans that has no late stops, where zones are not enough. Raises `late`
+        where none is.
         """
         longest_s = self.machine.stop_time_ms * 1e-3
         program, zones = late.program, limits.reserve_zones
+        whole: Compilation | None = None
         for share in EVERYWHERE:
+            if whole is not None and late_mostly(program, longest_s):
+                break
             lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
-            whole: Compilation | None = None
             try:
-                whole = self._with_stops(lower)
-                lowered = whole.program
+                found = self._with_stops(lower)
+                whole, lowered = whole or found, found.program
             except LongStopError as error:
                 lowered = error.program
             for spread in SPREADS:
@@ -194,9 +198,9 @@ class SectionPipeline(Pipeline):
                     return self._with_stops(self._planned(replace(limits, reserve_zones=zones)))
                 except LongStopError as error:
                     program = error.program
-            if whole is not None:
-                return whole
-        raise late
+        if whole is None:
+            raise late
+        return whole
 
     def _with_stops(self, plan: FeedPlan) -> Compilation:
         """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
@@ -250,13 +254,20 @@ class JobSection:
 
     @property
     def turning_summary(self) -> dict[str, object]:
-        """Of a section that turns axes alone: the length of its path, and a bound of how far it is from the program."""
-        if self.stands_at is None:
-            return {}
-        return {
-            "turned_deg": self.fitted.curve.length_mm,
-            "deviation_bound_deg": self.fitted.deviation_mm,
-        }
+        """Of a section that turns axes: a bound of how far they are from the program; of one that turns them alone, the
+        length of its path too.
+        """
+        bound = self.deviation_deg
+        found: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
+        return (
+            found if self.stands_at is None else {"turned_deg": self.fitted.curve.length_mm} | found
+        )
+
+    @property
+    def deviation_deg(self) -> float | None:
+        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        fitted = self.fitted
+        return fitted.turning_deg if self.stands_at is None else fitted.deviation_mm
 
     def places(self, moved_mm: Real) -> Real:
         """Positions (n, axes) of the path's axes, without the work offset, of those (n, k) of its program's axes."""
@@ -350,9 +361,17 @@ class Job:
             yield from section.before
         yield from self.after
 
+    @property
+    def deviation_deg(self) -> float | None:
+        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        bounds = (section.deviation_deg for section in self.sections)
+        return max((bound for bound in bounds if bound is not None), default=None)
+
     def summary(self) -> dict[str, object]:
         """What became of the toolpath, for JSON."""
-        return {
+        bound = self.deviation_deg
+        turning: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
+        return turning | {
             "lines": self.lines,
             "sections": len(self.sections),
             "segments": self.segments,
