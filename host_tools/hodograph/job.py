@@ -23,7 +23,7 @@ from .errors import InputError, PlanError
 from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
-from .job_outputs import SectionCommands, is_output, section_events
+from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
 from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
@@ -33,6 +33,7 @@ from .program.stop_reserve import (
     SPREADS,
     STEPS,
     ReserveStep,
+    late_mostly,
     reserve_zones,
     useful_steps,
     zones_at_places,
@@ -173,16 +174,19 @@ class SectionPipeline(Pipeline):
 
     def _with_places(self, limits: Limits, late: LongStopError) -> Compilation:
         """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
-        lower everywhere; that plan's own, where zones are not enough. Raises `late` where no lower limits are.
+        lower everywhere; the first of these plans that has no late stops, where zones are not enough. Raises `late`
+        where none is.
         """
         longest_s = self.machine.stop_time_ms * 1e-3
         program, zones = late.program, limits.reserve_zones
+        whole: Compilation | None = None
         for share in EVERYWHERE:
+            if whole is not None and late_mostly(program, longest_s):
+                break
             lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
-            whole: Compilation | None = None
             try:
-                whole = self._with_stops(lower)
-                lowered = whole.program
+                found = self._with_stops(lower)
+                whole, lowered = whole or found, found.program
             except LongStopError as error:
                 lowered = error.program
             for spread in SPREADS:
@@ -194,9 +198,9 @@ class SectionPipeline(Pipeline):
                     return self._with_stops(self._planned(replace(limits, reserve_zones=zones)))
                 except LongStopError as error:
                     program = error.program
-            if whole is not None:
-                return whole
-        raise late
+        if whole is None:
+            raise late
+        return whole
 
     def _with_stops(self, plan: FeedPlan) -> Compilation:
         """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
@@ -250,13 +254,20 @@ class JobSection:
 
     @property
     def turning_summary(self) -> dict[str, object]:
-        """Of a section that turns axes alone: the length of its path, and a bound of how far it is from the program."""
-        if self.stands_at is None:
-            return {}
-        return {
-            "turned_deg": self.fitted.curve.length_mm,
-            "deviation_bound_deg": self.fitted.deviation_mm,
-        }
+        """Of a section that turns axes: a bound of how far they are from the program; of one that turns them alone, the
+        length of its path too.
+        """
+        bound = self.deviation_deg
+        found: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
+        return (
+            found if self.stands_at is None else {"turned_deg": self.fitted.curve.length_mm} | found
+        )
+
+    @property
+    def deviation_deg(self) -> float | None:
+        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        fitted = self.fitted
+        return fitted.turning_deg if self.stands_at is None else fitted.deviation_mm
 
     def places(self, moved_mm: Real) -> Real:
         """Positions (n, axes) of the path's axes, without the work offset, of those (n, k) of its program's axes."""
@@ -350,9 +361,17 @@ class Job:
             yield from section.before
         yield from self.after
 
+    @property
+    def deviation_deg(self) -> float | None:
+        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        bounds = (section.deviation_deg for section in self.sections)
+        return max((bound for bound in bounds if bound is not None), default=None)
+
     def summary(self) -> dict[str, object]:
         """What became of the toolpath, for JSON."""
-        return {
+        bound = self.deviation_deg
+        turning: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
+        return turning | {
             "lines": self.lines,
             "sections": len(self.sections),
             "segments": self.segments,
@@ -394,7 +413,8 @@ def load_job(
             f"--tolerance {tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
         )
     reading, notes = reading or ReadOptions(), list[str]()
-    path = divided(toolpath_commands(file, reading, notes), tolerance_mm, str(file))
+    commands = toolpath_commands(file, reading, notes)
+    path = divided(commands, tolerance_mm, str(file), laser_mode=in_laser_mode(machine))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
@@ -420,9 +440,7 @@ def _with_outputs(
     """The sections, with the outputs in their programs."""
     if machine.outputs is None:
         return sections
-    commands = [
-        SectionCommands(one.before, one.events, one.fitted.curve.length_mm) for one in sections
-    ]
+    commands = [section_commands(one) for one in sections]
     every = section_events(commands, after, machine.outputs, file)
     return tuple(
         replace(one, pipeline=replace(one.pipeline, given_events=events))
@@ -442,6 +460,18 @@ def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputErr
         f"{file}:{line}: the move turns {name.upper()}, but no axis {name} of {machine.file.name} follows the path: "
         'name it behind "z" in path = [...] at its top, or leave it out'
     )
+
+
+def section_commands(section: JobSection) -> SectionCommands:
+    """What switches outputs on a section."""
+    fitted, machine = section.fitted, section.pipeline.machine
+    feeds = programmed_feeds(fitted) if in_laser_mode(machine) else ()
+    return SectionCommands(section.before, section.events, fitted.curve.length_mm, feeds)
+
+
+def in_laser_mode(machine: Machine) -> bool:
+    """Whether S after M4 follows the feed."""
+    return machine.outputs is not None and machine.outputs.codes.laser_mode
 
 
 def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:

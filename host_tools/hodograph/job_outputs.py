@@ -7,17 +7,24 @@ follows it. One at rest that is followed by a dwell, a tool change or a program 
 section before it, so that it is done when the dwell begins. The end of the program switches spindle and coolant off
 with the last setpoint, as M5 and M9 do; other outputs stay. Each program begins with all outputs off, so each section
 first repeats what is on.
+
+In laser mode, M4 makes the value for S follow the feed: an event at each place where the programmed feed changes gives
+the value for each mm/s, so that it is S at that feed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
+
+import numpy as np
 
 from .config.outputs import Channel, Outputs
 from .errors import InputError
 from .events import DIGITAL, Event, Events, events_of
+from .toolpath.fit.fitting import FittedPath
 from .toolpath.moves import (
     AnalogOutput,
     Command,
@@ -36,12 +43,36 @@ WAITS = (Dwell, ProgramStop, ToolChange)
 
 
 @dataclass(frozen=True)
+class ProgrammedFeed:
+    """From an arc length on: the feed of the block, mm/s (inf: a rapid move), and its source line."""
+
+    s_mm: float
+    feed_mm_s: float
+    line: int
+
+
+@dataclass(frozen=True)
 class SectionCommands:
-    """What happens at rest before a section, and on its way: arc length in mm and command; its length in mm."""
+    """What happens at rest before a section, and on its way: arc length in mm and command; its length in mm, and its
+    programmed feeds, the first one from its start on.
+    """
 
     before: tuple[Command, ...]
     on_the_way: tuple[tuple[float, Command], ...]
     length_mm: float
+    feeds: tuple[ProgrammedFeed, ...] = ()
+
+
+def programmed_feeds(fitted: FittedPath) -> tuple[ProgrammedFeed, ...]:
+    """Where the feed of a section changes."""
+    reference = fitted.reference
+    feed = reference.feed_mm_s
+    first = np.flatnonzero(np.append(True, feed[1:] != feed[:-1]))
+    places_mm = np.maximum(fitted.arc_length_at(reference.place_mm[first]), 0.0)
+    rows = zip(
+        places_mm.tolist(), feed[first].tolist(), reference.line[first].tolist(), strict=True
+    )
+    return tuple(ProgrammedFeed(*row) for row in rows)
 
 
 def is_output(command: Command, outputs: Outputs | None) -> bool:
@@ -96,6 +127,9 @@ class EventMaker:
     outputs: Outputs
     file: Path
     last: dict[str, Event] = field(default_factory=dict)
+    feed: ProgrammedFeed | None = None
+    power: float | None = None
+    """S while it follows the feed."""
 
     def section(
         self,
@@ -110,15 +144,42 @@ class EventMaker:
         """
         repeated = self._repeated()
         _, rest = _split(section.before, is_first=is_first)
-        begin = self.changed(0, rest)
-        way = [
-            event
-            for s_mm, command in section.on_the_way
-            for event in self.changed(round(s_mm * 2**40), [command])
-        ]
+        begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, rest)]
+        way = self._on_the_way(section)
         end_q40 = round(section.length_mm * 2**40)
         early = list(behind) if is_last else _split(behind, is_first=False)[0]
         return SectionEvents(repeated, [*begin, *way, *self.changed(end_q40, early)])
+
+    def _on_the_way(self, section: SectionCommands) -> list[Event]:
+        """Events of commands and of changes of the feed, in the order of their places."""
+        found: list[Event] = []
+        feeds = list(section.feeds[1:])
+        for s_mm, command in section.on_the_way:
+            passed = [feed for feed in feeds if feed.s_mm <= s_mm]
+            del feeds[: len(passed)]
+            found += [*self._at_feeds(passed), *self.changed(round(s_mm * 2**40), [command])]
+        return found + self._at_feeds(feeds)
+
+    def _at_feeds(self, feeds: Iterable[ProgrammedFeed]) -> list[Event]:
+        """Events of changes of the feed, which matter in laser mode."""
+        found = []
+        channel = self.outputs.codes.speed
+        for feed in feeds:
+            self.feed = feed
+            if self.power is None or channel is None:
+                continue
+            event = self._power(channel, round(feed.s_mm * 2**40), feed.line)
+            if self.last[channel.name][1:] != event[1:]:
+                self.last[channel.name] = event
+                found.append(event)
+        return found
+
+    def _power(self, channel: Channel, place_q40: int, line: int) -> Event:
+        """The event from which on the output follows the feed: S at that of the block."""
+        assert self.power is not None
+        feed_mm_s = inf if self.feed is None else self.feed.feed_mm_s
+        per_mm_s = self.power / feed_mm_s if feed_mm_s > 0.0 else 0.0
+        return channel.proportional(place_q40, per_mm_s, f"{self.file}:{line}")
 
     def _repeated(self) -> list[Event]:
         """Events at the start of a program that make the outputs what they were."""
@@ -161,8 +222,12 @@ class EventMaker:
             return []
         found = [(one, one.switched(place_q40, on)) for one, on in switches if one is not None]
         if isinstance(command, Spindle) and codes.speed is not None:
+            self.power = command.speed_rev_min if reverse and codes.laser_mode else None
             speed = command.speed_rev_min if turns else 0.0
-            found.append((codes.speed, codes.speed.valued(place_q40, speed, where)))
+            event = codes.speed.valued(place_q40, speed, where)
+            if self.power is not None:
+                event = self._power(codes.speed, place_q40, command.line)
+            found.append((codes.speed, event))
         return found
 
     def _ended(self, place_q40: int, line: int) -> list[tuple[Channel, Event]]:

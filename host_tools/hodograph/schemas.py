@@ -208,6 +208,7 @@ def _outputs() -> Schema:
         "mist": "Digital output: M7",
         "flood": "Digital output: M8",
     }
+    laser = {"properties": {"laser_mode": {"const": True}}, "required": ["laser_mode"]}
     return _table(
         "An I/O module by CiA 401, whose outputs paths switch",
         {
@@ -221,7 +222,11 @@ def _outputs() -> Schema:
             "product": _integer("Product that it must have; 0: any", 0, U32_MAX, 0),
             "channel": channels,
             "gcode": _table(
-                "Outputs for words of G-code", {key: _text(text) for key, text in codes.items()}
+                "Outputs for words of G-code",
+                {key: _text(text) for key, text in codes.items()}
+                | {"laser_mode": _flag("M4: speed in proportion to the feed, as a laser", False)},
+                (),
+                {"if": laser, "then": {"required": ["speed"]}},
             ),
         },
         ("node", "channel"),

@@ -68,6 +68,8 @@ class CodeOutputs:
     spindle_reverse  on while it turns counterclockwise
     speed            analogue: S while the spindle turns, else 0
     mist, flood      M7, M8
+    laser_mode       after M4 `speed` is in proportion to the feed: S at the feed of the block, 0 in rapid moves. S then
+                     changes in motion
     """
 
     spindle: Channel | None = None
@@ -75,6 +77,7 @@ class CodeOutputs:
     speed: Channel | None = None
     mist: Channel | None = None
     flood: Channel | None = None
+    laser_mode: bool = False
 
     @property
     def has_spindle(self) -> bool:
@@ -153,6 +156,7 @@ _OUTPUTS = (
 )
 _CHANNEL = ("digital", "analogue", "scale", "unit")
 _CODES = ("spindle", "spindle_reverse", "speed", "mist", "flood")
+_LASER_MODE = "laser_mode"
 
 
 def read_outputs(root: Table, taken: tuple[int, ...]) -> Outputs | None:
@@ -187,7 +191,7 @@ def read_outputs(root: Table, taken: tuple[int, ...]) -> Outputs | None:
         off_in_hold=table.flag("off_in_hold", False),
         vendor=table.integer("vendor", 0, low=0, high=2**32 - 1),
         product=table.integer("product", 0, low=0, high=2**32 - 1),
-        codes=_codes(table.table("gcode", _CODES, required=False), found),
+        codes=_codes(table.table("gcode", (*_CODES, _LASER_MODE), required=False), found),
     )
 
 
@@ -202,7 +206,10 @@ def _codes(table: Table, channels: tuple[Channel, ...]) -> CodeOutputs:
             kind = "an analogue" if key == "speed" else "a digital"
             raise table.error(key, f'is "{name}": it takes {kind} output')
         found[key] = by_name[name]
-    return CodeOutputs(**found)
+    laser_mode = table.flag(_LASER_MODE, False)
+    if laser_mode and "speed" not in found:
+        raise table.error(_LASER_MODE, 'needs an analogue output for the power: add speed = "NAME"')
+    return CodeOutputs(**found, laser_mode=laser_mode)
 
 
 def _channel(channels: Table, name: str) -> Channel:

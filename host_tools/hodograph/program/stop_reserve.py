@@ -68,6 +68,9 @@ _OWN_SHARE = 0.4
 
 _MOST_LATE = 0.3
 
+_FEW_LATE = 0.05
+"""Share of the time: where less is late, the shortest zones are left out, since they save less than a round takes."""
+
 _TOO_LATE = 2.0
 """Times the longest stop: short zones do not help where a stop may take longer."""
 
@@ -77,11 +80,15 @@ def late_pieces(program: Program, stop_time_s: float) -> Flags:
     return np.asarray(program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s)
 
 
-def late_mostly(program: Program, stop_time_s: float) -> bool:
-    """Whether they take so much of the time that zones would be nearly everywhere."""
+def late_share(program: Program, stop_time_s: float) -> float:
+    """The share of the time that they take."""
     seconds = program.pieces.duration_q32_s.astype(np.float64)
-    late = late_pieces(program, stop_time_s)
-    return bool(seconds[late].sum() > _MOST_LATE * seconds.sum())
+    return float(seconds[late_pieces(program, stop_time_s)].sum() / seconds.sum())
+
+
+def late_mostly(program: Program, stop_time_s: float) -> bool:
+    """Whether it is so much that zones in all of it would be nearly everywhere."""
+    return late_share(program, stop_time_s) > _MOST_LATE
 
 
 def useful_steps(
@@ -92,6 +99,8 @@ def useful_steps(
         return []
     if program.stops.worst(FAULT).time_s > _TOO_LATE * stop_time_s:
         return [step for step in steps if step.time_s == inf]
+    if late_share(program, stop_time_s) < _FEW_LATE:
+        return [step for step in steps if step is not STEPS[0]]
     return list(steps)
 
 

@@ -24,9 +24,11 @@ from ..job import (
     SectionMaker,
     ignored_kind,
     ignored_note,
+    in_laser_mode,
+    section_commands,
     toolpath_commands,
 )
-from ..job_outputs import EventMaker, SectionCommands
+from ..job_outputs import EventMaker
 from ..spline import PHSpline, coordinates
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
@@ -183,7 +185,7 @@ class StreamReader:
                 continue
             for made, final in _with_final(sections.made(divided.section)):
                 own = events.section(
-                    SectionCommands(made.before, made.events, made.fitted.curve.length_mm),
+                    section_commands(made),
                     divided.behind if final else (),
                     is_first=first,
                     is_last=divided.is_last and final,
@@ -198,6 +200,7 @@ class StreamReader:
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
         divider = _Windows(str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag))
         divider.tolerance_mm = self.tolerance_mm
+        divider.laser_mode = in_laser_mode(self.machine)
         waits = self.machine.outputs is not None
         held: Section | None = None
         for command in self._commands():

@@ -126,6 +126,7 @@ MACHINE: Document = {
             "speed": "power",
             "mist": "valve",
             "flood": "valve",
+            "laser_mode": True,
         },
     },
     "axis": [AXIS, AXIS | {"name": "y", "node": 3}, TURNING],

@@ -223,3 +223,15 @@ def test_import_shows_what_became_of_a_file(
     assert written["section"] == found["section"]
     assert main(["simulate", str(file)]) == 2
     assert "names no machine" in capsys.readouterr().err
+
+
+def test_hooks_shorter_than_a_section_stay_in_one(tmp_path: Path, mill: Machine) -> None:
+    """Points that go back and forth by two micrometres: a part between two of them would have no length."""
+    xs = [0.3, 0.28, 0.295, 0.2928, 0.295, 0.2932, 0.2956, 0.2875, 0.35]
+    text = "\n".join(["F9000", *(f"G1 X{x:g}" for x in xs)])
+    job = load_job(program(tmp_path, text), mill)
+    for section in job.sections:
+        assert section.fitted.curve.length_mm >= 2.0**-10
+        assert section.pipeline.compilation.program.duration_q32_s > 0
+    assert job.sections[-1].fitted.reference.point[-1].tolist() == [0.35, 0.0, 0.0]
+    assert job.deviation_um <= 10.0

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Outputs of G-code become events of the sections' programs."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,8 @@ import pytest
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
 from hodograph.job import Job, load_job
+from hodograph.stream.reading import StreamReader
+from hodograph.toolpath.files import ReadOptions
 
 ROOT = Path(__file__).parents[3]
 MACHINES = ROOT / "examples" / "machines"
@@ -123,3 +127,67 @@ def test_the_end_of_the_program_switches_the_spindle_off(tmp_path: Path, machine
             (20.0, 2, 0, 0, 0),
         ]
     ]
+
+
+@pytest.fixture(scope="module")
+def laser(machine: Machine) -> Machine:
+    """S is the power in %, 327.67 on the bus."""
+    assert machine.outputs is not None
+    codes = replace(machine.outputs.codes, laser_mode=True)
+    return replace(machine, outputs=replace(machine.outputs, codes=codes))
+
+
+def gain(power: float, feed_mm_s: float) -> int:
+    return round(power / feed_mm_s * 327.67 * 65536)
+
+
+def test_power_of_a_laser_follows_the_feed_after_m4(tmp_path: Path, laser: Machine) -> None:
+    """S at the feed of the block, 0 in rapid moves; it changes in motion, and M3 is constant."""
+    text = "M4 S50\nG1 X20\nS30\nG1 X40\nF1200\nG1 X60\nG0 X80\nG1 X90\nM5\nM3 S20\nG1 X100"
+    first, second = job(tmp_path, laser, text).sections
+    power = [
+        (place / MM, kind, value)
+        for place, kind, channel, _, value in first.pipeline.events.tolist()
+        if kind != 1
+    ]
+    assert power == [
+        (0.0, 3, gain(50, 10)),
+        (pytest.approx(20.0), 3, gain(30, 10)),
+        (pytest.approx(40.0), 3, gain(30, 20)),
+        (pytest.approx(60.0), 3, 0),
+        (pytest.approx(80.0), 3, gain(30, 20)),
+    ]
+    analogue = [
+        (kind, value) for _, kind, _, _, value in second.pipeline.events.tolist() if kind != 1
+    ]
+    assert analogue == [(3, gain(30, 20)), (2, 6553), (2, 0)]
+
+
+def test_a_laser_streams_the_same_events(tmp_path: Path, laser: Machine) -> None:
+    rows = [f"G{int(k % 9 == 0)} X{k} Y{k % 3} S{k % 50} F{600 + 60 * (k % 3)}" for k in range(60)]
+    found = job(tmp_path, laser, "\n".join(["M4 S10", *rows, "M5"]))
+    whole = [event for one in found.sections for event in one.pipeline.events.tolist()]
+    assert sum(kind == 3 for _, kind, *_ in whole) > 60
+    reader = StreamReader(found.file, laser, 0.01, ReadOptions())
+    streamed = [
+        event
+        for section in reader.sections()
+        for block in section.blocks
+        for event in block.events.tolist()
+    ]
+    values = [one[1:] for one in whole]
+    assert [one[1:] for one in streamed] == values
+
+
+def test_laser_mode_needs_an_output_for_the_power(tmp_path: Path) -> None:
+    text = (MACHINES / "dispenser.toml").read_text()
+    file = tmp_path / "machine.toml"
+    file.write_text(
+        re.sub(r"^speed = .*$", "laser_mode = true", text, flags=re.M).replace(
+            "../", f"{MACHINES.parent}/"
+        )
+    )
+    with pytest.raises(
+        InputError, match='laser_mode needs an analogue output for the power: add speed = "NAME"'
+    ):
+        load_machine(file)

@@ -70,6 +70,7 @@ def test_angles_are_smooth_and_within_the_tolerance(make: object) -> None:
     path, target = turned(points, angles)
     curve = path.curve
     bound = turning_bound_deg(curve, target).max()
+    assert path.turning_deg == bound
     s = np.linspace(0.0, curve.length_mm, 20001)
     off = np.linalg.norm(curve.extra_point(s) - target(s), axis=1).max()
     assert off <= bound <= TOLERANCE
@@ -120,6 +121,10 @@ def test_a_program_of_five_axes_runs_to_its_end(tmp_path: Path, five: Machine) -
     job = load_job(program(tmp_path, text), five)
     run = simulate_job(job)
     (motion,) = run.motions
+    said = run.summary()["deviation_bound_deg"]
+    assert said == job.sections[0].turning_summary["deviation_bound_deg"] == job.deviation_deg
+    assert isinstance(said, float)
+    assert 0.001 < said <= 0.01
     assert np.allclose(motion.cmd_mm[-1], [20.0, 8.0, 0.0, 6.0, 0.0], atol=1e-9)
     line = job.sections[0].line_at(motion.arc_length_mm)
     timed_s = np.count_nonzero(line == 14) * run.period_s

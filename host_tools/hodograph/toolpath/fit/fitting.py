@@ -53,12 +53,15 @@ class FittedPath:
 
     curve         at most `certificate.worst_mm` from the reference, and the reference from it
     place_mm      (segments + 1,) places of the reference at the joints of the curve
+    turning_deg   bound of how far the axes that turn along are from the programmed angles at the same share of the way
+                  between two points; None: none turns along
     """
 
     reference: Reference
     curve: SpatialPHSpline
     place_mm: Real
     certificate: Certificate
+    turning_deg: float | None = None
 
     @property
     def deviation_mm(self) -> float:

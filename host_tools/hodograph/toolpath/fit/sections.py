@@ -30,6 +30,7 @@ from ..moves import (
     Position,
     ProgramEnd,
     ProgramStop,
+    Rotation,
     Spindle,
     SplineMove,
     StraightMove,
@@ -55,6 +56,10 @@ _STRAIGHT_RAD = 1e-6
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
 SHORTEST_MM = 2.0**-9
 """Shorter moves are no section of their own."""
+
+
+_LONG_TOLERANCES = 10.0
+"""Of a path that is always a section, wherever it ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +116,8 @@ class Divider:
     direction: Real | None = None
     tied: bool = False
     stands_at: tuple[float, float, float] | None = None
+    laser_mode: bool = False
+    rotation: Rotation = Rotation.STOPPED
 
     def take(self, command: Command) -> None:
         """The next command."""
@@ -118,6 +125,8 @@ class Divider:
             self._move(command)
         elif isinstance(command, PathMode):
             self._mode(command)
+        elif isinstance(command, Spindle) and self._changes_power(command):
+            self.before.append(command) if not self.moved else self._on_the_way(command)
         elif isinstance(command, _STOPS):
             self.stop()
             self.before.append(command)
@@ -128,6 +137,12 @@ class Divider:
         elif isinstance(command, ProgramEnd):
             self.stop()
             self.before.append(command)
+
+    def _changes_power(self, command: Spindle) -> bool:
+        """Whether the command changes S only, of a laser that follows the feed."""
+        before, self.rotation = self.rotation, command.rotation
+        dynamic = command.rotation is Rotation.COUNTERCLOCKWISE
+        return self.laser_mode and dynamic and before is command.rotation
 
     def _move(self, move: Move) -> None:
         turned = self._turned_alone(move)
@@ -262,16 +277,25 @@ class Divider:
 
 
 def divided(
-    commands: Iterable[Command], tolerance_mm: float, file: str, start: Position = ORIGIN
+    commands: Iterable[Command],
+    tolerance_mm: float,
+    file: str,
+    start: Position = ORIGIN,
+    *,
+    laser_mode: bool = False,
 ) -> Toolpath:
     """The sections of a toolpath.
 
     tolerance_mm  how far curves may be from the programmed path; 0: exact stops everywhere. What a toolpath asks for
                   itself (G64 P) counts where it is less
+    laser_mode    whether S after M4 changes in motion
     Raises InputError, naming file and line: moves that have no path.
     """
     divider = Divider(
-        file, tolerance_mm, ReferenceBuilder(start, SAG_SHARE * (tolerance_mm or EXACT_MM))
+        file,
+        tolerance_mm,
+        ReferenceBuilder(start, SAG_SHARE * (tolerance_mm or EXACT_MM)),
+        laser_mode=laser_mode,
     )
     divider.tolerance_mm = tolerance_mm
     for command in commands:
@@ -287,11 +311,34 @@ def _without_reversals(section: Section) -> Iterator[Section]:
     yield from cut_at(section, sharp)
 
 
+def _far_apart(section: Section, inner: list[int]) -> list[int]:
+    """Those of these inner points between which, and beside which, each part leads to a place that is as far as a
+    section has to be long, or is so long that no curve within the tolerance is shorter: a smaller hook stays in a part.
+    All of them, where none is left.
+    """
+    reference, last = section.reference, section.reference.count
+    long_mm = max(SHORTEST_MM, _LONG_TOLERANCES * section.tolerance_mm)
+
+    def is_far(begin: int, end: int) -> bool:
+        way = np.linalg.norm(reference.point[end] - reference.point[begin])
+        length = reference.place_mm[end] - reference.place_mm[begin]
+        return bool(way >= SHORTEST_MM or length >= long_mm)
+
+    kept = [0]
+    for k in inner:
+        if is_far(kept[-1], k):
+            kept.append(k)
+    while len(kept) > 1 and not is_far(kept[-1], last):
+        kept.pop()
+    return kept[1:] or inner
+
+
 def cut_at(section: Section, places: np.ndarray) -> Iterator[Section]:
     """The section in parts, with stops at points of the reference that have these places."""
     own = section.reference.place_mm
     at = np.unique(np.searchsorted(own, places))
-    edges = [0, *(int(k) for k in at if 0 < k < section.reference.count), section.reference.count]
+    inner = [int(k) for k in at if 0 < k < section.reference.count]
+    edges = [0, *_far_apart(section, inner), section.reference.count]
     before = section.before
     for first, last in itertools.pairwise(edges):
         low, high = float(own[first]), float(own[last])

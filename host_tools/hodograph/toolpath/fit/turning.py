@@ -63,7 +63,7 @@ def with_turning(
     if not np.ptp(value, axis=0).any():
         still = np.repeat(value[:1, :, None], 6, axis=2)
         extra = np.repeat(still, fitted.curve.segment_count, axis=0)
-        return replace(fitted, curve=replace(fitted.curve, extra=extra))
+        return replace(fitted, curve=replace(fitted.curve, extra=extra), turning_deg=0.0)
     target = Angles.of(fitted.arc_length_at(reference.place_mm), value)
     rates = _rates_at_ends(reference.place_mm, value, tied)
     joined = target.with_rates(*rates)
@@ -240,9 +240,10 @@ def _followed(
             smooth.correction(joint, 2),
         )
         found = replace(fitted, curve=replace(fitted.curve, extra=extra))
-        wide = np.flatnonzero(turning_bound_deg(found.curve, target) > tolerance_deg)
+        bound = turning_bound_deg(found.curve, target)
+        wide = np.flatnonzero(bound > tolerance_deg)
         if not wide.size:
-            return found
+            return replace(found, turning_deg=float(bound.max()))
         fitted = _cut(fitted, wide, np.full(wide.size, 0.5))
     return None
 
