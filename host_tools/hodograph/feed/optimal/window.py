@@ -171,9 +171,7 @@ def _without_brief(
         if keep.all():
             break
         setting = found.setting
-        joined = _setting(
-            spline, setting.limits, found.grid.s[keep], setting.start, setting.effort
-        )
+        joined = _setting(spline, setting.limits, found.grid.s[keep], setting.start, setting.effort)
         again = _Rounds(joined, found.squared_feed).run(None, gain)
         if again is None:
             break
@@ -375,9 +373,7 @@ class _Rounds:
             self.about = About(np.maximum(p, _LEAST_P), (d, dd))
             self.typical_q, self.duration_s = known.q, known.duration_s
 
-    def run(
-        self, even: Callable[[Solution], bool] | None, least_gain: float
-    ) -> Solution | None:
+    def run(self, even: Callable[[Solution], bool] | None, least_gain: float) -> Solution | None:
         """The last solution; None where there is none, or only one above the limits.
 
         even        of a solution: where it is False after _TRUSTED rounds, further rounds on these knots are useless
