@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from hodograph.simulate import simulate_stop  # noqa: E402
 
 CASES = ("alpha_optimal", "heart_optimal", "alpha", "heart")
 LIMITS = {"hold": hold_limits, "fault": fault_limits}
+END_TICKS = 30
 STARTS = (1.0, 0.7)
 """Durations of the starts, as shares of the stop's own."""
 
@@ -68,6 +69,51 @@ def stops_of(pipeline: Pipeline, kind: str, instants: int) -> list[Compared]:
     return out
 
 
+@dataclass(frozen=True)
+class NearEnd:
+    """The fault stop near the end of a program that is farthest from the least time to rest: how many ticks before the
+    last setpoint it is commanded, the feed then, its time to standstill, and that of a brake with the machine's limits
+    along the path.
+    """
+
+    ticks: int
+    feed_mm_s: float
+    rest_after_s: float
+    least_s: float
+
+    @property
+    def lost_s(self) -> float:
+        """How much later than possible the axes rest."""
+        return self.rest_after_s - self.least_s
+
+
+def near_end(pipeline: Pipeline) -> NearEnd:
+    """The worst of the last END_TICKS instants."""
+    image, plan, machine = NativeProgram(pipeline.image), pipeline.plan, pipeline.machine
+    period_s = machine.period_us * 1e-6
+    last = int(np.ceil(plan.duration_s / period_s))
+    found = []
+    for ticks in range(2, END_TICKS + 1):
+        run = simulate_stop(
+            image, machine.models(machine.path_axes), "fault", (last - ticks) * period_s
+        )
+        before_s = (last - ticks - 1) * period_s
+        feed, acceleration = float(plan.feed(before_s)), float(plan.acceleration(before_s))
+        least_s = least_brake_s(feed, acceleration, machine.acceleration_mm_s2, machine.jerk_mm_s3)
+        least_s = min(least_s, plan.duration_s - before_s)
+        found.append(NearEnd(ticks, feed, run.rest_after_s, least_s))
+    return max(found, key=lambda one: one.lost_s)
+
+
+def least_brake_s(speed: float, acceleration: float, most: float, jerk: float) -> float:
+    """Time of the S-curve to rest in continuous time, with these limits along the path: mm, s."""
+    depth = min(float(np.sqrt(speed * jerk + acceleration**2 / 2.0)), most)
+    sign = 1.0 if acceleration + depth > 0.0 else -1.0
+    peak = speed + sign * (acceleration**2 - depth**2) / (2.0 * jerk)
+    even_s = max(peak / depth - depth / (2.0 * jerk), 0.0)
+    return abs(acceleration + depth) / jerk + even_s + depth / jerk
+
+
 def measure(name: str, instants: int, listed: bool) -> dict[str, Any]:
     """Figures of one program."""
     pipeline = load_pipeline(ROOT / f"examples/{name}.toml")
@@ -88,6 +134,8 @@ def measure(name: str, instants: int, listed: bool) -> dict[str, Any]:
                 print(
                     f"  {kind:<6} {one.at_s:7.3f} {one.rest_after_s:7.4f} {one.least_s} {one.of_least}"
                 )
+    end = near_end(pipeline)
+    out["near_end"] = asdict(end) | {"lost_s": end.lost_s}
     return out
 
 
@@ -106,11 +154,19 @@ def main() -> int:
     for name in options.only or CASES:
         results[name] = measure(name, options.instants, options.list)
         for kind, found in results[name].items():
+            if kind not in LIMITS:
+                continue
             print(
                 f"{name:<16} {kind:<6} {found['compared']:>8} {found['median_of_least']:>7.2f} "
                 f"{found['worst_of_least']:>7.2f} {found['within_1_3_percent']:>9.0f} {found['worst_s']:>9.3f}",
                 flush=True,
             )
+        end = results[name]["near_end"]
+        print(
+            f"{name:<16} fault stop at the end: at most {1e3 * end['lost_s']:.1f} ms later than possible "
+            f"({1e3 * end['rest_after_s']:.0f} ms for {1e3 * end['least_s']:.1f}, "
+            f"{end['ticks']} ticks before the last setpoint, at {end['feed_mm_s']:.1f} mm/s)"
+        )
     if options.json is not None:
         options.json.write_text(json.dumps(results) + "\n", encoding="utf-8")
     return 0

@@ -51,7 +51,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MILL = ROOT / "examples" / "machines" / "mill.toml"
 EMULATE = ROOT / "tools" / "emulate.py"
 FEED_MM_S, LEAST_MM, MOST_MM, GROWTH_MM = 50.0, 20.0, 60.0, 0.5
-ICOUNT = 3
+ICOUNT = 4
 """The board makes 125 million instructions a second: about 2 million for the check of each KiB of a chunk."""
 MARK_TICKS = 60_000
 PATIENCE_S = 1e6

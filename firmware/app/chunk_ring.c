@@ -30,17 +30,17 @@ void chunk_ring_clear(struct chunk_ring *ring)
 /* The newest block lies before the oldest one. */
 static bool is_wrapped(const struct chunk_ring *ring)
 {
-    return ring->used && ring->end <= ring->first;
+    return ring->used && ring->write <= ring->oldest;
 }
 
 static uint32_t room_behind_newest(const struct chunk_ring *ring)
 {
-    return (is_wrapped(ring) ? ring->first : ring->size) - ring->end;
+    return (is_wrapped(ring) ? ring->oldest : ring->size) - ring->write;
 }
 
 static uint32_t room_at_start(const struct chunk_ring *ring)
 {
-    return is_wrapped(ring) ? 0u : ring->first;
+    return is_wrapped(ring) ? 0u : ring->oldest;
 }
 
 uint32_t chunk_ring_room(const struct chunk_ring *ring)
@@ -53,34 +53,34 @@ uint32_t chunk_ring_room(const struct chunk_ring *ring)
 uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size)
 {
     const bool behind = room_behind_newest(ring) >= least;
-    const uint32_t at = behind ? ring->end : 0u;
+    const uint32_t at = behind ? ring->write : 0u;
     *size = behind ? room_behind_newest(ring) : room_at_start(ring);
     if (*size < least || *size == 0u) {
         return NULL;
     }
-    ring->back = ring->end;
+    ring->write_before = ring->write;
     ring->newest = at;
-    ring->end = at + *size;
-    ring->first = ring->used ? ring->first : at;
+    ring->write = at + *size;
+    ring->oldest = ring->used ? ring->oldest : at;
     ring->used = true;
     return ring->memory + at;
 }
 
 void chunk_ring_trim(struct chunk_ring *ring, uint32_t size)
 {
-    ring->end = ring->newest + rounded_up(size);
+    ring->write = ring->newest + rounded_up(size);
 }
 
 void chunk_ring_give_back(struct chunk_ring *ring)
 {
-    if (ring->first == ring->newest) {
+    if (ring->oldest == ring->newest) {
         chunk_ring_clear(ring);
     } else {
-        ring->end = ring->back;
+        ring->write = ring->write_before;
     }
 }
 
 void chunk_ring_free_oldest(struct chunk_ring *ring, const uint8_t *next)
 {
-    ring->first = (uint32_t)(next - ring->memory);
+    ring->oldest = (uint32_t)(next - ring->memory);
 }

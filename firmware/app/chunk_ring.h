@@ -18,11 +18,11 @@
 struct chunk_ring {
     uint8_t *memory; /* aligned to CHUNK_RING_ALIGNMENT */
     uint32_t size;
-    uint32_t first;  /* offset of the oldest block */
-    uint32_t newest; /* of the newest one, */
-    uint32_t end;    /* and where it ends */
-    uint32_t back;   /* `end` before it was taken */
-    bool used;       /* there is a block */
+    uint32_t oldest; /* offset of the oldest block, which is freed next */
+    uint32_t newest; /* offset of the newest block */
+    uint32_t write;  /* write offset: the end of the newest block, where the next one begins */
+    uint32_t write_before; /* the write offset before the newest block was taken */
+    bool used;             /* there is a block */
 };
 
 /* Of all memory that is there; `size` may be 0. */

@@ -28,7 +28,15 @@ from .pipeline import Pipeline
 from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
-from .program.stop_reserve import EVERYWHERE, STEPS, ReserveStep, reserve_zones, useful_steps
+from .program.stop_reserve import (
+    EVERYWHERE,
+    SPREADS,
+    STEPS,
+    ReserveStep,
+    reserve_zones,
+    useful_steps,
+    zones_at_places,
+)
 from .program.stops import FAULT
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
@@ -61,8 +69,12 @@ GREATEST_TOLERANCE_MM = 10.0
 _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
+_SLOWER, _MOST_SLOWER = 0.7, 12
+"""Share of its mean feed that a piece gets where this does not help, and how many times."""
+
 _THOROUGH_CHORDS = 1000
-"""Sections with at most so many chords are searched for stops with all trials, where few do not suffice."""
+"""Sections with at most so many chords, and so many feed pieces, are searched for stops with all trials where few do
+not suffice."""
 
 _THOROUGH_GAIN = 1.1
 """About how many times as long the bounds of stops are that few trials find."""
@@ -110,35 +122,81 @@ class SectionPipeline(Pipeline):
         return replace(super().stop_terms, quick=not self.thorough)
 
     def _planned(self, limits: Limits) -> FeedPlan:
-        """The plan; with more reserve where a piece would have none left for the least override rate."""
+        """The plan; with more reserve, then with a lower feed there, where a piece would have none left for the least
+        override rate.
+        """
         plan = super()._planned(limits)
-        joints_q40 = quantise(self.curve, ()).start_q40
         for reserve in _MORE_RESERVE:
-            pieces = plan.pieces_over(int(joints_q40[-1]), joints_q40)
-            if min(pieces.override_rate_codes.min(), pieces.override_second_codes.min()) > 0:
-                break
+            if not self._without_override(plan):
+                return plan
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
+        for _ in range(_MOST_SLOWER):
+            slower = self._without_override(plan)
+            if not slower:
+                break
+            plan = super()._planned(replace(plan.limits, zones=(*plan.limits.zones, *slower)))
         return plan
+
+    def _without_override(self, plan: FeedPlan) -> list[FeedZone]:
+        """The pieces of a plan that leave no headroom for a changing override, with a lower feed: a bend of less than
+        a micrometre may be over between two places where limits are evaluated.
+        """
+        joints_q40 = quantise(self.curve, ()).start_q40
+        pieces = plan.pieces_over(int(joints_q40[-1]), joints_q40)
+        codes = np.minimum(pieces.override_rate_codes, pieces.override_second_codes)
+        ends_mm = np.append(pieces.start_q40, joints_q40[-1]).astype(np.float64) * 2.0**-40
+        seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+        return [
+            FeedZone(low, high, max(_SLOWER * (high - low) / duration_s, LEAST_FEED_MM_S))
+            for low, high, duration_s, least in zip(
+                *(ends_mm[:-1].tolist(), ends_mm[1:].tolist(), seconds.tolist()),
+                codes.min(axis=1).tolist(),
+                strict=True,
+            )
+            if least == 0 and low < high
+        ]
 
     def _compiled(self, plan: FeedPlan) -> Compilation:
         """The program; of a plan made again with more reserve where a stop would have to wait too long to begin."""
         longest_s = self.machine.stop_time_ms * 1e-3
         limits, zones = plan.limits, plan.limits.reserve_zones
-        steps: list[ReserveStep | float] = [*STEPS, *EVERYWHERE]
+        steps: list[ReserveStep] = list(STEPS)
         while True:
             try:
                 return self._with_stops(plan)
             except LongStopError as error:
                 steps = useful_steps(error.program, longest_s, steps)
                 if not steps:
-                    raise
-                step = steps.pop(0)
-                if isinstance(step, float):
-                    lower = replace(limits, machine=limits.machine.scaled(1.0 - step))
-                else:
-                    zones += tuple(reserve_zones(error.program, longest_s, step))
-                    lower = replace(limits, reserve_zones=zones)
-            plan = self._planned(lower)
+                    return self._with_places(limits, error)
+                zones += tuple(reserve_zones(error.program, longest_s, steps.pop(0)))
+            plan = self._planned(replace(limits, reserve_zones=zones))
+
+    def _with_places(self, limits: Limits, late: LongStopError) -> Compilation:
+        """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
+        lower everywhere; that plan's own, where zones are not enough. Raises `late` where no lower limits are.
+        """
+        longest_s = self.machine.stop_time_ms * 1e-3
+        program, zones = late.program, limits.reserve_zones
+        for share in EVERYWHERE:
+            lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
+            whole: Compilation | None = None
+            try:
+                whole = self._with_stops(lower)
+                lowered = whole.program
+            except LongStopError as error:
+                lowered = error.program
+            for spread in SPREADS:
+                more = zones_at_places(program, lowered, longest_s, share, spread)
+                if not more:
+                    break
+                zones += tuple(more)
+                try:
+                    return self._with_stops(self._planned(replace(limits, reserve_zones=zones)))
+                except LongStopError as error:
+                    program = error.program
+            if whole is not None:
+                return whole
+        raise late
 
     def _with_stops(self, plan: FeedPlan) -> Compilation:
         """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
@@ -149,7 +207,7 @@ class SectionPipeline(Pipeline):
         except LongStopError as error:
             longest_s = _THOROUGH_GAIN * self.machine.stop_time_ms * 1e-3
             assert self.fitted is not None
-            few = self.fitted.reference.count <= _THOROUGH_CHORDS
+            few = max(self.fitted.reference.count, error.program.piece_count) <= _THOROUGH_CHORDS
             if self.thorough or not few or error.program.stops.worst(FAULT).time_s > longest_s:
                 raise
             return replace(self, thorough=True)._with_stops(plan)
@@ -372,6 +430,20 @@ def _with_outputs(
     )
 
 
+def missing_axes(machine: Machine) -> str:
+    """Those of a, b and c that are no axes of the machine's path."""
+    names = [axis.name.lower() for axis in machine.path_axes[3:]]
+    return "".join(name for name in AXES[3:] if name not in names)
+
+
+def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputError:
+    """The refusal of a move that turns a, b or c, which is no axis of the machine's path."""
+    return InputError(
+        f"{file}:{line}: the move turns {name.upper()}, but no axis {name} of {machine.file.name} follows the path: "
+        'name it behind "z" in path = [...] at its top, or leave it out'
+    )
+
+
 def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
     """What a command that the machine does not execute is about; None: it executes it, or it is about motion."""
     if is_output(command, outputs):
@@ -486,21 +558,16 @@ class SectionMaker:
         names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
         columns = [AXES.index(name) - 3 if name in AXES[3:] else None for name in names]
         try:
-            return with_turning(fitted, columns, section.tolerance_mm)
+            return with_turning(fitted, columns, section.tolerance_mm, section.tied)
         except PlanError as error:
             raise PlanError(f"{self.file}: {error}") from None
 
     def _check_turning(self, angles: Real, lines: Int) -> None:
         """Raises InputError, naming the line, where a, b or c turns, which is no axis of the machine's path."""
-        names = [axis.name.lower() for axis in self.machine.path_axes[3:]]
         for k, name in enumerate(AXES[3:]):
-            if name not in names and angles[:, k].any():
+            if name in missing_axes(self.machine) and angles[:, k].any():
                 line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
-                raise InputError(
-                    f"{self.file}:{line}: the move turns {name.upper()}, but no axis {name} of "
-                    f'{self.machine.file.name} follows the path: name it behind "z" in path = [...] at its top, '
-                    "or leave it out"
-                )
+                raise no_such_axis(self.file, int(line), name, self.machine)
 
     def _section(self, section: Section, fitted: FittedPath) -> JobSection:
         machine = self._moving(section)

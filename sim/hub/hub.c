@@ -294,7 +294,9 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
             continue;
         }
         send_frame(hub, to, &out);
-        if (!matches(to->deferred, to->deferred_count, frame)) {
+        if (matches(to->deferred, to->deferred_count, frame)) {
+            virtual_time_wake_for_all(&hub->time, to->number);
+        } else {
             virtual_time_wake(&hub->time, to->number);
         }
         virtual_time_note_frame(&hub->time, to->number);
@@ -520,7 +522,8 @@ static void take_wait(struct hub *hub, const struct hub_connection *from,
     if ((wait->flags & LOCAL_BUS_SENT) != 0u) {
         take_sent(hub, from->number);
     }
-    if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns)) {
+    const bool all = (wait->flags & LOCAL_BUS_ALL) != 0u;
+    if (virtual_time_wait(&hub->time, from->number, wait->number, wait->time_ns, all)) {
         const struct participant *interrupted = virtual_time_find(&hub->time, from->number);
         notify(hub, LOCAL_BUS_INTERRUPTED, interrupted);
     }

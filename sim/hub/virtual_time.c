@@ -62,7 +62,7 @@ void virtual_time_leave(struct virtual_time *time, uint32_t number)
 }
 
 bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t grant,
-                       uint64_t until_ns)
+                       uint64_t until_ns, bool all)
 {
     struct participant *waits = virtual_time_find(time, number);
     if (waits == NULL || grant != waits->grant) {
@@ -71,6 +71,7 @@ bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t gran
     const bool again = !waits->active;
     waits->active = false;
     waits->until_ns = until_ns;
+    waits->all = all;
     return again;
 }
 
@@ -78,6 +79,14 @@ void virtual_time_wake(struct virtual_time *time, uint32_t number)
 {
     struct participant *waits = virtual_time_find(time, number);
     if (waits != NULL) {
+        waits->woken = true;
+    }
+}
+
+void virtual_time_wake_for_all(struct virtual_time *time, uint32_t number)
+{
+    struct participant *waits = virtual_time_find(time, number);
+    if (waits != NULL && waits->all) {
         waits->woken = true;
     }
 }

@@ -27,6 +27,7 @@ struct participant {
     bool woken;
     bool frames; /* some have come since its last grant */
     bool suspended;
+    bool all; /* frames that it defers wake it, too */
     bool watches;
     uint64_t until_ns;
     uint32_t grant; /* number of the last one */
@@ -50,13 +51,16 @@ void virtual_time_leave(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_find(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_named(struct virtual_time *time, const char *name);
 
-/* The participant waits. A wait with the number of an older grant is out of date, and changes nothing. A second one
+/* The participant waits; `all`: frames that it defers wake it, too. A wait with the number of an older grant is out of date, and changes nothing. A second one
  * for the same grant ends the wait before its time: true. */
 bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t grant,
-                       uint64_t until_ns);
+                       uint64_t until_ns, bool all);
 
 /* It is due now; one that is active will be as soon as it waits. Without effect on one that is not there. */
 void virtual_time_wake(struct virtual_time *time, uint32_t number);
+
+/* As virtual_time_wake, where it waits for all frames. */
+void virtual_time_wake_for_all(struct virtual_time *time, uint32_t number);
 
 /* A frame has come for it: its next grant has LOCAL_BUS_FRAMES. */
 void virtual_time_note_frame(struct virtual_time *time, uint32_t number);

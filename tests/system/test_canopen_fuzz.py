@@ -20,6 +20,7 @@ from hodograph.bus.run import run_program, run_session
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.simulate import Motion, simulate
 
+HANGS_S = 600.0  # of real time: none of these takes a second
 BURST = 3
 """Random frames at most at one instant: a period has room for a few more than the machine's own."""
 LEAST_PAUSE_S = 0.0015
@@ -84,7 +85,7 @@ class Noise:
 
     def __enter__(self) -> Noise:
         self._thread.start()
-        assert self._joined.wait(30.0)  # time stands still for it meanwhile
+        assert self._joined.wait(HANGS_S)  # time stands still for it meanwhile
         return self
 
     def __exit__(self, *_: object) -> None:

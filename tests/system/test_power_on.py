@@ -21,6 +21,7 @@ from hodograph.config import Machine, load_machine
 from hodograph.errors import BusError
 from marks import long
 
+HANGS_S = 600.0  # of real time: none of these takes a second
 ALPHA = str(EXAMPLES / "alpha.toml")
 BOOT_S = 20.0
 REFUSED = 5
@@ -228,7 +229,7 @@ def test_a_store_file_that_is_none(stand: Stand, tmp_path: Path) -> None:
         (tmp_path / "nowhere" / "store", "No such file"),
     ):
         process = Process("controller-2", [*command, "--store", str(file)])
-        process.child.wait(30)
+        process.child.wait(HANGS_S)
         assert process.child.returncode == 1
         assert words in process.text()
         process.end()

@@ -272,13 +272,17 @@ def test_the_pace_of_real_time_where_it_is_asked_for() -> None:
 
 def test_the_pace_of_real_time_with_many_events() -> None:
     """Events closer together than a process can sleep: 0.3 s of them take no more than five times what as many sleeps
-    of this process take in the same run. Each used to take a millisecond.
+    of this process take, the longer time of those before and after them. Each used to take a millisecond.
     """
     steps, step_s = 3000, 1e-4
-    begun_s = time.monotonic()
-    for _ in range(steps):
-        time.sleep(step_s)
-    host_s = time.monotonic() - begun_s
+
+    def host_takes_s() -> float:
+        begun_s = time.monotonic()
+        for _ in range(steps):
+            time.sleep(step_s)
+        return time.monotonic() - begun_s
+
+    before_s = host_takes_s()
     with LocalHub(speed=1.0) as hub:
         bus = LocalBus(hub.address.channel)
         bus.clock.sleep(0.001)
@@ -287,6 +291,7 @@ def test_the_pace_of_real_time_with_many_events() -> None:
             bus.clock.sleep(step_s)
         paced_s = time.monotonic() - begun_s
         bus.shutdown()
+    host_s = max(before_s, host_takes_s())
     print(f"{steps} steps of {step_s} s: {paced_s:.3f} s; this host's own: {host_s:.3f} s")
     assert 0.29 <= paced_s <= 5.0 * host_s
 

@@ -374,6 +374,30 @@ static void test_filters_and_deferred_frames_do_not_wake(void)
     TEST_ASSERT_EQUAL(0x200, got[1].id);
 }
 
+static void test_deferred_frames_wake_one_that_waits_for_all(void)
+{
+    const struct can_match all = {0x000, 0x000};
+    struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
+    struct can_msg got[CAN_SOCKET_BATCH];
+    const uint64_t begin_ns = clock_ns();
+    const uint64_t one_ns = frame_ns(0x100, 0);
+    TEST_ASSERT_EQUAL(0, can_socket_defer(&mine, &all, 1));
+    send_frame(&other, 0x100, 0);
+    send_frame(&other, 0x100, 0);
+    send_frame(&other, 0x100, 0);
+    say_wait(&other, LOCAL_BUS_NEVER);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, one_ns + 1u));
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + one_ns + 1u, clock_ns());
+    TEST_ASSERT_EQUAL(1, receive(got));
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + one_ns, mine.stamps_ns[0]);
+    clock_wake_for_all(true);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, CLOCK_NEVER));
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + 2u * one_ns, clock_ns());
+    clock_wake_for_all(false);
+    TEST_ASSERT_EQUAL(1, clock_poll(&fds, 1, 1, 2u * one_ns));
+    TEST_ASSERT_EQUAL_UINT64(begin_ns + 4u * one_ns, clock_ns());
+}
+
 static void test_what_a_member_sent_before_it_left_goes_out(void)
 {
     struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
@@ -534,6 +558,7 @@ int main(void)
     RUN_TEST(test_one_that_slept_beside_a_busy_bus_gets_its_grant);
     RUN_TEST(test_frames_that_wake_nobody_are_not_lost_however_many);
     RUN_TEST(test_filters_and_deferred_frames_do_not_wake);
+    RUN_TEST(test_deferred_frames_wake_one_that_waits_for_all);
     RUN_TEST(test_what_a_member_sent_before_it_left_goes_out);
     RUN_TEST(test_what_a_participant_sent_before_it_left_is_on_the_bus_at_once);
     RUN_TEST(test_tracked_frames_are_waited_for_until_their_last_bit);

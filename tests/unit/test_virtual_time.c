@@ -15,7 +15,7 @@ static void wait(uint32_t number, uint64_t until_ns)
 {
     const struct participant *who = virtual_time_find(&time_, number);
     TEST_ASSERT_NOT_NULL(who);
-    TEST_ASSERT_FALSE(virtual_time_wait(&time_, number, who->grant, until_ns));
+    TEST_ASSERT_FALSE(virtual_time_wait(&time_, number, who->grant, until_ns, false));
 }
 
 static uint32_t granted(void)
@@ -92,10 +92,10 @@ static void test_a_second_wait_ends_the_first(void)
     wait(b, LOCAL_BUS_NEVER);
     wait(c, LOCAL_BUS_NEVER);
     const uint32_t grant = virtual_time_find(&time_, b)->grant;
-    TEST_ASSERT_TRUE(virtual_time_wait(&time_, b, grant, 0));
+    TEST_ASSERT_TRUE(virtual_time_wait(&time_, b, grant, 0, false));
     TEST_ASSERT_EQUAL_UINT32(b, granted());
     /* One that crossed with the grant belongs to the older one: b stays active. */
-    TEST_ASSERT_FALSE(virtual_time_wait(&time_, b, grant, 0));
+    TEST_ASSERT_FALSE(virtual_time_wait(&time_, b, grant, 0, false));
     TEST_ASSERT_TRUE(virtual_time_is_held(&time_));
 }
 

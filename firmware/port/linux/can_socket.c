@@ -246,7 +246,8 @@ static size_t frames_in_packet(const struct can_socket *socket)
 
 /* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
 static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
-                    const struct local_bus_frame *frames, struct can_msg *messages)
+                    const struct local_bus_frame *frames, struct can_msg *messages,
+                    uint64_t *stamps_ns)
 {
     const size_t size = frame_bytes(socket);
     int count = 0;
@@ -255,6 +256,7 @@ static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
             continue;
         }
         convert(&messages[count], &frames[i].frame);
+        stamps_ns[count] = socket->local ? frames[i].time_ns : 0u;
         if (is_own(socket, header, &frames[i])) {
             can_socket_untrack(socket, (uint16_t)messages[count].id);
         } else {
@@ -292,7 +294,8 @@ int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SO
     }
     int count = 0;
     for (int i = 0; i < got; ++i) {
-        count += sort_out(socket, &headers[i], &frames[(size_t)i * each], messages + count);
+        count += sort_out(socket, &headers[i], &frames[(size_t)i * each], messages + count,
+                          socket->stamps_ns + count);
     }
     *more = got == (int)packets;
     return count == 0 && socket->local && at_end(headers, got) ? -ENETDOWN : count;

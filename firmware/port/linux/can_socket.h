@@ -34,6 +34,8 @@ struct can_socket {
     size_t tracked_count;
     uint16_t waiting[CAN_SOCKET_TRACKED]; /* of the tracked frames that have not come back */
     size_t waiting_count;
+    uint64_t stamps_ns
+        [CAN_SOCKET_BATCH]; /* virtual time: when the frames that were received last had come */
 };
 
 /* Opens and binds: a network interface, or with a '/' in its name the local bus of hodograph-hub (sim/hub) at this path.

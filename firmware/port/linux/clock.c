@@ -20,6 +20,7 @@ static struct {
     int fd; /* to the hub; meaningful while `joined` */
     bool joined;
     bool sent;
+    bool all; /* deferred frames wake it, too */
     uint32_t number;
     uint32_t grant; /* number of the last one */
     bool frames;    /* some came with it */
@@ -47,6 +48,11 @@ uint32_t clock_participant(void)
 void clock_note_sent(void)
 {
     self.sent = true;
+}
+
+void clock_wake_for_all(bool on)
+{
+    self.all = on;
 }
 
 uint64_t clock_ns(void)
@@ -92,6 +98,7 @@ int clock_join(const char *bus, const char *name)
     block_signals(&self.signals);
     self.fd = fd;
     self.joined = true;
+    self.all = false;
     self.number = welcome.number;
     self.grant = 0;
     self.now_ns = welcome.time_ns;
@@ -109,7 +116,8 @@ void clock_leave(void)
 
 static int say_wait(uint64_t until_ns)
 {
-    const uint16_t flags = self.sent ? LOCAL_BUS_SENT : 0;
+    const uint16_t flags =
+        (uint16_t)((self.sent ? LOCAL_BUS_SENT : 0) | (self.all ? LOCAL_BUS_ALL : 0));
     const struct local_bus_control wait = {.flags = flags,
                                            .mark = LOCAL_BUS_MARK,
                                            .version = LOCAL_BUS_VERSION,

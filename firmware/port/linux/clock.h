@@ -35,6 +35,9 @@ uint32_t clock_participant(void);
 /* A member of this process has sent something: the hub looks for it when the process waits. */
 void clock_note_sent(void);
 
+/* Whether frames that are deferred (can_socket_defer) end the waits from now on; at first they do not. */
+void clock_wake_for_all(bool on);
+
 /* A signal has come outside of clock_poll(): the next one ends at once, and the hub reports it to those who watch. For
  * signal handlers. */
 void clock_note_signal(void);

@@ -88,10 +88,14 @@ static void run_tick(void)
     port_unlock();
 }
 
+/* In virtual time each frame is received at the instant at which it came, however late it is taken. */
 static void hand_over(const struct can_msg *messages, int count)
 {
     port_lock();
     for (int i = 0; i < count; ++i) {
+        if (clock_is_virtual()) {
+            self.now_ns = self.socket->stamps_ns[i];
+        }
         self.handlers.receive(self.handlers.self, &messages[i], now_us());
     }
     port_unlock();
@@ -113,12 +117,18 @@ static void receive_waiting(void)
     }
 }
 
-/* The clock is a system call where the kernel itself is a process, and there the pace counts: so at
+/* In virtual time answers of drives are taken when the next tick may start, at the earliest; those that are missing then end the wait
+ * (clock_wake_for_all).
+ *
+ * The clock is a system call where the kernel itself is a process, and there the pace counts: so at
  * lock step the time of the last interrupt is near enough for a guard time. */
 static uint64_t time_to_sleep_ns(void)
 {
     const uint64_t since_ns = self.schedule.hurry ? self.now_ns : clock_ns();
     const uint64_t wait_ns = self.schedule.due_ns > since_ns ? self.schedule.due_ns - since_ns : 0u;
+    if (clock_is_virtual() && self.schedule.awaiting && since_ns < self.schedule.earliest_ns) {
+        return self.schedule.earliest_ns - since_ns;
+    }
     const uint64_t longest_ns = self.schedule.awaiting ? SCHEDULE_SLICE_NS : LONGEST_SLEEP_NS;
     return wait_ns < longest_ns ? wait_ns : longest_ns;
 }
@@ -149,10 +159,13 @@ static void step(uint64_t longest_ns)
 {
     struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
     const uint64_t wait_ns = time_to_sleep_ns();
+    clock_wake_for_all(self.now_ns >= self.schedule.earliest_ns);
     const int ready = clock_poll(&waited, 1, 1, wait_ns < longest_ns ? wait_ns : longest_ns);
-    self.now_ns = clock_ns();
+    const uint64_t woken_ns = clock_ns();
+    self.now_ns = woken_ns;
     if (ready > 0) {
         receive_waiting();
+        self.now_ns = woken_ns;
     } else if (ready < 0 && ready != -EINTR) {
         __atomic_store_n(&self.error, ready, __ATOMIC_RELEASE);
         clock_leave(); /* the shutdown needs a clock that goes on */

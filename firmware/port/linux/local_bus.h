@@ -46,11 +46,12 @@ enum local_bus_kind {
     LOCAL_BUS_HELLO_MEMBER = 1,      /* number: the participant that its frames wake, 0: none */
     LOCAL_BUS_HELLO_PARTICIPANT = 2, /* name; flags: WATCHES */
     LOCAL_BUS_FILTER = 3,            /* of a member: frames that it wants (local_bus_filters) */
-    LOCAL_BUS_DEFER = 4,             /* of a member: frames that do not wake its participant */
+    LOCAL_BUS_DEFER =
+        4, /* of a member: frames that do not wake its participant, unless it waits for ALL */
     LOCAL_BUS_TRACK =
         8, /* of a member: frames of its own that come back to it when their last bit is sent, in virtual
                           * time; they do not wake its participant */
-    LOCAL_BUS_WAIT = 5,     /* number: of the last grant; flags: SENT; time_ns: when to wake
+    LOCAL_BUS_WAIT = 5,     /* number: of the last grant; flags: SENT, ALL; time_ns: when to wake
                                   * it, or before it with a frame */
     LOCAL_BUS_SUSPEND = 6,  /* name: it gets no more grants, as if its processor stood still */
     LOCAL_BUS_CONTINUE = 7, /* name: it gets them again */
@@ -67,6 +68,7 @@ enum local_bus_flag {
     LOCAL_BUS_VIRTUAL = 2, /* welcome: time is virtual */
     LOCAL_BUS_SENT = 4,    /* wait: its members have sent something since the last one */
     LOCAL_BUS_FRAMES = 8,  /* grant: frames have come */
+    LOCAL_BUS_ALL = 16,    /* wait: frames that its members defer wake it too */
 };
 
 struct local_bus_control {

@@ -124,9 +124,14 @@ uint8_t port_node_id(void)
     return self.options.node;
 }
 
+/* What drives answer to a SYNC (TPDO1) is needed by the next tick: in virtual time the process does not wake for each. */
 int port_can_accept(const struct can_match *filters, size_t count)
 {
-    return can_socket_filter(&self.socket, filters, count) == 0 ? 0 : PORT_ERR_SYSTEM;
+    static const struct can_match answers = {0x180u, 0x780u};
+    if (can_socket_filter(&self.socket, filters, count) != 0) {
+        return PORT_ERR_SYSTEM;
+    }
+    return can_socket_defer(&self.socket, &answers, 1) == 0 ? 0 : PORT_ERR_SYSTEM;
 }
 
 /* A frame that cannot be tracked counts as delivered. */

@@ -25,7 +25,7 @@ from ..bus.sdo.controller import connect
 from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
-from ..config import Machine, load_machine, load_paths
+from ..config import SPACE_AXES, Machine, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
@@ -211,14 +211,14 @@ def _run(
         if continued:
             assert entry is not None
             note(
-                f"goes on in section {begin.section + 1} at {number(begin.way_q40 * 2.0**-40)} mm of it"
+                f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * 2.0**-40)} mm of it"
             )
             entry = replace(
                 entry,
                 job0=job_number,
                 section=begin.section,
-                way_q40=begin.way_q40,
-                committed_q40=begin.way_q40,
+                arc_q40=begin.arc_q40,
+                committed_q40=begin.arc_q40,
                 first=begin.section,
                 starts=((begin.section, 0),),
             )
@@ -306,11 +306,16 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     )
     if found.distance_mm > machine.start_tolerance_mm:
         point = [number(one) for one in found.point_mm]
-        more = f" --z {point[2]}" if len(point) > 2 else ""
+        more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
+        turned = [
+            f"{axis.name} {at}"
+            for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
+        ]
+        along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
         raise RefusedError(
             f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
             f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
-            f"--to {point[0]} {point[1]}{more}, then hodograph stream --continue"
+            f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue"
         )
     return found.place
 
@@ -350,6 +355,7 @@ def _print(done: StreamedJob, options: Namespace) -> None:
             ("chunks", f"{done.chunks}, {size_text(done.bytes)}"),
             ("motion", f"{duration_text(done.motion_s)} in {duration_text(done.took_s)}"),
             ("rests for want of chunks", str(done.underruns)),
+            ("rests of the plan", done.rests.text),
         ]
     )
 
@@ -375,6 +381,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
             bar(len(found))
         motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
         counted = {"chunks": plan.chunks, "bytes": plan.byte_count}
+        rests = plan.rests
     took_s = time.perf_counter() - begin_s
     for line in notes:
         note(line)
@@ -385,6 +392,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 "wall_s": took_s,
                 "greatest_bytes_per_s": rate,
                 **counted,
+                "rests": asdict(rests),
                 "job": [asdict(one) for one in found],
             }
         )
@@ -398,6 +406,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
                 f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}",
             ),
             ("bytes a second", f"{number(rate)} at most, over 3 s"),
+            ("rests of the plan", rests.text),
         ]
     )
     for k, one in enumerate(found, 1):

@@ -275,17 +275,33 @@ class Headroom:
             _by_axis(given or (np.inf,) * count)
             for given in (limits.velocity_mm_s, limits.acceleration_mm_s2, limits.jerk_mm_s3)
         )
+        a, j = raised(samples.acceleration) + _TINY, raised(samples.jerk) + _TINY
         return Axes(
             raised(samples.velocity) + _TINY,
-            raised(samples.acceleration) + _TINY,
-            raised(samples.jerk) + _TINY,
+            a,
+            j,
             velocity,
-            acceleration,
-            jerk,
+            self._less_reserve(acceleration, a),
+            self._less_reserve(jerk, j),
             samples.velocity,
             samples.acceleration,
             None if plants is None else _by_axis(one.reach_mm_s for one in plants),
             None if plants is None else _by_axis(one.time_constant_s for one in plants),
+        )
+
+    def _less_reserve(self, limit: Real, used: Real) -> Real:
+        """Limits (A, 1, 1) without what reserve zones keep for stops: the override may not use it. Where the plan
+        uses (A, C, K) more, they leave the override what they leave it elsewhere.
+        """
+        limits, arc_mm = self.bounds.limits, self._samples.arc_mm
+        if not limits.reserve_zones:
+            return limit
+        kept = np.ones_like(arc_mm)
+        for zone in limits.reserve_zones:
+            inside = (arc_mm >= zone.from_mm) & (arc_mm <= zone.to_mm)
+            kept = np.where(inside, np.minimum(kept, 1.0 - zone.share), kept)
+        return np.asarray(
+            np.minimum(limit, np.maximum(kept * limit, used / (1.0 - limits.reserve)))
         )
 
     def factor(self) -> Real:

@@ -60,6 +60,12 @@ class Server:
         self.app.router.add_get("/{name:[a-z_.]*}", self._page)
         self.app.on_shutdown.append(self._shut_down)
 
+    def runner(self) -> web.AppRunner:
+        """What serves the application, and closes a connection whose request does not come in REQUEST_S."""
+        return web.AppRunner(
+            self.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
+        )
+
     @web.middleware
     async def _check(
         self,

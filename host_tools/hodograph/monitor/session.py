@@ -20,7 +20,7 @@ from .clients import Broadcaster
 from .link import Link, read_command
 from .pump import Layout, Pump
 from .security import Guard, is_loopback
-from .server import REQUEST_S, Server
+from .server import Server
 from .source import Source, open_source
 
 
@@ -112,9 +112,7 @@ class LivePage:
             self._greeting(),
             _execute(link, pump),
         )
-        runner = web.AppRunner(
-            server.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
-        )
+        runner = server.runner()
         await runner.setup()
         usage = Usage()
         try:

@@ -95,6 +95,22 @@ class StopSearch:
         """Codes (M, 3): `given` where they are `known` (M,), found elsewhere; good also for a brake that begins out of
         one with the codes `before` (M, 3).
         """
+        found = self._found(limits, given, known, before)
+        return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
+
+    def mean_s(self, limits: StopLimits, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """Mean time to rest (M,) of stops from the instants of each piece at the rate 1, with these codes (M, 3)."""
+        found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), None)
+        return np.array([one.mean_s for one in found])
+
+    def _found(
+        self,
+        limits: StopLimits,
+        given: NDArray[np.uint8],
+        known: NDArray[np.bool_],
+        before: NDArray[np.uint8] | None,
+    ) -> Any:
+        """struct stop_found of each piece."""
         ffi, lib = library()
         own = limits_struct(limits)
         found = ffi.new("struct stop_found[]", self._count)
@@ -105,7 +121,7 @@ class StopSearch:
                 one.before = codes
         path = self._path(own)
         lib.stop_search(self._program.pointer, own[0], path[0], found)
-        return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
+        return found
 
     def _path(self, given: tuple[Any, Any]) -> tuple[Any, tuple[Any, ...]]:
         """The struct stop_path and what it points to, which must be kept as long."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from math import inf
 
 import numpy as np
@@ -37,6 +37,13 @@ MOST_PARTS = 256
 """Parts of that length; those of a longer program last longer, which bounds the time of the search."""
 WORTH_GAIN = 0.05
 """Share by which finer numbers have to make the mean of the bounds of a part shorter."""
+LONGEST_WAIT_S = 0.04
+"""Where a hold may wait longer for a brake, the pieces that it waits in are halved down to FINE_PART_S."""
+FINE_PART_S = 0.004
+MOST_FINE_PARTS = 1024
+"""Parts of that length; those of a longer program last longer, which bounds the time of the search and the image."""
+FINE_WORTH_SHARE = 0.97
+"""Numbers of these parts have to make the mean time to rest shorter to this share of that of waiting."""
 
 
 class LongStopError(PlanError):
@@ -82,6 +89,8 @@ def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
         codes = _refined(tree, limits, codes)
     for kind in (HOLD, FAULT):
         codes[_better_without(_with_codes(tree.program, codes), kind, tree.groups), kind] = 0
+    if not terms.quick:
+        codes = _waiting_less(tree, limits, codes)
     return _checked(with_bounds(_with_codes(*tree.joined(codes))), terms)
 
 
@@ -159,6 +168,66 @@ def _refined(
     without = ~_gains(tree.program, whole[parents], codes, parents)[parents]
     codes[without] = whole[parents][without]
     return codes
+
+
+def _waiting_less(
+    tree: _Halves, limits: Sequence[StopLimits], codes: NDArray[np.uint8]
+) -> NDArray[np.uint8]:
+    """Codes (M, 2, 3) of a program whose pieces are halved to short parts where a hold waits for long: in a bend that
+    uses its limits fully a brake may begin at some instants only. Parts get numbers for holds where these are better
+    than to wait, and where numbers for a fault stop are found that may follow them.
+    """
+    waits = _long_waits(tree.program, limits[HOLD], codes)
+    longest_s = max(FINE_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_FINE_PARTS)
+    while True:
+        seconds = np.ldexp(tree.program.pieces.duration_q32_s.astype(np.float64), -32)
+        chosen = waits & (seconds > longest_s) & tree.long_enough()
+        if not chosen.any():
+            break
+        codes, waits = np.repeat(codes, 1 + chosen, axis=0), np.repeat(waits, 1 + chosen)
+        tree.halve(chosen)
+    before = codes.copy()
+    _search_round(tree.program, limits, codes, np.stack((~waits, np.ones_like(waits)), axis=1))
+    lost = (codes[:, FAULT, DECELERATION] == 0) & (before[:, FAULT, DECELERATION] != 0)
+    codes[lost] = before[lost]
+    without = waits & ~_better_than_waiting(_with_codes(tree.program, codes), limits[HOLD])
+    codes[without] = before[without]
+    return codes
+
+
+def _better_than_waiting(program: Program, limits: StopLimits) -> NDArray[np.bool_]:
+    """Parts (M,) whose numbers for holds make the mean time to rest shorter to FINE_WORTH_SHARE of that of the way on
+    into the next part; or shorter at all, where they are those of the next part.
+    """
+    codes = program.stops.codes[:, HOLD]
+    mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes)
+    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
+    next_s = 0.0
+    for i in range(duration_s.size - 1, -1, -1):
+        same = i + 1 < out.size and out[i + 1] and np.array_equal(codes[i], codes[i + 1])
+        waiting_s = 0.5 * float(duration_s[i]) + next_s
+        given = codes[i, DECELERATION] > 0
+        out[i] = given and mean_s[i] <= (1.0 if same else FINE_WORTH_SHARE) * waiting_s
+        next_s = mean_s[i] if out[i] else duration_s[i] + next_s
+    return out
+
+
+def _long_waits(
+    program: Program, limits: StopLimits, codes: NDArray[np.uint8]
+) -> NDArray[np.bool_]:
+    """Pieces (M,) in which a hold may wait for more than LONGEST_WAIT_S; not those at the end of the program, before
+    which no brake fits. A hold also waits in a piece whose numbers gain nothing: where the program brakes hard by
+    itself, no brake with a lower jerk of release can begin.
+    """
+    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes[:, HOLD])
+    ahead_s = 0.5 * seconds + np.append(mean_s[1:] + 0.5 * seconds[1:], 0.0)
+    brakes = (codes[:, HOLD, DECELERATION] > 0) & (mean_s < ahead_s)
+    out: NDArray[np.bool_] = np.zeros(seconds.size, dtype=np.bool_)
+    for low, high in pairwise((-1, *np.flatnonzero(brakes).tolist())):
+        out[low + 1 : high] = seconds[low + 1 : high].sum() > LONGEST_WAIT_S
+    return out
 
 
 def _gains(

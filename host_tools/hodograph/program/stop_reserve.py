@@ -3,7 +3,8 @@
 docs/theory/toolpath-fitting.md section 8.
 
 A plan that uses the limits of the axes fully, all along a winding path, leaves a brake nothing to begin with. Short
-stretches with a reserve, some tenths of a second apart, cost little and bound the time that a stop waits.
+stretches with a reserve, some tenths of a second apart, cost little and bound the time that a stop waits. The feed
+override may not use the reserve (feed/override.py).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feed import ReserveZone
+from .check_stops import WINDOW, WINDOW_TICKS, own_bounds
 from .image import Program
 from .stops import DECELERATION, FAULT
 
@@ -49,7 +51,20 @@ STEPS = (
 """One round after the other, where stops are late in places."""
 
 EVERYWHERE = (0.16, 0.25, 0.4, 0.6)
-"""Shares of all limits that are left free, one after the other, where this does not help."""
+"""Shares of all limits that are left free, one after the other: everywhere in a plan that shows where stops may begin
+then, and around such places in the plan that is used."""
+
+SPREADS = (1.0, 3.0)
+"""Times the usual length: zones around places where shorter ones have not been enough."""
+
+_BEFORE_S, _BEHIND_S = 0.03, 0.015
+"""A zone around a place begins so long before it and ends so long behind it, in the time of the lowered plan."""
+
+_USED_SHARE = 0.96
+"""Of the longest stop: what the wait for a place and the stop from there may take."""
+
+_OWN_SHARE = 0.4
+"""Of that time: places that need no zone are taken if they are so far from the next one."""
 
 _MOST_LATE = 0.3
 
@@ -70,21 +85,19 @@ def late_mostly(program: Program, stop_time_s: float) -> bool:
 
 
 def useful_steps(
-    program: Program, stop_time_s: float, steps: Sequence[ReserveStep | float]
-) -> list[ReserveStep | float]:
+    program: Program, stop_time_s: float, steps: Sequence[ReserveStep]
+) -> list[ReserveStep]:
     """Which of the remaining steps to try next, chosen by how late the stops are."""
     if late_mostly(program, stop_time_s):
-        return [step for step in steps if isinstance(step, float)]
+        return []
     if program.stops.worst(FAULT).time_s > _TOO_LATE * stop_time_s:
-        return [step for step in steps if isinstance(step, float) or step.time_s == inf]
+        return [step for step in steps if step.time_s == inf]
     return list(steps)
 
 
 def reserve_zones(program: Program, stop_time_s: float, step: ReserveStep) -> list[ReserveZone]:
     """Zones in all stretches of a program from which a fault stop may take longer than `stop_time_s`."""
-    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
-    t = np.concatenate((np.zeros(1), np.cumsum(seconds)))
-    s = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    t, s = _axes(program)
     late = late_pieces(program, stop_time_s)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], late, [False])).astype(np.int8)))
     begin, end = t[edges[0::2]], t[edges[1::2]]
@@ -113,3 +126,94 @@ def _moved(centre: Real, known: Real, most_s: float) -> Real:
     before, after = known[at - 1], known[np.minimum(at, known.size - 1)]
     nearest = np.where(np.abs(before - centre) <= np.abs(after - centre), before, after)
     return np.asarray(np.where(np.abs(nearest - centre) <= most_s, nearest, centre))
+
+
+@dataclass(frozen=True, eq=False)
+class StopPlaces:
+    """Places of a program where a fault stop that has waited begins at once, in their order.
+
+    begin_s, end_s    program times (n,): the first piece that has stop parameters, and the end of the last one that
+                      the controller may choose then; both ascend
+    begin_mm, end_mm  the same in arc length
+    bound_s           longest stop from there
+    """
+
+    begin_s: Real
+    end_s: Real
+    begin_mm: Real
+    end_mm: Real
+    bound_s: Real
+
+
+def stop_places(program: Program) -> StopPlaces:
+    """Pieces that have stop parameters, and so have all that may be chosen in their place (check_stops.WINDOW)."""
+    own_s, _, waits = own_bounds(program, FAULT)
+    given = (program.stops.codes[:, FAULT, DECELERATION] > 0) & (waits == 0.0)
+    time_s, place_mm = _axes(program)
+    count = own_s.size
+    # A piece counts that begins less than the window behind the end of the first one.
+    behind_s = time_s[1:] + WINDOW_TICKS * program.period_us * 1e-6
+    last = np.minimum(np.searchsorted(time_s[:-1], behind_s), np.arange(count) + 1 + WINDOW)
+    lacking = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(~given)))
+    first = np.flatnonzero(lacking[last] == lacking[:-1])
+    last = last[first]
+    worst_s = np.array(
+        [own_s[i:k].max() for i, k in zip(first.tolist(), last.tolist(), strict=True)]
+    )
+    return StopPlaces(time_s[first], time_s[last], place_mm[first], place_mm[last], worst_s)
+
+
+def zones_at_places(
+    program: Program, lowered: Program, stop_time_s: float, share: float, spread: float
+) -> list[ReserveZone]:
+    """Zones around places where stops may begin in a program `lowered`, all of whose limits are lower by `share`, such
+    that one comes soon enough after each place of `program`. Its own places need no zone. Where neither has one, none
+    is returned.
+    """
+    own, other = stop_places(program), stop_places(lowered)
+    own_time, own_place = _axes(program)
+    begin_s = np.interp(other.begin_mm, own_place, own_time)
+    end_s = np.interp(other.end_mm, own_place, own_time)
+    zones: list[ReserveZone] = []
+    next_s, longest_s = float(own_time[-1]), _USED_SHARE * stop_time_s
+    bound_s = 0.0
+    while next_s > longest_s - bound_s:
+        room_s = longest_s - bound_s
+        k = int(np.searchsorted(own.end_s, next_s - room_s))
+        if k < own.end_s.size and own.begin_s[k] < next_s - _OWN_SHARE * room_s:
+            next_s, bound_s = float(own.begin_s[k]), float(own.bound_s[k])
+            continue
+        k = int(np.searchsorted(end_s, next_s - room_s))
+        if k < end_s.size and begin_s[k] < next_s - _HAIR_S:
+            next_s, bound_s = float(begin_s[k]), float(other.bound_s[k])
+            zones.append(_zone_around(lowered, other, k, share, spread))
+            continue
+        # Stops are late in any case: on with the nearest place before.
+        near = [
+            (float(at_s[n - 1]), float(places.bound_s[n - 1]))
+            for at_s, places in ((own.begin_s, own), (begin_s, other))
+            if (n := int(np.searchsorted(at_s, next_s - _HAIR_S))) > 0
+        ]
+        if not near:
+            break
+        next_s, bound_s = max(near)
+    return zones
+
+
+_HAIR_S = 1e-4
+
+
+def _axes(program: Program) -> tuple[Real, Real]:
+    """Program times and arc lengths (M + 1,) of the ends of pieces."""
+    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    ends = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    return np.concatenate((np.zeros(1), np.cumsum(seconds))), ends
+
+
+def _zone_around(
+    lowered: Program, places: StopPlaces, k: int, share: float, spread: float
+) -> ReserveZone:
+    time_s, place_mm = _axes(lowered)
+    ends_s = (places.begin_s[k] - spread * _BEFORE_S, places.end_s[k] + spread * _BEHIND_S)
+    low_mm, high_mm = np.interp(ends_s, time_s, place_mm).tolist()
+    return ReserveZone(low_mm, high_mm, share)

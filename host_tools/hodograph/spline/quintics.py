@@ -18,6 +18,26 @@ def halved(extra: Real) -> tuple[Real, Real]:
     return np.stack(left, axis=-1), np.stack(right[::-1], axis=-1)
 
 
+def part_of_quintics(extra: Real, low: Real, high: Real) -> Real:
+    """Quintics (n, E, 6) on [low, high] (n,) in their own [0, 1], by de Casteljau; low is below 1."""
+    low, high = low[:, None], high[:, None]
+    return _before(_behind(extra, low), (high - low) / (1.0 - low))
+
+
+def _behind(extra: Real, xi: Real) -> Real:
+    """Quintics (…, 6) on [xi, 1]; xi (…,)."""
+    kept, rest = [extra[..., -1]], extra
+    for _ in range(5):
+        rest = rest[..., :-1] * (1.0 - xi)[..., None] + rest[..., 1:] * xi[..., None]
+        kept.append(rest[..., -1])
+    return np.stack(kept[::-1], axis=-1)
+
+
+def _before(extra: Real, xi: Real) -> Real:
+    """Quintics (…, 6) on [0, xi]; xi (…,)."""
+    return _behind(extra[..., ::-1], 1.0 - xi)[..., ::-1]
+
+
 def extra_frames(extra: Real, xi: Real, speed: tuple[Real, Real, Real]) -> tuple[Real, Real, Real]:
     """First three derivatives (E, …) by arc length of quintics (…, E, 6) at xi (…,).
 

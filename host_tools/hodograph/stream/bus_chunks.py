@@ -98,8 +98,8 @@ def curve_of(program: Program) -> Curve:
 
 def _drawn(program: Program) -> tuple[Floats, Floats]:
     """Arc lengths (n,) of a program and the points there, (n, 2) or (n, 3) in mm."""
-    ways = np.linspace(0.0, program.length_mm, _POINTS)
-    return ways, points_at(curve_of(program), ways)
+    arc_mm = np.linspace(0.0, program.length_mm, _POINTS)
+    return arc_mm, points_at(curve_of(program), arc_mm)
 
 
 class JobPoints:
@@ -114,8 +114,8 @@ class JobPoints:
     def add(self, chunk: Chunk) -> None:
         """The points of another chunk, in place of the tail before it; the first of another job begins anew."""
         header = chunk.header
-        ways, points = _drawn(chunk.program)
-        arcs = ways + header.job_start_q40 * 2.0**-40
+        arc_mm, points = _drawn(chunk.program)
+        arcs = arc_mm + header.job_start_q40 * 2.0**-40
         if header.job != self._job or header.first:
             self._job, self._stride = header.job, 1
             self._arcs, self._points = np.zeros(0), np.zeros((0, points.shape[1]))

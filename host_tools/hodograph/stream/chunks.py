@@ -87,13 +87,13 @@ class JobPlace:
 
     rest       what happens at rest before it
     sequence   of its first chunk
-    way_q40    arc length of the job at its start
+    arc_q40    arc length of the job at its start
     point_q40  (A,) where the section before it ends
     """
 
     rest: Rest
     sequence: int
-    way_q40: int
+    arc_q40: int
     point_q40: NDArray[np.int64]
 
 
@@ -103,13 +103,13 @@ class PlannedChunk:
 
     new_s     motion from the joint before to its own joint; of the last one, to the end
     line      source line at its own joint
-    way_q40   arc length of the section at its own joint
+    arc_q40   arc length of the section at its own joint
     """
 
     chunk: Chunk
     new_s: float
     line: int
-    way_q40: int
+    arc_q40: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +231,8 @@ class SectionChunks:
         self._searched: _Searched | None = None
         self._tail_bytes = 0
         self._rested_s = 0.0
+        self.rest_lines: list[int] = []
+        """Source lines at which the axes come to rest although the section goes on; grows with the chunks."""
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -247,6 +249,9 @@ class SectionChunks:
                     break
                 yield planned
                 first, joints = joints[used - 1], joints[used:]
+            else:
+                if window.rests and not self._feed.at_end(window):
+                    self.rest_lines.append(self._feed.path.line_at(window.stretch.end_q40))
             if self._last is not None:
                 self._feed.forget(self._last.first_segment)
 
@@ -260,6 +265,7 @@ class SectionChunks:
         if last.end_q40 == int(path.start_q40[-1]) and not self._feed.read_more():
             return False
         self._rested_s += last.tail.total_q32_s * 2.0**-32
+        self.rest_lines.append(path.line_at(last.end_q40))
         self._kept = self._kept.with_new(last.tail, last.tail_codes)
         self._last = replace(last, tail=taken(last.tail, slice(0, 0)))
         self._feed.rest_at(last.end_q40, last_s(last.tail, len(last.tail)))
@@ -324,8 +330,8 @@ class SectionChunks:
         last = self._last
         assert last is not None
         header = self._in_job(last.header)
-        way_q40 = header.job_start_q40 - last.header.job_start_q40 + last.end_q40
-        return JobPlace(Rest(), header.sequence + 1, way_q40, self._feed.path.end_point_q40)
+        arc_q40 = header.job_start_q40 - last.header.job_start_q40 + last.end_q40
+        return JobPlace(Rest(), header.sequence + 1, arc_q40, self._feed.path.end_point_q40)
 
     def _in_job(self, header: ChunkHeader) -> ChunkHeader:
         """A header that counts from the start of the section, as it is in the job."""
@@ -339,7 +345,7 @@ class SectionChunks:
             first=False,
             rest=place.rest if header.first else None,
             sequence=header.sequence + place.sequence,
-            job_start_q40=header.job_start_q40 + place.way_q40,
+            job_start_q40=header.job_start_q40 + place.arc_q40,
         )
 
     def _size_kept(self, window: Window, joint: int) -> int:
@@ -455,6 +461,7 @@ class SectionChunks:
             start_q40=path.start_q40[first:end] - base,
             point_q40=path.point_q40[:, first:end],
             a_q44=path.a_q44[:, first:end],
+            extra_q40=path.extra_q40[:, first:end],
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=int(pieces.start_q40[0]) != self._feed.begin_q40,

@@ -21,6 +21,7 @@ from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
 from ..spline import PHSpline, coordinates
+from ..spline.quintics import part_of_quintics
 from ..spline.spatial import SpatialPHSpline
 from ..spline.splitting import cut_segments, part_of
 
@@ -84,15 +85,22 @@ def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
     part = slice(first, last)
     if isinstance(curve, PHSpline):
         return PHSpline(curve.origin[part].copy(), curve.w[part].copy(), False)
-    return SpatialPHSpline(curve.origin[part].copy(), curve.preimage[part].copy(), False)
+    return SpatialPHSpline(
+        curve.origin[part].copy(), curve.preimage[part].copy(), False, curve.extra[part].copy()
+    )
 
 
 def joined(curves: Sequence[Curve]) -> Curve:
-    """Curves one after the other, all of the same kind."""
+    """Curves one after the other, all of the same kind and with the same axes."""
     origin = np.concatenate([one.origin for one in curves])
     if isinstance(curves[0], PHSpline):
         return PHSpline(origin, np.concatenate([one.w for one in curves]), False)  # type: ignore[union-attr]
-    return SpatialPHSpline(origin, np.concatenate([one.preimage for one in curves]), False)  # type: ignore[union-attr]
+    return SpatialPHSpline(
+        origin,
+        np.concatenate([one.preimage for one in curves]),  # type: ignore[union-attr]
+        False,
+        np.concatenate([one.extra for one in curves]),  # type: ignore[union-attr]
+    )
 
 
 def blocks_from(
@@ -144,25 +152,32 @@ def _behind(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
 
 
 def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
-    """A curve without its first part, and how many whole segments that has. Without extra axes."""
+    """A curve without its first part, and how many whole segments that has."""
     segment, xi = curve.locate(begin_mm)
     first, x = int(segment), float(xi)
     if isinstance(curve, PHSpline):
         start = np.append(curve.position(first, x), curve.origin[first + 1 :])
         return first, PHSpline(start, _behind_at(curve.w[first:], x), False)
     origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
-    return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False)
+    begin = part_of_quintics(curve.extra[first : first + 1], np.array([x]), np.ones(1))
+    extra = np.concatenate((begin, curve.extra[first + 1 :]))
+    return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False, extra)
 
 
 def with_joints(curve: Curve, at_mm: Real) -> Curve:
-    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint. Without extra axes."""
+    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint."""
     if not at_mm.size:
         return curve
     segment, xi = curve.locate(at_mm)
     origin: Any = np.insert(curve.origin, segment + 1, curve.position(segment, xi), axis=0)
     if isinstance(curve, PHSpline):
         return PHSpline(origin, cut_segments(curve.w, segment, xi)[2], False)
-    return SpatialPHSpline(origin, cut_segments(curve.preimage, segment, xi)[2], False)
+    owner, begin, preimage = cut_segments(curve.preimage, segment, xi)
+    if not curve.extra_axes:
+        return SpatialPHSpline(origin, preimage, False)
+    end = np.where(np.append(np.diff(owner) == 0, False), np.append(begin[1:], 1.0), 1.0)
+    extra = part_of_quintics(curve.extra[owner], begin, end)
+    return SpatialPHSpline(origin, preimage, False, extra)
 
 
 def _behind_at(w: Any, x: float) -> Any:
@@ -181,7 +196,7 @@ class StreamPath:
 
     passed     segments of the section that are no longer here
     start_q40  (N + 1,) of the segments and of the end
-    point_q40  (A, N), a_q44 (2 or 4, N, 3): as in a program
+    point_q40  (A, N), a_q44 (2 or 4, N, 3), extra_q40 (A - 3, N, 5): as in a program
     events     outputs that switch on the path; arc lengths from the start of the section
     """
 
@@ -234,12 +249,15 @@ class StreamPath:
         self._append_events(block.events, int(made.start_q40[-1]))
         if self._curve is None:
             self._curve, self.point_q40, self.a_q44 = block.curve, point, made.a_q44
+            self.extra_q40 = made.extra_q40
         else:
             self._curve = joined((self._curve, block.curve))
             self.point_q40 = np.concatenate((self.point_q40, point), axis=1)
             self.a_q44 = np.concatenate((self.a_q44, made.a_q44), axis=1)
+            self.extra_q40 = np.concatenate((self.extra_q40, made.extra_q40), axis=1)
         arcs = segment_arcs(made.a_q44[:, -1:])
-        self._end_point = point[:, -1] + np.array([arc_to_q40(w)[0] for w in arcs[:-1]])
+        moved = [int(arc_to_q40(one)[0]) for one in arcs[:-1]]
+        self._end_point = point[:, -1] + np.array([*moved, *made.extra_q40[:, -1:, -1].ravel()])
         if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
             raise PlanError(
                 f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"
@@ -292,6 +310,7 @@ class StreamPath:
         self._curve = sliced(self.curve, count)
         self.start_q40 = self.start_q40[count:]
         self.point_q40, self.a_q44 = self.point_q40[:, count:], self.a_q44[:, count:]
+        self.extra_q40 = self.extra_q40[:, count:]
         self.feed_mm_s, self.line = self.feed_mm_s[count:], self.line[count:]
         self.events = self.events[self._events_until(int(self.start_q40[0]) - 1) :]
         return passed_mm

@@ -18,7 +18,7 @@ from filelock import lock_descriptor
 
 from ..errors import InputError
 
-VERSION = 2
+VERSION = 3
 
 _BESIDE_Q40 = 1 << 20
 """2^-20 mm: so near before the start of a section the machine rests at it."""
@@ -38,7 +38,7 @@ class Entry:
     """The job and how far it has come.
 
     files, machine, options  as on the command line
-    section, way_q40         the section in motion, and arc length in it that was reported last
+    section, arc_q40         the section in motion, and arc length in it that was reported last
     committed_q40            arc length of the job in the controller up to which chunks were sent
     job                      number of the job in the controller
     job0                     number that it would have if it began with section 0
@@ -52,7 +52,7 @@ class Entry:
     options: dict[str, Any]
     job0: int
     section: int = 0
-    way_q40: int = 0
+    arc_q40: int = 0
     committed_q40: int = 0
     done: bool = False
     first: int = 0
@@ -63,13 +63,13 @@ class Entry:
         """Number of the job in the controller."""
         return self.job0 + self.first
 
-    def place_at(self, way_q40: int) -> tuple[int, int]:
+    def place_at(self, arc_q40: int) -> tuple[int, int]:
         """Section, and arc length in it, at an arc length of the controller's job."""
         section, start_q40 = self.section, 0
         for number, begin_q40 in self.starts:
-            if begin_q40 <= way_q40 + _BESIDE_Q40:
+            if begin_q40 <= arc_q40 + _BESIDE_Q40:
                 section, start_q40 = number, begin_q40
-        return section, max(way_q40 - start_q40, 0)
+        return section, max(arc_q40 - start_q40, 0)
 
 
 def mark(file: Path) -> FileMark:
@@ -169,7 +169,7 @@ def load(file: Path) -> Entry:
 
 def _check(entry: Entry) -> None:
     """Raises KeyError and TypeError: something is missing, or is not what it should be."""
-    whole = (entry.job0, entry.section, entry.way_q40, entry.committed_q40, entry.first)
+    whole = (entry.job0, entry.section, entry.arc_q40, entry.committed_q40, entry.first)
     if not all(isinstance(one, int) for one in whole) or not isinstance(entry.machine, str):
         raise TypeError
     if not isinstance(entry.options["tolerance_mm"], int | float):

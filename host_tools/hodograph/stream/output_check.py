@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Whether a machine has the outputs that a job switches, and whether the job turns axes: found before anything moves.
+"""Whether a machine has the outputs that a job switches, and the axes that it turns: found before anything moves.
 
-A toolpath is read part by part while the machine moves, so an output that the machine does not have, or a move of A,
-B or C, would be found in motion. A scan of the text of G-code costs far less than reading it. It knows numbers only:
-where it is not sure that all is well (an expression, a number that the machine does not have, a place of A, B or C that
-is not 0), the file is read once as it will be read in motion, which gives the message. So the scan may be wrong to one
-side only.
+A toolpath is read part by part while the machine moves, so an output or an axis that the machine does not have would be
+found in motion. A scan of the text of G-code costs far less than reading it. It knows numbers only: where it is not
+sure that all is well (an expression, the number of an output that the machine does not have, a place that is not 0 of
+an axis that it does not have), the file is read once as it will be read in motion, which gives the message. So the scan
+may be wrong to one side only.
 """
 
 from __future__ import annotations
@@ -14,27 +14,26 @@ import re
 from pathlib import Path
 
 from ..config import Machine, load_paths
-from ..config.outputs import Channel, Outputs
+from ..config.outputs import Channel
 from ..errors import InputError
-from ..job import toolpath_commands
+from ..job import missing_axes, no_such_axis, toolpath_commands
 from ..job_outputs import EventMaker, is_output
 from ..names import STANDARD_INPUT, is_toolpath
 from ..path_outputs import require_output
 from ..toolpath.files import ReadOptions, is_gcode
-from ..toolpath.moves import ORIGIN, Move
+from ..toolpath.moves import AXES, Move
 
 _COMMENT = re.compile(rb"\([^)]*\)|;.*|\s")
 _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 _LITERAL = re.compile(rb"/?\d*(?:[A-Z]" + _NUMBER + rb")*%?")
 _WORD = re.compile(rb"([A-Z])(" + _NUMBER + rb")")
-_TURNING = b"ABC"
 _MOST_SEEN = 1000
 _DIGITAL, _ANALOGUE = (62.0, 63.0, 64.0, 65.0), (67.0, 68.0)
 
 
 def require_outputs(file: Path, machine: Machine, reading: ReadOptions) -> None:
     """Raises InputError, naming the line: a file switches an output that the machine does not have, or to a value that
-    is too large; or it turns A, B or C, which no chunk does. Standard input cannot be read ahead.
+    is too large; or it turns an axis that the machine does not have. Standard input cannot be read ahead.
     """
     if str(file) == STANDARD_INPUT:
         return
@@ -43,41 +42,39 @@ def require_outputs(file: Path, machine: Machine, reading: ReadOptions) -> None:
             for one in listed.file.outputs:
                 require_output(listed.file, one, machine)
         return
-    if is_gcode(file) and not _Scan(machine.outputs).is_sure(file):
-        _read(file, machine.outputs, reading)
+    if is_gcode(file) and not _Scan(machine).is_sure(file):
+        _read(file, machine, reading)
 
 
-def require_no_turning(file: Path | str, move: Move) -> None:
-    """Raises InputError, naming the line: a move turns A, B or C."""
-    if move.end[3:] != ORIGIN[3:]:
-        raise InputError(
-            f"{file}:{move.line}: the move turns A, B or C, and stream takes x, y and z only: use run, "
-            "with exact stops (G61.1) where a section does not fit the controller"
-        )
-
-
-def _read(file: Path, outputs: Outputs | None, reading: ReadOptions) -> None:
+def _read(file: Path, machine: Machine, reading: ReadOptions) -> None:
     """Reads all commands. Raises InputError."""
+    outputs, missing = machine.outputs, missing_axes(machine)
     maker = None if outputs is None else EventMaker(outputs, file)
     for command in toolpath_commands(file, reading, []):
         if isinstance(command, Move):
-            require_no_turning(file, command)
+            turned = [name for name in missing if command.end[AXES.index(name)] != 0.0]
+            if turned:
+                raise no_such_axis(file, command.line, turned[0], machine)
         elif maker is not None and is_output(command, outputs):
             maker.changed(0, [command])
 
 
 class _Scan:
-    """What the text of a file is sure to do with outputs and with A, B and C."""
+    """What the text of a file is sure to do with outputs, and with those of A, B and C that the machine lacks."""
 
-    def __init__(self, outputs: Outputs | None) -> None:
+    def __init__(self, machine: Machine) -> None:
+        outputs = machine.outputs
+        self._missing = missing_axes(machine).upper().encode()
         self._any = outputs is not None
         own = () if outputs is None else outputs.channels
         self._digital = {float(one.number) for one in own if one.digital}
         self._analogue = {float(one.number): one for one in own if not one.digital}
         self._speed = None if outputs is None else outputs.codes.speed
         self._seen: set[bytes] = set()
-        letters = _TURNING + (b"M" if self._any else b"") + (b"" if self._speed is None else b"S")
-        self._letters = re.compile(b"[" + letters + letters.lower() + b"]")
+        letters = (
+            self._missing + (b"M" if self._any else b"") + (b"" if self._speed is None else b"S")
+        )
+        self._letters = re.compile(b"[" + letters + letters.lower() + b"]" if letters else rb"(?!)")
 
     def is_sure(self, file: Path) -> bool:
         """Whether the machine has all outputs of the file. Raises InputError: it cannot be read."""
@@ -97,7 +94,7 @@ class _Scan:
             return False
         words = [(name, float(value)) for name, value in _WORD.findall(text)]
         value = dict(words)
-        sure = not any(number for name, number in words if name in _TURNING)
+        sure = not any(number for name, number in words if name in self._missing)
         if self._any:
             sure = sure and all(self._has(number, value) for name, number in words if name == b"M")
         sure = sure and self._fits(self._speed, value.get(b"S"))

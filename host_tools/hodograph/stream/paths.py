@@ -46,10 +46,6 @@ class _BegunPipeline(Pipeline):
         found = super().found_spline
         if self.begin_mm <= 0.0:
             return found
-        if found.spline.axes > 3:
-            raise PlanError(
-                f"{self.file.file}: a path with extra axes cannot go on in its middle: stream the job from its start"
-            )
         curve = curve_behind(found.spline, self.begin_mm)[1]
         if isinstance(curve, PHSpline):  # two branches, so that each has the type of its curve
             return FoundSpline(curve, 0)
@@ -105,8 +101,8 @@ class PathsJob:
             yield made
             header = made.chunk.header
             program = made.chunk.program
-            way_q40 = header.job_start_q40 + program.length_q40
-            place = JobPlace(Rest(), header.sequence + 1, way_q40, end_point_q40(program))
+            arc_q40 = header.job_start_q40 + program.length_q40
+            place = JobPlace(Rest(), header.sequence + 1, arc_q40, end_point_q40(program))
 
     def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
         length_mm = Pipeline(listed.file, self.machine).curve.length_mm
@@ -130,7 +126,7 @@ class PathsJob:
             last=last,
             job=job,
             sequence=0 if place is None else place.sequence,
-            job_start_q40=begin_q40 if place is None else place.way_q40,
+            job_start_q40=begin_q40 if place is None else place.arc_q40,
             line=number + 1,
             rest=None if place is None else (rest if self.stops else Rest(listed.dwell_ms)),
             joined=not last,

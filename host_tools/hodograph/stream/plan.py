@@ -60,7 +60,27 @@ class Place:
     """A place in a job: section, counted from 0 over all files, and arc length in it in 2^-40 mm."""
 
     section: int = 0
-    way_q40: int = 0
+    arc_q40: int = 0
+
+
+@dataclass(frozen=True)
+class PlanRests:
+    """Rests of the axes that no command asks for: where no chunk that fits goes on in motion, or no feed.
+
+    first  file and line of the first one, "part.ngc:12"; None: there is none
+    """
+
+    count: int = 0
+    first: str | None = None
+
+    def behind(self, file: Path, line: int) -> PlanRests:
+        """With another one."""
+        return PlanRests(self.count + 1, self.first or f"{file}:{line}")
+
+    @property
+    def text(self) -> str:
+        """For the user."""
+        return str(self.count) if self.first is None else f"{self.count}, the first at {self.first}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +110,7 @@ class JobPlan:
 
     notes          of reading and fitting; grows
     section_count  sections planned so far
+    rests          of the chunks planned so far
     """
 
     def __init__(
@@ -113,6 +134,7 @@ class JobPlan:
         self.notes: list[str] = []
         self.after: tuple[Command, ...] = ()
         self.section_count = 0
+        self.rests = PlanRests()
         self._store = ChunkStore()
         self._motion_s = array("d", [0.0])
         self._waits_s = array("d", [0.0])
@@ -304,7 +326,7 @@ class JobPlan:
             reader = self._reader(file)
             carried, switched = self.after, SwitchedOutputs()
             for section in reader.sections():
-                begin_q40 = self._begin.way_q40 if number == self._begin.section else 0
+                begin_q40 = self._begin.arc_q40 if number == self._begin.section else 0
                 blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40, switched)
                 block = next(blocks, None) if number >= self._begin.section else None
                 if block is not None:
@@ -316,7 +338,7 @@ class JobPlan:
                     else:
                         place = replace(place, rest=rest_of(before, stops=self.stops))
                         made = PlannedSection(
-                            number, file, section.first_line, before, place.way_q40, place.rest
+                            number, file, section.first_line, before, place.arc_q40, place.rest
                         )
                     chunks = SectionChunks(
                         self._job.machine,
@@ -328,8 +350,11 @@ class JobPlan:
                         place,
                         partial(self._goes_on, section),
                     )
-                    last = False
+                    last, counted = False, 0
                     for planned in chunks.chunks():
+                        for line in chunks.rest_lines[counted:]:
+                            self.rests = self.rests.behind(file, line)
+                        counted = len(chunks.rest_lines)
                         last = planned.chunk.header.last
                         yield made, planned.chunk, planned.new_s
                     place = None if last else chunks.end
@@ -353,7 +378,7 @@ class JobPlan:
         """The paths of a path file, the first of which is section `number`."""
         begin = self._begin
         first = max(begin.section - number, 0)
-        begin_q40 = begin.way_q40 if begin.section >= number else 0
+        begin_q40 = begin.arc_q40 if begin.section >= number else 0
         job = PathsJob(file, self._job.machine, self._number + number, self._allowed(), self.stops)
         for made in job.chunks(first, begin_q40):
             header = made.chunk.header

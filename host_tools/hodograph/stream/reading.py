@@ -33,7 +33,6 @@ from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, S
 from ..toolpath.fit.stations import turns
 from ..toolpath.moves import ORIGIN, Command, Move
 from .geometry import Block, sliced, with_joints
-from .output_check import require_no_turning
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -62,7 +61,7 @@ _SHORT_SHARE = 0.5
 class _Windows(Divider):
     """A divider that cuts sections which become too long to be fitted at once."""
 
-    window: int = FIRST_CHORDS
+    window: int = field(default_factory=lambda: FIRST_CHORDS)
     searched: int = 0
 
     @property
@@ -71,8 +70,11 @@ class _Windows(Divider):
         return self.moved and self.builder.length_mm >= SHORTEST_MM
 
     def _move(self, move: Move) -> None:
-        require_no_turning(self.file, move)
         super()._move(move)
+        if self.stands_at is not None:
+            raise InputError(
+                f"{self.file}:{move.line}: the move turns A, B or C alone, which stream does not take: use run"
+            )
         while self.builder.count > self.window + self.searched + _SEARCHED:
             chord, turn = _straightest(self.builder, self.window + self.searched, _SEARCHED)
             self.searched += _SEARCHED
@@ -93,10 +95,22 @@ def _straightest(builder: ReferenceBuilder, first: int, count: int) -> tuple[int
     if not length.all():
         return first, 0.0
     turn = turns(point)
+    if builder.turns:
+        turn = _turns_of_all(np.hstack((point, builder.angles(first - 1, first + count + 2))))
     cost = turn[1:-2] + turn[2:-1]
     cost[length[1:-1] < _SHORT_SHARE * np.median(length)] = np.inf
     at = int(np.argmin(cost))
     return first + at, float(cost[at])
+
+
+def _turns_of_all(point: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Change of direction (n,) at points (n, 6) of all axes, 0 at the ends; rad. A degree counts as a mm, as in
+    tolerances.
+    """
+    leg = np.diff(point, axis=0)
+    leg /= np.linalg.norm(leg, axis=1)[:, None]
+    apart, along = (np.linalg.norm(leg[1:] + sign * leg[:-1], axis=1) for sign in (-1.0, 1.0))
+    return np.pad(2.0 * np.arctan2(apart, along), 1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import SPACE_AXES, load_paths
+from ..config import load_paths
 from ..errors import InputError
 from ..names import is_toolpath
 from ..pipeline import Pipeline
+from ..spline import PHSpline
 from .geometry import Block, Curve, points_at
 from .journal import Entry
 from .plan import JobFiles, Place
@@ -43,14 +44,13 @@ class Nearest:
 def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Nearest:
     """The place nearest to the axes between the one that the journal has last and the end of what had been sent.
 
-    at_mm  (A,) of the axes that the path moves, machine coordinates; those behind x, y, z do not count
+    at_mm  (A,) of the axes that the path moves, machine coordinates; a degree counts as a mm
     Raises InputError and PlanError as reading the job does.
     """
     starts = dict(entry.starts) or {entry.section: 0}
-    low_q40 = starts.get(entry.section, 0) + entry.way_q40
-    drawn = min(len(at_mm), SPACE_AXES)
-    offset_mm = np.array(job.machine.offset_mm[:drawn])
-    target = np.array(at_mm[:drawn]) - offset_mm
+    low_q40 = starts.get(entry.section, 0) + entry.arc_q40
+    offset_mm = np.array(job.machine.offset_mm[: len(at_mm)])
+    target = np.array(at_mm) - offset_mm
     found: list[Nearest] = []
     for number, blocks in _sections(job):
         if number > max(starts):
@@ -63,9 +63,9 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
                 low = (low_q40 - start_q40) * 2.0**-40 - _BESIDE_MM - begin_mm
                 high = (entry.committed_q40 - start_q40) * 2.0**-40 + _BESIDE_MM - begin_mm
                 if high > 0.0 and low < length_mm:
-                    ways = _nearest_ways(block.curve, target, max(low, 0.0), min(high, length_mm))
+                    arcs = _nearest_arcs(block.curve, target, max(low, 0.0), min(high, length_mm))
                     found += [
-                        _found(block, way, begin_mm, number, target, offset_mm) for way in ways
+                        _found(block, arc, begin_mm, number, target, offset_mm) for arc in arcs
                     ]
             begin_mm += length_mm
     if not found:
@@ -97,19 +97,19 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block]]]:
 
 
 def _found(
-    block: Block, way_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
+    block: Block, arc_mm: float, begin_mm: float, number: int, target: Real, offset_mm: Real
 ) -> Nearest:
-    point = points_at(block.curve, np.array([way_mm]))[0, : target.size]
-    segment, _ = block.curve.locate(way_mm)
+    point = _places(block.curve, np.array([arc_mm]))[0]
+    segment, _ = block.curve.locate(arc_mm)
     return Nearest(
-        Place(number, round((begin_mm + way_mm) * 2.0**40)),
+        Place(number, round((begin_mm + arc_mm) * 2.0**40)),
         int(block.line[int(segment)]),
         tuple((point + offset_mm).tolist()),
         float(np.linalg.norm(point - target)),
     )
 
 
-def _nearest_ways(curve: Curve, target: Real, low: float, high: float) -> list[float]:
+def _nearest_arcs(curve: Curve, target: Real, low: float, high: float) -> list[float]:
     """Arc lengths of the places nearest to a point, of several about as near, in their order."""
     count = int(np.clip(np.ceil((high - low) / _STEP_MM) + 1, 2, _MOST_SAMPLES))
     s = np.linspace(low, high, count)
@@ -128,4 +128,9 @@ def _refined(curve: Curve, target: Real, s: Real, k: int) -> float:
 
 
 def _distances(curve: Curve, s: Real, target: Real) -> Real:
-    return np.asarray(np.linalg.norm(points_at(curve, s)[:, : target.size] - target, axis=1))
+    return np.asarray(np.linalg.norm(_places(curve, s) - target, axis=1))
+
+
+def _places(curve: Curve, s: Real) -> Real:
+    """All axes (n, A) at arc lengths (n,)."""
+    return points_at(curve, s) if isinstance(curve, PHSpline) else curve.axes_point(s)

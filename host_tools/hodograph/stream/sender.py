@@ -34,7 +34,7 @@ from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messa
 from ..native import NativeProgram
 from .chunk import Chunk
 from .journal import Journal
-from .plan import JobPlan, PlannedSection
+from .plan import JobPlan, PlannedSection, PlanRests
 
 AHEAD_S = 20.0
 """So much motion is sent ahead at most, so that a command acts on little that is already underway."""
@@ -46,7 +46,7 @@ _RECORD_S = 0.5
 _UNDERRUN_S = 10.0
 _START_COUNTS = 2
 _PASSED_Q40 = 1 << 20
-"""A section is in motion when the way is so far behind its start, 2^-20 mm."""
+"""A section is in motion when the arc length is so far behind its start, 2^-20 mm."""
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
 """A section starts at the latest when so much motion is sent, or so long after its first chunk."""
 
@@ -80,7 +80,7 @@ class StreamProgress:
 
 @dataclass(frozen=True)
 class StreamedJob:
-    """A job that came to its end."""
+    """A job that came to its end; `rests`: those of its plan."""
 
     sections: int
     chunks: int
@@ -88,6 +88,7 @@ class StreamedJob:
     motion_s: float
     took_s: float
     underruns: int
+    rests: PlanRests
 
 
 @dataclass
@@ -157,6 +158,7 @@ class Sender:
             self._motion_s,
             took_s,
             self._underruns,
+            self.plan.rests,
         )
 
     def _wait_item(self) -> tuple[PlannedSection, Chunk, float] | None:
@@ -186,7 +188,7 @@ class Sender:
         self._to_start(chunk)
         begin_q40 = chunk.header.job_start_q40
         self._ahead = deque([section])
-        self._note_place(first=section.number, way_q40=begin_q40, committed_q40=begin_q40)
+        self._note_place(first=section.number, arc_q40=begin_q40, committed_q40=begin_q40)
         close_stream(self.at.controller)
         self._stream()
 
@@ -274,8 +276,8 @@ class Sender:
 
     def _pass_sections(self, status: StreamStatus) -> None:
         """Goes on to the section in motion, and says what is to be said before it."""
-        way_q40 = round(status.way_mm * 2**40)
-        while len(self._ahead) > 1 and way_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
+        arc_q40 = round(status.way_mm * 2**40)
+        while len(self._ahead) > 1 and arc_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
             self._ahead.popleft()
             section = self._section
             report_messages(self.at, section.file, section.before)
@@ -346,7 +348,7 @@ class Sender:
         now_s = self.at.controller.clock.now_s()
         if self.journal is not None and now_s - self._journal_s >= _JOURNAL_S:
             self._journal_s = now_s
-            self._note_place(way_q40=round(status.way_mm * 2**40) - section.start_q40)
+            self._note_place(arc_q40=round(status.way_mm * 2**40) - section.start_q40)
         self._note_underruns(status, now_s)
         self._slow_down()
         if self.progress is not None:

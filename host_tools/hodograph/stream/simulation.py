@@ -96,6 +96,7 @@ class Concatenation:
         self._pieces: list[FeedPieces] = []
         self._points: list[np.ndarray] = []
         self._a: list[np.ndarray] = []
+        self._extra: list[np.ndarray] = []
         self._starts: list[np.ndarray] = []
         self._codes: list[np.ndarray] = []
         self._events: list[np.ndarray] = []
@@ -113,6 +114,7 @@ class Concatenation:
         self._starts.append(own.start_q40[fresh] + header.job_start_q40)
         self._points.append(own.point_q40[:, fresh])
         self._a.append(own.a_q44[:, fresh])
+        self._extra.append(own.extra_q40[:, fresh])
         events = own.events.copy()
         events["place"] += header.job_start_q40
         self._events.append(events[events["place"] > self._end_q40])
@@ -132,7 +134,7 @@ class Concatenation:
             start_q40=np.concatenate(self._starts),
             point_q40=np.concatenate(self._points, axis=1),
             a_q44=np.concatenate(self._a, axis=1),
-            extra_q40=np.zeros((0, 0, 5), dtype=np.int64),
+            extra_q40=np.concatenate(self._extra, axis=1),
             pieces=pieces,
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=False,

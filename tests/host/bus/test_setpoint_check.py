@@ -189,6 +189,20 @@ def test_a_jump_behind_a_sync_without_setpoint_is_found() -> None:
     assert "speed@8" in jumps(stream)
 
 
+@pytest.mark.parametrize("lost", [{6}, {6, 7}, {4, 8}])
+def test_a_step_is_not_spread_over_missing_syncs(lost: set[int]) -> None:
+    """The drive acts on the last setpoint before each SYNC: it makes two steps or three in one period."""
+    stream = Stream()
+    for k in range(12):
+        stream.tick(900 * k, 0)
+    assert jumps(stream) == []
+    counters = {number % 240 + 1 for number in lost}
+    stream.frames = [
+        frame for frame in stream.frames if frame[0] != 0x80 or frame[1][0] not in counters
+    ]
+    assert f"speed@{min(lost) - 1}" in jumps(stream)
+
+
 @pytest.mark.parametrize("word", [0x1233, 0x0000, 0xFFFF])
 def test_one_garbled_statusword_neither_hides_a_jump_nor_makes_one(word: int) -> None:
     def garbled(jump: int) -> Stream:

@@ -36,6 +36,7 @@ from hodograph.cli.output import (
 from hodograph.cli.waiting import held, waiting
 from hodograph.errors import InputError
 
+HANGS_S = 600.0  # of real time: none of these takes a second
 ALPHA = str(Path(__file__).resolve().parents[3] / "examples" / "alpha.toml")
 
 
@@ -104,7 +105,7 @@ def test_sizes_for_people(size: int, text: str) -> None:
 
 def test_the_line_shows_and_goes(terminal: Terminal) -> None:
     with redirect_stderr(terminal), waiting("spline"):
-        assert terminal.written.wait(20)
+        assert terminal.written.wait(HANGS_S)
     text = terminal.getvalue()
     assert re.match(r"\rspline: \d+ s\x1b\[K", text)
     assert text.endswith("\r\x1b[K")
@@ -115,7 +116,7 @@ def test_the_line_goes_before_results_and_notes(
 ) -> None:
     out = Terminal()
     with redirect_stderr(terminal), redirect_stdout(out), waiting("spline"):
-        assert terminal.written.wait(20)
+        assert terminal.written.wait(HANGS_S)
         monkeypatch.setattr(waiting_module, "AFTER_S", 1e9)  # it does not come again
         note("something")
         before = terminal.getvalue()
@@ -127,11 +128,11 @@ def test_the_line_goes_before_results_and_notes(
 
 def test_a_bar_has_the_terminal_for_itself(terminal: Terminal) -> None:
     with redirect_stderr(terminal), waiting("simulate"):
-        assert terminal.written.wait(20)
+        assert terminal.written.wait(HANGS_S)
         with held():
             terminal.written.clear()
             assert not terminal.written.wait(0.1)
-        assert terminal.written.wait(20)
+        assert terminal.written.wait(HANGS_S)
 
 
 def test_files_see_no_line(
@@ -153,7 +154,7 @@ def test_a_dumb_terminal_sees_no_line(terminal: Terminal, monkeypatch: pytest.Mo
 def test_the_line_goes_with_an_error(terminal: Terminal) -> None:
     def fail() -> None:
         with redirect_stderr(terminal), waiting("spline"):
-            assert terminal.written.wait(20)
+            assert terminal.written.wait(HANGS_S)
             raise ValueError("no")
 
     with pytest.raises(ValueError, match="no"):

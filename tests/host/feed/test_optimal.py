@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from time import process_time
 
 import numpy as np
 import pytest
@@ -227,7 +226,7 @@ def test_no_limits_at_all_are_refused() -> None:
 
 
 def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the solver is given, counted, since time is noisy; time within a generous bound."""
+    """What the solver is given, and what it gives, counted, since time depends on the load."""
     work: list[int] = []
     solved = solver._solved
 
@@ -236,15 +235,12 @@ def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch)
         return solved(task)
 
     monkeypatch.setattr(solver, "_solved", counted)
-    seconds, pieces = [], []
+    pieces = []
     for n in (150, 600):
         work.append(0)
-        began = process_time()
         pieces.append(track(plan_optimal(walk(n + 2, 1), OPTIMAL, AXES, CONTROLLER)).s.size)
-        seconds.append(process_time() - began)
     for counts in (work, pieces):
         assert 3.0 < counts[1] / counts[0] < 5.5
-    assert seconds[1] < 8.0 * seconds[0] + 0.5
 
 
 def test_an_interval_that_is_too_brief_with_its_neighbour_is_joined_to_it() -> None:

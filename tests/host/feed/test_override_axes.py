@@ -11,8 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hodograph.errors import InputError
-from hodograph.feed import AxisLimits, FeedRequest, FeedZone, Limits, Plant, plan_feed, plan_path
+from hodograph.feed import (
+    AxisLimits,
+    FeedRequest,
+    FeedZone,
+    Limits,
+    Plant,
+    ReserveZone,
+    plan_feed,
+    plan_path,
+)
+from hodograph.feed.kinematics import PathBounds
 from hodograph.feed.optimal import plan_optimal
+from hodograph.feed.override_levels import FULL
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.native.program import NativeProgram
 from hodograph.program import Program, compile_program, encode
@@ -199,6 +210,22 @@ def test_a_factor_of_no_use_leaves_its_room_to_holds() -> None:
     factor = pieces.override_factor
     assert ((factor == 1.0) | (factor >= 1.05)).all()
     assert (factor == 1.0).sum() > 10
+
+
+def test_the_override_does_not_use_what_zones_keep_for_stops() -> None:
+    limits = Limits(axis=AxisLimits(acceleration_mm_s2=(1500.0, 1500.0)))
+    spline = wavy(2)
+    zone = ReserveZone(0.3 * spline.length_mm, 0.5 * spline.length_mm, 0.4)
+    kept = plan_optimal(spline, FeedRequest("optimal"), replace(limits, reserve_zones=(zone,)))
+    free = replace(kept, limits=limits, paths=(PathBounds(spline, limits),))
+    start_mm = kept.pieces.start_q40 * 2.0**-40
+    inside = (start_mm > zone.from_mm) & (np.append(start_mm[1:], spline.length_mm) < zone.to_mm)
+    assert inside.sum() > 5
+    assert kept.pieces.override_factor[inside].max() == 1.0
+    assert free.pieces.override_factor[inside].max() > 1.05
+    assert (kept.pieces.override_rate_codes[inside, FULL] > 0).all()
+    rates = [plan.pieces.override_rate_codes[inside, FULL].mean() for plan in (kept, free)]
+    assert rates[0] < rates[1]
 
 
 def test_without_such_limits_nothing_changes() -> None:

@@ -12,15 +12,17 @@ from typing import Any
 
 import aiohttp
 import pytest
-from aiohttp import WSMsgType
+from aiohttp import WSMsgType, web
 from aiohttp.test_utils import TestClient, TestServer
 
 from hodograph.errors import InputError, RefusedError
+from hodograph.monitor import server as server_module
 from hodograph.monitor.clients import MOST_CLIENTS, MOST_WAITING, Broadcaster
 from hodograph.monitor.link import read_command
 from hodograph.monitor.security import Guard
 from hodograph.monitor.server import Server
 
+HANGS_S = 600.0  # of real time: none of these takes a second
 TOKEN = "a-token-for-these-tests"
 
 Browser = TestClient[Any, Any]
@@ -62,7 +64,7 @@ async def hello(browser: Browser, **more: Any) -> aiohttp.ClientWebSocketRespons
 
 async def answer(socket: aiohttp.ClientWebSocketResponse, kind: str) -> Any:
     while True:
-        message = await socket.receive_json(timeout=5)
+        message = await socket.receive_json(timeout=HANGS_S)
         if message["type"] == kind:
             return message
 
@@ -136,7 +138,7 @@ def test_without_the_token_loopback_may_look_on_only() -> None:
 def test_a_wrong_token_is_refused(host: str, token: Any) -> None:
     async def scenario(browser: Browser) -> None:
         socket = await hello(browser, token=token)
-        message = await socket.receive(timeout=5)
+        message = await socket.receive(timeout=HANGS_S)
         assert message.type is WSMsgType.CLOSE
         assert socket.close_code == 4401
 
@@ -148,7 +150,7 @@ def test_an_open_server_shows_nothing_without_the_token() -> None:
 
     async def scenario(browser: Browser) -> None:
         socket = await hello(browser)
-        assert (await socket.receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await socket.receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
         assert socket.close_code == 4401
         socket = await hello(browser, token=TOKEN)
         assert (await answer(socket, "hello"))["may_command"] is True
@@ -167,7 +169,7 @@ def test_nonsense_ends_the_connection_and_not_the_server(text: str) -> None:
                 await socket.send_json({"type": "hello", "token": TOKEN})
                 await answer(socket, "hello")
             await socket.send_str(text)
-            while (message := await socket.receive(timeout=5)).type is WSMsgType.TEXT:
+            while (message := await socket.receive(timeout=HANGS_S)).type is WSMsgType.TEXT:
                 assert json.loads(message.data)["type"] == "history"
             assert message.type is WSMsgType.CLOSE
             too_big = len(text) > 4096
@@ -183,7 +185,7 @@ def test_several_browsers_but_not_any_number() -> None:
         for socket in sockets:
             await answer(socket, "hello")
         one_more = await hello(browser)
-        assert (await one_more.receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await one_more.receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
         await sockets[0].close()
         await asyncio.sleep(0.1)
         assert (await answer(await hello(browser), "hello"))["mode"] == "live"
@@ -203,8 +205,8 @@ def test_who_has_the_token_always_gets_in() -> None:
             assert (await answer(socket, "hello"))["may_command"] is True
         await answer(operators[0], "hello")
         await answer(operators[0], "history")
-        assert (await operators[0].receive(timeout=5)).type is WSMsgType.CLOSE
-        assert (await idle[0].receive(timeout=5)).type is WSMsgType.CLOSE
+        assert (await operators[0].receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
+        assert (await idle[0].receive(timeout=HANGS_S)).type is WSMsgType.CLOSE
 
     Case().run(scenario)
 
@@ -257,17 +259,19 @@ def test_commands_are_the_controllers() -> None:
 
 
 def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor one that comes a byte at a time: the session serves with this time-out."""
+    """Nor one that comes a byte at a time."""
+    monkeypatch.setattr(server_module, "REQUEST_S", 0.2)
 
-    async def scenario(server: TestServer) -> None:
-        streams = [await asyncio.open_connection(server.host, server.port) for _ in range(20)]
+    async def scenario(host: str, port: int) -> None:
+        streams = [await asyncio.open_connection(host, port) for _ in range(20)]
         for _, writer in streams:
             writer.write(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX:")
         # A byte that comes after the end resets the connection: then it is an error that ends it.
-        while not all(reader.at_eof() or reader.exception() for reader, _ in streams):
-            for _, writer in streams:
-                writer.write(b"x")
-            await asyncio.sleep(0.05)
+        async with asyncio.timeout(20.0):
+            while not all(reader.at_eof() or reader.exception() for reader, _ in streams):
+                for _, writer in streams:
+                    writer.write(b"x")
+                await asyncio.sleep(0.05)
         for _, writer in streams:
             writer.close()
 
@@ -275,12 +279,13 @@ def test_half_a_request_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
         served = Server(
             Guard("127.0.0.1", TOKEN), Broadcaster(asyncio.get_running_loop()), {}, nobody
         )
-        server = TestServer(served.app)
-        await server.start_server(keepalive_timeout=0.2)
+        runner = served.runner()
+        await runner.setup()
         try:
-            await scenario(server)
+            await web.TCPSite(runner, "127.0.0.1", 0).start()
+            await scenario(*runner.addresses[0])
         finally:
-            await server.close()
+            await runner.cleanup()
 
     asyncio.run(whole())
 

@@ -16,7 +16,7 @@ from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import Program, encode, stop_planning
 from hodograph.program.stop_planning import fault_limits, hold_limits
 from hodograph.program.stops import DECELERATION, FAULT
-from hodograph.simulate import simulate
+from hodograph.simulate import simulate, simulate_stop
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 MACHINE = EXAMPLES / "machines/paper_alpha.toml"
@@ -114,6 +114,29 @@ def test_long_pieces_are_halved_where_stops_become_shorter(monkeypatch: pytest.M
         for program in (fine, whole)
     }
     assert len(hashes) == 1
+    found = trials(made)
+    assert found.kept, found
+
+
+def mean_hold_s(program: Program, made: Pipeline) -> float:
+    """Time to rest of holds at 16 instants, on the mean."""
+    image, drives = NativeProgram(encode(program)), made.machine.models(made.machine.path_axes)
+    at_s = np.linspace(0.0, program.duration_s, 18)[1:-1].tolist()
+    return float(np.mean([simulate_stop(image, drives, "hold", at).rest_after_s for at in at_s]))
+
+
+def test_where_a_hold_would_wait_for_long_short_parts_have_brakes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A program of profile optimal: in a bend a brake may begin at some instants only."""
+    made = load_pipeline(EXAMPLES / "heart_optimal.toml")
+    fine = made.program
+    with monkeypatch.context() as patch:
+        patch.setattr(stop_planning, "LONGEST_WAIT_S", inf)
+        whole = load_pipeline(EXAMPLES / "heart_optimal.toml").program
+    assert whole.piece_count < fine.piece_count < 1.2 * whole.piece_count
+    assert mean_hold_s(fine, made) < 0.92 * mean_hold_s(whole, made)
+    assert fine.stops.worst_us[FAULT] <= whole.stops.worst_us[FAULT]
     found = trials(made)
     assert found.kept, found
 

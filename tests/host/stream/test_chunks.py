@@ -30,6 +30,7 @@ from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
 from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
 from hodograph.stream.geometry import Block, StreamPath, blocks_from, with_joints
+from hodograph.stream.plan import JobFiles, JobPlan, Place, PlanRests
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.stream.windows import SectionFeed
@@ -177,12 +178,32 @@ def test_axes_rest_where_no_chunk_goes_on(tmp_path: Path, machine: Machine, most
     file.write_text(_wave(60))
     (roomy,) = _sections(file, machine)
     (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
-    made = list(SectionChunks(machine, "wave", section.blocks, 1, most).chunks())
+    maker = SectionChunks(machine, "wave", section.blocks, 1, most)
+    made = list(maker.chunks())
+    assert maker.rest_lines
+    assert maker.rest_lines == sorted(maker.rest_lines)
     tight = [one.chunk for one in made]
-    _verify(tight, machine, most, 1)
+    _verify(tight, machine, most, 1, rests=True)
     duration_s = concatenated(tight).duration_s
     assert duration_s > concatenated(roomy).duration_s + 0.02
     assert sum(one.new_s for one in made) == pytest.approx(duration_s, abs=1e-9)
+
+
+def test_rests_that_no_command_asks_for_are_counted(tmp_path: Path, machine: Machine) -> None:
+    file = tmp_path / "wave.ngc"
+    file.write_text(_wave(60))
+    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    found = []
+    for most in (MOST, 6000):
+        with JobPlan(job, most, 1, Place(), processes=1) as plan:
+            for chunks in plan.by_job():
+                assert all(chunk.size <= most for chunk in chunks)
+            found.append(plan.rests)
+    roomy, tight = found
+    assert roomy == PlanRests()
+    assert roomy.text == "0"
+    assert tight.count > 0
+    assert tight.text.startswith(f"{tight.count}, the first at {file}:")
 
 
 @pytest.mark.long
@@ -249,9 +270,9 @@ def test_segments_are_cut_at_arc_lengths() -> None:
 @pytest.mark.timeout(7200)
 def test_a_million_lines_take_little_memory(tmp_path: Path) -> None:
     script, figures = ROOT / "benchmarks" / "streaming.py", tmp_path / "figures.json"
-    lines = ["--lines", "100000", "--fit-lines", "1000000"]
+    lines = ["--no-ring", "--lines", "100000", "--fit-lines", "1000000"]
     subprocess.run([sys.executable, script, *lines, "--json", figures], check=True)
-    planned, fitted = json.loads(figures.read_text())
+    planned, fitted = json.loads(figures.read_text())["jobs"]
     assert (planned["lines"], fitted["lines"]) == (100_000, 1_000_000)
     assert max(planned["memory_mb"], fitted["memory_mb"]) < 250.0
 

@@ -64,7 +64,7 @@ def test_nearest_places(
     """Only between the last place of the journal and the end of what was sent; of equal places the first."""
     found = nearest_place(job, entry, at)
     assert found.place.section == section
-    assert abs(found.place.way_q40 / Q40 - way) < 1e-5
+    assert abs(found.place.arc_q40 / Q40 - way) < 1e-5
     assert abs(found.distance_mm - distance) < 1e-5
     assert found.line == 3 + section
     off = np.linalg.norm(np.subtract(found.point_mm, at))
@@ -74,8 +74,19 @@ def test_nearest_places(
 def test_work_offset(job: JobFiles, machine: Machine) -> None:
     moved = replace(job, machine=replace(machine, offset_mm=(5.0, -3.0, 1.0)))
     found = nearest_place(moved, _entry(0, 1.0, 10.0), (9.0, -3.0, 1.0))
-    assert abs(found.place.way_q40 / Q40 - 4.0) < 1e-5
+    assert abs(found.place.arc_q40 / Q40 - 4.0) < 1e-5
     assert found.distance_mm < 2e-6
+
+
+def test_axes_that_turn_count(tmp_path: Path) -> None:
+    """There and back on one line, while A goes on: the place is where A is too."""
+    five = load_machine(ROOT / "examples" / "machines" / "mill_five_axes.toml")
+    file = tmp_path / "part.ngc"
+    file.write_text("G61\nF600\nG1 X10 A10\nG1 X0 A20\n")
+    job = JobFiles((file,), five, 0.01, ReadOptions())
+    found = nearest_place(job, _entry(0, 0.0, 20.0), (4.0, 0.0, 0.0, 16.5, 0.0))
+    assert (found.place.section, found.line) == (1, 4)
+    assert abs(found.distance_mm - 0.5**0.5 / 2.0) < 1e-4
 
 
 def test_a_path_file(machine: Machine) -> None:

@@ -148,7 +148,7 @@ def test_the_journal_comes_back(tmp_path: Path) -> None:
     part = tmp_path / "part.ngc"
     part.write_text("G1 X1 F100\n")
     journal = Journal(tmp_path / "state" / "stream.json", _entry(part))
-    journal.update(section=3, first=2, way_q40=5 << 40, starts=((3, 1 << 40), (4, 9 << 40)))
+    journal.update(section=3, first=2, arc_q40=5 << 40, starts=((3, 1 << 40), (4, 9 << 40)))
     found = load(journal.file)
     assert found == journal.entry
     assert found.job == 102
@@ -192,7 +192,7 @@ def test_no_journal(tmp_path: Path) -> None:
     ("key", "value"),
     [
         ("job0", "7"),
-        ("way_q40", None),
+        ("arc_q40", None),
         ("options", {"tolerance_mm": 0.01}),
         ("options", {"tolerance_mm": "fine", "reading": {}}),
         ("options", {"tolerance_mm": 0.01, "reading": 1}),

@@ -143,8 +143,8 @@ def test_what_cannot_turn_is_refused_with_its_line(tmp_path: Path, five: Machine
     with pytest.raises(PlanError, match=r":3: a goes to .* … 125 deg with the work offset"):
         load_job(program(tmp_path, "F600\nG1 X5\nG1 X90 A125\nX99\n"), five)
     file = program(tmp_path, "F600\nG1 X5 A1\nX9\n")
-    with pytest.raises(InputError, match=":2: the move turns A, B or C, and stream takes"):
-        list(StreamReader(file, five, TOLERANCE, ReadOptions()).sections())
+    with pytest.raises(InputError, match=r":2: the move turns A, but no axis a of mill.toml"):
+        list(StreamReader(file, mill, TOLERANCE, ReadOptions()).sections())
 
 
 def test_axes_that_the_program_does_not_turn_stand(tmp_path: Path, five: Machine) -> None:

@@ -21,9 +21,11 @@ axis          Of each axis by itself, as far as the limits of the machine's axes
               a difference may reach over two. A recording that begins in motion shows no jerk before its third step.
 
 Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
-that is what the drive makes of it. One garbled statusword in a row does not hide a drive that follows. A path in space
-is drawn by three axes, with sqrt(3) in place of sqrt(2). Axes beyond those that draw the path are checked by their own
-limits, one by one; those that hold their position for speed and acceleration too.
+that is what the drive makes of it. Where a SYNC is missing, the drive stood as well, and acts on the last of the
+setpoints that came: their steps together are the step of one period. One garbled statusword in a row does not hide a
+drive that follows. A path in space is drawn by three axes, with sqrt(3) in place of sqrt(2). Axes beyond those that
+draw the path are checked by their own limits, one by one; those that hold their position for speed and acceleration
+too.
 """
 
 from __future__ import annotations
@@ -256,11 +258,14 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
         commanded = _commanded(control)
         follows = commanded & _enabled(frames, node, at)
         valid = follows[1:] & commanded[:-1]
-        # Two setpoints for one SYNC: the larger step counts.
+        # Two setpoints for one SYNC: the larger step counts, or both together, which the drive makes in one period.
         steps.followed[sync[1:][valid], axis] = True
         step = np.where(valid, np.diff(target), 0.0)
         larger = np.argsort(np.abs(step), kind="stable")
-        steps.counts[sync[1:][larger], axis] = step[larger]
+        counts, together = steps.counts[:, axis], np.zeros(sync_at.size)
+        counts[sync[1:][larger]] = step[larger]
+        np.add.at(together, sync[1:], step)
+        counts[:] = np.where(np.abs(together) > np.abs(counts), together, counts)
         for i in np.flatnonzero(valid & (np.diff(sync) > 1)):
             steps.followed[sync[i] + 1 : sync[i + 1], axis] = True  # it stands
         if valid[0] and follows[0]:  # begun in motion, perhaps: as fast as it goes on

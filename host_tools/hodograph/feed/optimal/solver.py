@@ -15,7 +15,7 @@ from .rows import Rows
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_TOLERANCE = 1e-8
+TOLERANCE = 1e-8
 _MOST_ITERATIONS = 120
 _NEAR = 1e-3
 _WAYS = ((piqp.sparse_ldlt_cond, 1), (piqp.sparse_ldlt, 10))
@@ -40,7 +40,9 @@ class Problem:
     rows: Rows
 
 
-def solve(problem: Problem, penalty: float | None = None) -> Real | None:
+def solve(
+    problem: Problem, penalty: float | None = None, tolerance: float = TOLERANCE
+) -> Real | None:
     """The unknowns, or None where there is no solution.
 
     penalty  rows may be exceeded, each interval's by a share of its own that costs this much (in units of the
@@ -60,7 +62,7 @@ def solve(problem: Problem, penalty: float | None = None) -> Real | None:
     )
     if penalty is not None:
         task = _elastic(task, problem.rows.interval, penalty * unit)
-    found = _solved(task)
+    found = _solved(task, tolerance)
     return None if found is None else found[: scale.size] * scale
 
 
@@ -109,7 +111,7 @@ def _elastic(task: _Task, interval: Index, penalty: float) -> _Task:
     )
 
 
-def _solved(task: _Task) -> Real | None:
+def _solved(task: _Task, tolerance: float) -> Real | None:
     """Unknowns with one value only are equations: as bounds without an inside they keep PIQP from ending.
 
     A program whose rows are scaled badly may end short of the tolerance: what is near enough is taken, since the
@@ -124,7 +126,7 @@ def _solved(task: _Task) -> Real | None:
     low[fixed], high[fixed] = -np.inf, np.inf
     for backend, scalings in _WAYS:
         solver = piqp.SparseSolver()
-        _set(solver.settings, backend, scalings)
+        _set(solver.settings, backend, scalings, tolerance)
         solver.setup(
             task.hessian, task.gradient, equal, value, task.matrix, task.least, task.most, low, high
         )
@@ -137,9 +139,9 @@ def _solved(task: _Task) -> Real | None:
     return None
 
 
-def _set(settings: piqp.Settings, backend: piqp.KKTSolver, scalings: int) -> None:
-    settings.eps_abs = settings.eps_rel = _TOLERANCE
-    settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = _TOLERANCE
+def _set(settings: piqp.Settings, backend: piqp.KKTSolver, scalings: int, tolerance: float) -> None:
+    settings.eps_abs = settings.eps_rel = tolerance
+    settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = tolerance
     settings.max_iter = _MOST_ITERATIONS
     settings.kkt_solver = backend
     settings.preconditioner_iter = scalings

@@ -17,7 +17,7 @@ from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
 from .knots import FirstEstimate, choose_knots, first_estimate, refined
 from .plan_limits import PlanLimits
 from .rows import JERK_ROW, About, Rows, Selection, make_rows
-from .solver import Problem, solve
+from .solver import TOLERANCE, Problem, solve
 
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -53,12 +53,14 @@ Feed = Callable[[Real], Real]
 class Effort:
     """How far a plan is improved.
 
-    gain      share of the time that a further round has to gain
-    patience  rounds before all points have rows, which takes some ten times as long
+    gain       share of the time that a further round has to gain
+    patience   rounds before all points have rows, which takes some ten times as long
+    tolerance  of the quadratic programs. A solution ends short of its limits by about as much.
     """
 
     gain: float = 1e-4
     patience: int = 6
+    tolerance: float = TOLERANCE
 
 
 _WHOLE = Effort()
@@ -406,11 +408,12 @@ class _Rounds:
             self.typical_q,
             _LEAST_FALL if np.isfinite(self.duration_s) else _LEAST_ESTIMATED,
         )
-        found = solve(problem)
+        tolerance = self.setting.effort.tolerance
+        found = solve(problem, None, tolerance)
         if found is None and not self._tolerable:
             self.exceeded = True
             times = _times(self.setting, self.inner_p)
-            found = solve(problem, _PENALTY * float(times.sum()))
+            found = solve(problem, _PENALTY * float(times.sum()), tolerance)
         return found
 
     def _take(self, q: Real, slope: Real, rounds: int) -> float:

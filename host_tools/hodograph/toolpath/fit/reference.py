@@ -6,6 +6,8 @@ docs/theory/toolpath-fitting.md section 2.
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, ceil, inf, pi, sqrt
@@ -122,19 +124,38 @@ class ReferenceBuilder:
         """Points (n, 3) first … end - 1, as far as there are so many."""
         return np.array(self._points[max(first, 0) : end], dtype=np.float64)
 
-    def cut(self, chord: int) -> Reference:
-        """The chords of all moves so far up to the middle of this one; the other half and what follows stays.
+    @property
+    def turns(self) -> bool:
+        """Whether a move has turned a, b or c."""
+        return len(self._turns) > 1
 
-        No move may have turned a, b or c.
-        """
-        a, b = self._points[chord : chord + 2]
-        middle = (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]))
-        points, rows = self._points, self._rows
+    def angles(self, first: int, end: int) -> Real:
+        """a, b and c (n, 3) at points first … end - 1, as far as there are so many."""
+        known = list(self._turns)
+        first, end = max(first, 0), min(end, len(self._points))
+        low = max(bisect_right(known, first) - 1, 0)
+        high = bisect_right(known, end - 1) + 1
+        known = known[low:high]
+        step = np.linalg.norm(
+            np.diff(self.points(known[0], max(known[-1] + 1, end)), axis=0), axis=1
+        )
+        place = np.concatenate((np.zeros(1), np.cumsum(step)))
+        own = place[first - known[0] : end - known[0]]
+        at = place[np.subtract(known, known[0])]
+        value = np.array([self._turns[k] for k in known])
+        return np.stack([np.interp(own, at, column) for column in value.T], axis=1)
+
+    def cut(self, chord: int) -> Reference:
+        """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
+        middle = _middle(*self._points[chord : chord + 2])
+        turned = _middle(*self.angles(chord, chord + 2).tolist())
+        points, rows, turns = self._points, self._rows, self._turns
         self._points, self._rows = [*points[: chord + 1], middle], rows[: chord + 1]
+        self._turns = {k: one for k, one in turns.items() if k <= chord} | {chord + 1: turned}
         part = self.reference()
         self._points, self._rows = [middle, *points[chord + 1 :]], rows[chord:]
-        self._turns = {0: self._at[3:]}
-        self.start = (*middle, self._at[3], self._at[4], self._at[5])
+        self._turns = {0: turned} | {k - chord: one for k, one in turns.items() if k > chord}
+        self.start = (*middle, *turned)
         self.length_mm -= float(part.place_mm[-1])
         return part
 
@@ -160,6 +181,11 @@ class ReferenceBuilder:
         place = np.concatenate((np.zeros(1), np.cumsum(step)))
         at = place[list(self._turns)]
         return np.stack([np.interp(place[kept], at, column) for column in angle.T], axis=1)
+
+
+def _middle(a: Sequence[float], b: Sequence[float]) -> tuple[float, float, float]:
+    """The middle of two points."""
+    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
 
 
 def feed_of(feed: Feed | None, length_mm: float) -> float:

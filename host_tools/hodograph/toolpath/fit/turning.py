@@ -37,14 +37,22 @@ _PARTS = 8
 _HALVINGS = 16
 _EDGE = 1e-6
 
+_SAME_RATE = 1e-6
+"""Degrees per mm: rates that differ by less are one."""
+
 
 def with_turning(
-    fitted: FittedPath, columns: Sequence[int | None], tolerance_deg: float
+    fitted: FittedPath,
+    columns: Sequence[int | None],
+    tolerance_deg: float,
+    tied: tuple[bool, bool] = (False, False),
 ) -> FittedPath:
     """The path with extra axes.
 
     columns        of the reference's angles, one for each extra axis; None: the axis stands at 0
     tolerance_deg  how far the axes may be from the programmed angles at any place
+    tied           whether start and end are in the middle of a chord of a longer path: the axes then have the rate of
+                   the chord there, and no second derivative, so that both halves join C2
     Raises PlanError, naming the line: no function is within the tolerance.
     """
     reference = fitted.reference
@@ -57,13 +65,23 @@ def with_turning(
         extra = np.repeat(still, fitted.curve.segment_count, axis=0)
         return replace(fitted, curve=replace(fitted.curve, extra=extra))
     target = Angles.of(fitted.arc_length_at(reference.place_mm), value)
+    rates = _rates_at_ends(reference.place_mm, value, tied)
+    joined = target.with_rates(*rates)
     for share in _SHARES:
-        smooth = target.smoothed(share * tolerance_deg)
-        found = _followed(_cut_at_changes(fitted, smooth), target, smooth, tolerance_deg)
+        smooth = joined.smoothed(share * tolerance_deg)
+        found = _followed(_cut_at_changes(fitted, smooth), target, smooth, rates, tolerance_deg)
         if found is not None:
             return found
     line = int(reference.line[0])
     raise PlanError(f"line {line}: no smooth turn of A, B and C is within {tolerance_deg:g} deg")
+
+
+def _rates_at_ends(
+    place_mm: Real, value: Real, tied: tuple[bool, bool]
+) -> tuple[Real | None, Real | None]:
+    """Programmed rates (E,) at start and end, by the length of the chord there; None: that end is not tied."""
+    first, last = ((value[k + 1] - value[k]) / (place_mm[k + 1] - place_mm[k]) for k in (0, -2))
+    return first if tied[0] else None, last if tied[1] else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +103,23 @@ class Angles:
         kept = np.append(True, np.diff(at) > 0.0)
         at, value = at[kept], value[kept]
         return cls(at, value, np.diff(value, axis=0) / np.diff(at)[:, None])
+
+    def with_rates(self, first: Real | None, last: Real | None) -> Angles:
+        """With these rates (E,) at start and end, up to the middle of the leg there; None: with their own.
+
+        The curve of half a chord is a little shorter than it, each half by another length, so that its rate by arc
+        length is not quite that of the other half.
+        """
+        at, value = self.at, self.value
+        if last is not None and np.abs(last - self.rate[-1]).max() > _SAME_RATE:
+            middle = 0.5 * (at[-2] + at[-1])
+            at = np.insert(at, -1, middle)
+            value = np.insert(value, -1, value[-1] - last * (at[-1] - middle), axis=0)
+        if first is not None and np.abs(first - self.rate[0]).max() > _SAME_RATE:
+            middle = 0.5 * (at[0] + at[1])
+            at = np.insert(at, 1, middle)
+            value = np.insert(value, 1, value[0] + first * (middle - at[0]), axis=0)
+        return Angles.of(at, value)
 
     @property
     def change(self) -> Real:
@@ -184,17 +219,24 @@ def _cut_at_changes(fitted: FittedPath, smooth: SmoothAngles) -> FittedPath:
 
 
 def _followed(
-    fitted: FittedPath, target: Angles, smooth: SmoothAngles, tolerance_deg: float
+    fitted: FittedPath,
+    target: Angles,
+    smooth: SmoothAngles,
+    rates: tuple[Real | None, Real | None],
+    tolerance_deg: float,
 ) -> FittedPath | None:
     """The path with the smooth angles as quintics of its segments, which are halved until they are within the tolerance
-    of the target; None: they do not come there.
+    of the target; None: they do not come there. `rates`: of tied ends.
     """
     for _ in range(_HALVINGS):
         joint = fitted.curve.segment_starts_mm
+        rate = smooth.angles.rate_at(joint) + smooth.correction(joint, 1)
+        for end, own in zip((0, -1), rates, strict=True):
+            rate[end] = rate[end] if own is None else own
         extra = quintics_by_arc_length(
             fitted.curve,
-            target(joint) + smooth.correction(joint, 0),
-            target.rate_at(joint) + smooth.correction(joint, 1),
+            smooth.angles(joint) + smooth.correction(joint, 0),
+            rate,
             smooth.correction(joint, 2),
         )
         found = replace(fitted, curve=replace(fitted.curve, extra=extra))
