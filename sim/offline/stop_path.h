@@ -25,8 +25,9 @@ struct stop_row {
     double s_mm;
     double tangent[2]; /* of a planar program */
     double curvature;  /* 1/mm; of a spatial program without sign */
-    double slope;      /* of the curvature, 1/mm^2; of a spatial program its third derivative across the tangent */
-    double feed_mm_s;  /* greatest feed here: caps and centripetal acceleration */
+    double
+        slope; /* of the curvature, 1/mm^2; of a spatial program its third derivative across the tangent */
+    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
 };
 
 /* How the axes of a spatial program move there: first to third derivative by arc length. */

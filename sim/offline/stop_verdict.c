@@ -150,8 +150,8 @@ static int overridden_keeps(const struct stop_setting *setting, const struct sto
 }
 
 /* Fills for each feed override whether bounds alone show that brakes at it keep the limits: most do at low ones. */
-static void rates_surely_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
-                              const struct stop_piece *piece,
+static void rates_surely_keep(const struct stop_setting *setting,
+                              const struct stop_inverse *inverse, const struct stop_piece *piece,
                               const struct path_brake_numbers *numbers,
                               uint8_t surely[2u * STOP_SHARES])
 {
