@@ -35,7 +35,7 @@ from hodograph.spline.verdict import EXTRA_TURNING_RAD  # noqa: E402
 
 
 def part(polygon: Callable[[int], Polygon], seeds: range) -> tuple[list[Row], list[str]]:
-    """Figures of the decent ones, messages of the refused ones."""
+    """Figures of the accepted splines, messages of the refused ones."""
     rows: list[Row] = []
     refused: list[str] = []
     for seed in seeds:
@@ -67,7 +67,7 @@ def campaign(polygon: Callable[[int], Polygon], count: int) -> dict[str, Any]:
     return {
         "polygons": count,
         "seeds": f"0 to {count - 1}",
-        "decent": len(table),
+        "accepted": len(table),
         "rate_percent": 100 * len(table) / count,
         "refused": refused[:10],
         "iterations_median": float(np.median(iterations)),

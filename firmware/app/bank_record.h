@@ -5,9 +5,9 @@
  *
  *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
  *
- * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check, so
- * that a bank without a valid record never counts, whenever the power failed. Of two valid ones the later sequence
- * (modulo 2^32) is the newer content. Main loop.
+ * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check. A bank
+ * without a valid record is ignored: the power failed before the record was complete. Of two banks with valid records
+ * the one with the later sequence number (modulo 2^32) has the newer content. Main loop.
  */
 #ifndef APP_BANK_RECORD_H
 #define APP_BANK_RECORD_H

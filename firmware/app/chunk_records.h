@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * chunk_records: the coefficient records of a job in chunks: those near the motion, in the memory of the port
- * (core/coefficient_cache.h). The main loop makes them ahead of the tick: some half of the cache is ahead of the motion.
- * Where the main loop stands still for longer than that, the tick has no point: the fault EMCY 0x6100, and the drives stop by
- * their own ramps, as when the main loop stands still at all (FAULT_MAIN_LOOP_STALL).
- * Main loop; machine is locked here where it has to be.
+ * chunk_records: the coefficient records of a job in chunks. Only records near the motion exist, in the port's memory
+ * for them (core/coefficient_cache.h). The main loop computes them ahead of the tick, for about half of the cache. If the
+ * main loop stalls for longer than that, the tick has no point: fault 0x6100, and the drives stop by their own ramps.
+ *
+ * Used by app/stream. Main loop; takes the machine's lock where it is needed.
  */
 #ifndef APP_CHUNK_RECORDS_H
 #define APP_CHUNK_RECORDS_H

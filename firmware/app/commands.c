@@ -17,7 +17,7 @@ static enum machine_refusal locked(struct machine *machine,
     return refusal;
 }
 
-/* The start of the program is exactly the image's point; anywhere else the kernel says where. */
+/* At the start of the program the point is that of the image; elsewhere the kernel computes it. */
 static int prepare(struct controller *controller, int64_t from_q40_mm, struct motion *prepared,
                    int32_t start_counts[AXES_MAX])
 {
@@ -115,7 +115,8 @@ static enum machine_refusal home(struct controller *controller)
 {
     return too_late_for_real_drives(controller)
                ? MACHINE_NOT_IN_TIME
-               : homing_begin(&controller->homing, &controller->machine, controller->boot.facts);
+               : homing_begin(&controller->homing, &controller->machine,
+                              controller->boot.properties);
 }
 
 /* What keeps the controller from beginning anything. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* commands: object 0x2001. Main loop. */
+/* commands: executes the commands of the operator, which are written to object 0x2001. Called by objects.c; urgent ones also
+ * by controller.c while a chunk is checked. Main loop. */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
 
@@ -26,11 +27,10 @@ static inline bool command_is_urgent(uint8_t number)
            number == (uint8_t)COMMAND_QUICK_STOP;
 }
 
-/* Whether the frame is an SDO request of this node to do one of these, in the one form that passes at any time.
- * Pure. */
+/* Whether a frame is an SDO request to this node for an urgent command: an expedited write of one byte. Pure. */
 bool command_urgent_request(const struct can_msg *frame, uint8_t node);
 
-/* Those of a set (bit by enum command), the most severe last. Under the lock. */
+/* Executes the urgent commands of a set (bit: enum command), the most severe last. Under the lock. */
 void commands_execute_urgent(struct machine *machine, uint16_t set);
 
 /* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. */

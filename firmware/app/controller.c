@@ -44,7 +44,7 @@ void controller_start_itself(struct controller *controller)
  * below 0x2000, get their stored values (0x1010) or else their defaults. The program stays: it is no parameter. The
  * resets come while the machine is configurable only. */
 
-/* The whole configuration anew from the objects; the drives have to be configured by it. */
+/* Reads the whole configuration from the objects again; the drives have to be configured by it. */
 static void take_configuration(struct controller *controller)
 {
     config_read(&controller->config, &controller->od);
@@ -357,7 +357,7 @@ static bool boot_requested(struct machine *machine)
 }
 
 /* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 reports changes only. */
-static void note_facts(struct controller *controller, const struct can_msg *command)
+static void note_properties(struct controller *controller, const struct can_msg *command)
 {
     if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
         return;
@@ -366,12 +366,12 @@ static void note_facts(struct controller *controller, const struct can_msg *comm
     struct axis *axis = machine_axis(&controller->machine, command->data[1]);
     if (axis != NULL) {
         const uint32_t i = (uint32_t)(axis - controller->machine.axes);
-        const struct drive_properties *facts = &controller->boot.facts[i];
-        axis->digital_inputs = facts->value[DRIVE_INPUTS];
-        axis->torque_mapped = facts->known[DRIVE_TORQUE_MAPPED];
-        axis->velocity_mapped = facts->known[DRIVE_VELOCITY_MAPPED];
-        if (facts->known[DRIVE_POSITION]) {
-            axis_reconnected(axis, (int32_t)facts->value[DRIVE_POSITION],
+        const struct drive_properties *properties = &controller->boot.properties[i];
+        axis->digital_inputs = properties->value[DRIVE_INPUTS];
+        axis->torque_mapped = properties->known[DRIVE_TORQUE_MAPPED];
+        axis->velocity_mapped = properties->known[DRIVE_VELOCITY_MAPPED];
+        if (properties->known[DRIVE_POSITION]) {
+            axis_reconnected(axis, (int32_t)properties->value[DRIVE_POSITION],
                              MACHINE_KEPT_UNITS * config_counts_per_unit(&controller->config, i));
         } else {
             axis->homed = false;
@@ -399,7 +399,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
     struct can_msg out;
     bool due = drive_boot_process(&controller->boot, elapsed_us, &out);
     while (due) {
-        note_facts(controller, &out);
+        note_properties(controller, &out);
         controller_send(&out);
         due = drive_boot_process(&controller->boot, 0, &out);
     }
@@ -430,8 +430,8 @@ static void poll_drives(struct controller *controller, uint32_t elapsed_us)
     port_unlock();
     struct can_msg out;
     const bool allowed = found && !controller->ending && !homing_busy(&controller->homing);
-    if (drive_polling_process(&controller->polling, &controller->machine, controller->boot.facts,
-                              allowed, elapsed_us, &out)) {
+    if (drive_polling_process(&controller->polling, &controller->machine,
+                              controller->boot.properties, allowed, elapsed_us, &out)) {
         controller_send(&out);
     }
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* frame_queue: frames from the receive interrupt to the main loop, in order. */
+/* frame_queue: passes frames from the receive interrupt to the main loop, in their order. One producer, one consumer. */
 #ifndef APP_FRAME_QUEUE_H
 #define APP_FRAME_QUEUE_H
 
@@ -8,13 +8,13 @@
 
 #include "can/can_frame.h"
 
-/* A whole SDO block (127 segments) comes without a pause, among other traffic. */
+/* An SDO block of 127 segments comes without a pause, with other frames between. */
 #define FRAME_QUEUE_SIZE 256u
 
 struct frame_queue {
     uint32_t head; /* frames ever put in; wraps */
     uint32_t tail; /* frames ever taken out */
-    uint32_t lost; /* frames that found no room */
+    uint32_t lost; /* frames lost because the queue was full */
     struct can_msg frames[FRAME_QUEUE_SIZE];
 };
 

@@ -193,7 +193,7 @@ static bool configurable(const struct controller *controller)
     return possible;
 }
 
-/* CiA 301: a 1 says that it stores, or restores, on command. */
+/* CiA 301: 1 means that the device stores, or restores, on command. */
 static uint64_t object_read_on_command(struct controller *controller, const struct od_entry *entry)
 {
     (void)controller;
@@ -323,7 +323,7 @@ struct object {
     uint16_t last;
     uint8_t sub_first;
     uint8_t sub_last;
-    bool locked; /* `read` looks at what interrupts write */
+    bool locked; /* `read` reads values that interrupts write */
 
     /* The present value, two's complement in 64 bits. */
     uint64_t (*read)(struct controller *controller, const struct od_entry *entry);

@@ -74,7 +74,7 @@ uint64_t object_read_drive_state(struct controller *controller, const struct od_
 
 uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry)
 {
-    return controller->boot.facts[entry->sub - 1u].value[entry->index - 0x2027u];
+    return controller->boot.properties[entry->sub - 1u].value[entry->index - 0x2027u];
 }
 
 /* ---- PDO parameters: 0x1400, 0x1800, 0x1A00 + i of axis i; 0x1806, 0x1A06 + i ---- */

@@ -3,12 +3,12 @@
  * objects_axis: handlers of objects that have one value for each axis, for the table in objects.c.
  *
  *   0x200A ... 0x200E, 0x2017, 0x201B, 0x201C, 0x2024, 0x2026 ... 0x202C
- *               sub i + 1: axis i: what its drive reported last, what it was sent
+ *               sub i + 1: axis i: the last values that its drive reported, or was sent
  *   0x1400 + i  TPDO1 of its drive      0x1800 + i  its RPDO1; third object 0x202B where the drive maps a torque offset
  *                                       0x1806 + i  its RPDO2, where the drive maps a velocity offset
  *
- * PDO parameters say what is on the bus: those of axes that are not configured, and offsets that are not sent, have bit
- * 31 of the COB-ID set.
+ * PDO parameters describe the frames on the bus. PDOs of axes that are not configured, and of offsets that are not sent,
+ * have bit 31 of the COB-ID set.
  *
  * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under
  * the lock.

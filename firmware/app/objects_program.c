@@ -80,7 +80,7 @@ uint32_t object_program_read(void *context, const struct od_entry *entry, uint32
     return SDO_OK;
 }
 
-/* ---- From sub 2 on: state of the upload, what the program says of itself ---- */
+/* ---- From sub 2 on: state of the upload, properties of the program ---- */
 
 static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 {
@@ -111,7 +111,7 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 #define START_REST  25u
 #define END_REST    (START_REST + AXES_MAX - PROGRAM_PLANE)
 
-/* The first piece in which a stop takes as long as the header says that one takes at most. */
+/* The first piece whose stop time bound is the longest one, which the header holds. */
 static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,
                               uint32_t worst_us)
 {

@@ -8,15 +8,14 @@
  *
  * Parameters are all objects that can be read and written and that describe the machine, its drives, or this node on
  * the bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save
- * writes them to the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h):
- * wherever the power goes, either the old parameters or the new ones are found again, whole. Layout of the content:
+ * writes them to the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h). So
+ * after a loss of power at any moment the old parameters or the new ones are found, complete. Layout of the content:
  *
  *     CRC-32 of (index u16, sub u8, size u8) of each parameter u32 | CRC-32 of the configuration u32 | confirmed u8 |
  *     zero u8 x 3 | values in rising order of (index, sub), little-endian | zeros to a multiple of 8 bytes
  *
- * A content of 0 bytes means that the defaults are wanted (0x1011). The newest record decides: where its content is
- * damaged, has a value that this firmware does not take, or is of a firmware with other parameters, nothing is
- * restored, neither a part of it nor the parameters before. Main loop.
+ * A content of 0 bytes stands for the defaults (0x1011). Only the content of the newest record is used. If it is damaged,
+ * has a value that this firmware refuses, or is of a firmware with other parameters, nothing is restored. Main loop.
  */
 #ifndef APP_PARAMETER_STORE_H
 #define APP_PARAMETER_STORE_H

@@ -2,12 +2,14 @@
 /*
  * program_slot: the active program and the upload of its successor (object 0x2000).
  *
- * An upload goes to the spare bank of the port's store; only a complete image that passes every check takes over, so a
- * broken or refused one leaves the active program as it was. What has taken over carries a record (bank_record.h), by
- * which it is found again after a loss of power at any moment: it, or its predecessor. A program is bound to the
- * configuration it was checked against, by that one's CRC-32, which the record keeps: under another configuration, and
- * once after each power-on, it is checked again before it counts. Main loop. Nobody may run the program while an upload
- * ends (see machine_moving).
+ * An upload goes to the spare bank of the port's store. Only a complete image that passes every check becomes the active
+ * program. A broken or refused upload leaves the active program unchanged. The commit record of a bank (bank_record.h)
+ * is written last. So after a loss of power at any moment the new program or its predecessor is found.
+ *
+ * The commit record also holds the CRC-32 of the configuration that the program was checked against. Under another
+ * configuration, and once after each power-on, the program is checked again before it may run.
+ *
+ * Main loop. The program must not run when an upload ends (see machine_moving).
  */
 #ifndef APP_PROGRAM_SLOT_H
 #define APP_PROGRAM_SLOT_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program_table: the coefficient records (core/coefficients.h) of the program in a bank of the store, right after its
- * image, for the kernel that the tick uses. The controller makes them itself when an upload has passed its checks; what
- * it finds there after power-on it compares with what it would write. Main loop.
+ * program_table: stores the coefficient records (core/coefficients.h) of a program in its bank, after the image. They are
+ * for the kernel that the tick uses. The controller computes them when an upload has passed its checks. After power-on it
+ * compares the stored records with those that it would write. Used by app/program_slot. Main loop.
  */
 #ifndef APP_PROGRAM_TABLE_H
 #define APP_PROGRAM_TABLE_H

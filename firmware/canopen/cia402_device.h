@@ -21,7 +21,7 @@ enum cia402_action {
     CIA402_SLOW_DOWN,     /* leaving Operation enabled (0x605B, 0x605C): stop, then
                          cia402_device_stopped */
     CIA402_STOP_QUICKLY,  /* Quick stop active: stop with 0x6085, then cia402_device_stopped */
-    CIA402_STOP_FOR_FAULT /* Fault reaction: as 0x605E says, then cia402_device_stopped */
+    CIA402_STOP_FOR_FAULT /* Fault reaction by 0x605E, then cia402_device_stopped */
 };
 
 /* Option codes, from the object dictionary. */

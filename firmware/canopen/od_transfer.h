@@ -35,14 +35,14 @@ struct od_transfer {
 
 void od_transfer_init(struct od_transfer *t, struct od *od);
 
-/* `announced`: size in bytes as the client says it, 0: it does not. Checks existence, access and size. */
+/* `announced`: size in bytes that the client announced; 0: none. Checks existence, access and size. */
 uint32_t od_transfer_begin_write(struct od_transfer *t, uint16_t index, uint8_t sub,
                                  uint32_t announced);
 
 /* The next `size` bytes. SDO_ABORT_TOO_LONG beyond what was announced, or what the value has room for. */
 uint32_t od_transfer_put(struct od_transfer *t, const uint8_t *data, uint32_t size);
 
-/* All bytes are there: SDO_ABORT_TOO_SHORT when fewer than announced, else what the dictionary says. */
+/* All bytes are there: SDO_ABORT_TOO_SHORT when fewer than announced, else the result of the dictionary. */
 uint32_t od_transfer_finish_write(struct od_transfer *t);
 
 /* Sets `size`. Checks existence and access. */

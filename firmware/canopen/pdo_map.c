@@ -21,7 +21,7 @@ enum {
 };
 
 #define FRAME_29_BITS UINT32_C(0x20000000)
-/* Bit 30 only says whether a remote request is permitted: there are none here. */
+/* Bit 30 (remote requests permitted) has no meaning: there are no remote requests. */
 #define IDENTITY_BITS UINT32_C(0x3FFFFFFF)
 
 /* ---- Parameters, as the dictionary has them ---- */

@@ -363,7 +363,7 @@ static bool block_upload_initiate(struct sdo_server *s, const uint8_t *data, str
     return true;
 }
 
-/* Repeated segments count once: `moved` says how far the CRC has come. */
+/* Repeated segments count once: the CRC covers the first `moved` bytes. */
 static void add_to_crc(struct sdo_server *s, uint32_t offset, const uint8_t *data, uint32_t size)
 {
     if (offset == s->object.moved) {

@@ -48,7 +48,7 @@ _LIMIT_DIGITS = 9  # of a signal's least and greatest value: 0.1 is no sum of po
 
 
 def dbc_text(machine: Machine, eds: Path = DRIVE_EDS) -> str:
-    """The DBC of a machine whose drives are as `eds` says, with CR LF.
+    """The DBC of a machine with drives by `eds`, with CR LF.
 
     Raises InputError: the EDS cannot be read, or gives two objects of a PDO the same name.
     """

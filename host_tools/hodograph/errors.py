@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Everything that can go wrong, as one tree of exceptions.
 
-A message is one line that says what, where and what to do. Only `hodograph.cli.main` turns an
+A message is one line: what is wrong, where, and what to do. Only `hodograph.cli.main` turns an
 exception into a line on stderr and an exit status; the table of statuses is docs/reference/cli.md.
 """
 

@@ -425,7 +425,7 @@ def load_job(
 
 
 def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Command]:
-    """The commands of a file; what the reader of a drawing or of points says goes to `notes`. Raises InputError."""
+    """The commands of a file; notes of the reader of a drawing or of points are added to `notes`. Raises InputError."""
     for command in read_toolpath(file, reading):
         if isinstance(command, Message) and not is_gcode(file):
             place = f"{file}:{command.line}" if command.line else str(file)

@@ -33,7 +33,7 @@ _BOOT_S = 1.0
 _AROUND = 500
 """Ticks on both sides within which the clocks of tick and stamps do not drift apart."""
 _MISSED = 2.0
-"""Periods between two ticks: a controller whose tick is a period late begins its clock anew."""
+"""Periods between two ticks: a controller whose tick is a period late restarts its clock."""
 
 
 @dataclass(frozen=True)

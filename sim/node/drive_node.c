@@ -95,7 +95,7 @@ int drive_node_init(struct drive_node *node, uint8_t id, const struct drive_conf
 
 /* ---- time ---- */
 
-/* Enabling the drive begins the timeout of SYNC anew. */
+/* Enabling the drive restarts the timeout of SYNC. */
 static void follow_enabling(struct drive_node *node)
 {
     if (node->servo.enabled_now) {

@@ -37,7 +37,7 @@ struct drive_pdos {
 void drive_pdos_init(struct drive_pdos *pdos, struct od *od, struct servo *servo,
                      struct drive_node_port port);
 
-/* The NMT state changes: deadlines and counters begin anew. */
+/* The NMT state changes: deadlines and counters restart. */
 void drive_pdos_rest(struct drive_pdos *pdos);
 
 /* The od's hooks, for 0x1400 ... 0x1BFF: whether a write is permitted (SDO_OK or an abort code); it has happened. */

@@ -44,7 +44,7 @@ static void reset_communication(void *context)
     begin_communication(module);
 }
 
-/* CiA 401: 0x6206 says bit by bit, 0x6443 by output, whether the error value is taken or the output stays. */
+/* CiA 401: 0x6206 (for each bit) and 0x6443 (for each output) select the error value, or that the output stays. */
 static void take_error_values(struct io_module *module)
 {
     struct od_module *v = &module->values;

@@ -34,7 +34,7 @@ struct io_module {
     struct pdo_map rpdos[IO_MODULE_RPDOS];
     struct drive_node_port port;
     bool master_seen; /* a heartbeat of the master, since the last io_module_process */
-    bool moved;       /* RPDOs have other identifiers: filters have to be set anew */
+    bool moved;       /* RPDOs have other identifiers: filters have to be set again */
     uint8_t id;       /* 0: there is no module */
 };
 

@@ -22,7 +22,7 @@ struct sync_clock {
 /* The SYNC that follows is the first one. `overflow` is 0x1019. */
 void sync_clock_reset_counter(struct sync_clock *clock, uint8_t overflow);
 
-/* SYNC is the time base, and its timeout begins anew. */
+/* SYNC is the time base, and its timeout restarts. */
 void sync_clock_await(struct sync_clock *clock);
 
 /* A SYNC frame. Returns the periods since the last one, 0 if it is repeated, or a negative SYNC_... code. After a loss

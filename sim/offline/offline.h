@@ -60,7 +60,7 @@ struct offline_order {
 struct offline_stop {
     uint32_t tick;       /* of the order, */
     uint32_t rest_tick;  /* and the first setpoint at rest; UINT32_MAX: there was none yet */
-    uint32_t bound_us;   /* what the stop table says, where it was ordered */
+    uint32_t bound_us;   /* of the stop table, at the piece in which it was commanded */
     int64_t from_q40_mm; /* arc length of the last setpoint before the order, */
     int64_t rest_q40_mm; /* and at rest */
 };
@@ -116,7 +116,7 @@ void offline_feedforward(struct offline *sim, const struct feedforward_gains *ga
 void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double friction_volts);
 
 /* Faults of this run, right after offline_begin; they must outlive the simulation. Positions and contour error stay
- * those of the axis itself, whatever its encoder says. Of faults of one kind and axis one acts at a time.
+ * those of the axis itself, not of its encoder. Only one fault of a kind acts on an axis at a time.
  * Returns 0 or OFFLINE_ERR_FAULT. */
 int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count);
 

@@ -49,7 +49,7 @@ void influence_period(const struct influence *influence, struct drive *drive,
 bool influence_coast(const struct influence *influence, struct drive *drive, double brake_volts);
 
 /* One bus period in which the motor works against its own motion with so many volts (more than 0; those in force at
- * most), until it stands; from there on the loop begins anew. True when the axis is at rest. */
+ * most), until it stands; from there on the loop restarts. True when the axis is at rest. */
 bool influence_brake(const struct influence *influence, struct drive *drive, double volts);
 
 #endif

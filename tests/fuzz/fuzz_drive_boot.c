@@ -160,13 +160,14 @@ static void deliver(struct fuzz_input *in)
 static bool identity_fits(unsigned axis)
 {
     const struct config_axis *expected = &self.config.axis[axis];
-    const struct drive_properties *facts = &self.boot.facts[axis];
+    const struct drive_properties *properties = &self.boot.properties[axis];
     const uint32_t wanted[3] = {expected->expected_vendor, expected->expected_product,
                                 expected->expected_revision};
     bool fits = true;
     for (unsigned i = 0; i < 3u; ++i) {
-        fits = fits && (wanted[i] == 0u || (facts->known[(unsigned)DRIVE_VENDOR + i] &&
-                                            facts->value[(unsigned)DRIVE_VENDOR + i] == wanted[i]));
+        fits = fits &&
+               (wanted[i] == 0u || (properties->known[(unsigned)DRIVE_VENDOR + i] &&
+                                    properties->value[(unsigned)DRIVE_VENDOR + i] == wanted[i]));
     }
     return fits;
 }

@@ -249,7 +249,7 @@ def master_with_switches(
 
 @pytest.mark.parametrize("method", [17, 18])
 def test_homing_with_a_limit_switch(master_with_switches: Master, method: int) -> None:
-    """The zero is where the switch lets go."""
+    """The zero is where the switch goes off."""
     node = master_with_switches.node
     node.sdo[0x6098].raw = method
     node.sdo[0x6099][1].raw = 20_000_000

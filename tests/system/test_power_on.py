@@ -37,7 +37,7 @@ def machine_file(folder: Path, more_of_x: str = "", name: str = "machine") -> Pa
     return file
 
 
-class Stand:
+class PowerBench:
     """A controller with a store that outlives it, and drives: each with a switch of its own."""
 
     def __init__(self, hub: LocalHub, clock: VirtualClock, folder: Path) -> None:
@@ -78,8 +78,8 @@ class Stand:
 
 
 @pytest.fixture
-def stand(hub: LocalHub, clock: VirtualClock, tmp_path: Path) -> Iterator[Stand]:
-    made = Stand(hub, clock, tmp_path)
+def bench(hub: LocalHub, clock: VirtualClock, tmp_path: Path) -> Iterator[PowerBench]:
+    made = PowerBench(hub, clock, tmp_path)
     try:
         made.drives_on()
         made.controller_on()
@@ -117,13 +117,13 @@ def homed(say: Say) -> list[bool]:
 # --- configuration ---
 
 
-def test_stored_parameters_and_program_are_there_again(stand: Stand, say: Say) -> None:
+def test_stored_parameters_and_program_are_there_again(bench: PowerBench, say: Say) -> None:
     assert "stored" in say("configure", ALPHA, "--store")
     say("upload", ALPHA)
     before = look(say)
-    stand.off("controller")
-    stand.controller_on()
-    stand.until_off()
+    bench.off("controller")
+    bench.controller_on()
+    bench.until_off()
     after = look(say)
     assert after["configuration"]["state"] == "restored"
     assert after["configuration"]["stored"] == "whole"
@@ -134,11 +134,11 @@ def test_stored_parameters_and_program_are_there_again(stand: Stand, say: Say) -
     assert say("start", "--follow") == "done\n"
 
 
-def test_a_program_without_its_configuration_does_not_run(stand: Stand, say: Say) -> None:
+def test_a_program_without_its_configuration_does_not_run(bench: PowerBench, say: Say) -> None:
     say("upload", ALPHA)
-    stand.off("controller")
-    stand.controller_on()
-    stand.until_off()
+    bench.off("controller")
+    bench.controller_on()
+    bench.until_off()
     found = look(say)
     assert found["program"]["state"] == "ready"
     assert found["configuration"]["state"] == "none"
@@ -149,7 +149,9 @@ def test_a_program_without_its_configuration_does_not_run(stand: Stand, say: Say
     assert say("start", "--follow") == "done\n"
 
 
-def test_another_machine_file_holds_until_power_off(stand: Stand, say: Say, tmp_path: Path) -> None:
+def test_another_machine_file_holds_until_power_off(
+    bench: PowerBench, say: Say, tmp_path: Path
+) -> None:
     """Two in turn: the stored one comes back; a program is checked under the one that holds."""
     slow = tmp_path / "slow.toml"
     text = machine_file(tmp_path).read_text()
@@ -160,26 +162,26 @@ def test_another_machine_file_holds_until_power_off(stand: Stand, say: Say, tmp_
     assert "another one is stored" in say("status")
     assert "not within the limits" in say("start", status=REFUSED)
     say("stop", "--off")
-    stand.off("controller")
-    stand.controller_on()
-    stand.until_off()
+    bench.off("controller")
+    bench.controller_on()
+    bench.until_off()
     assert look(say)["configuration"]["state"] == "restored"
     assert say("start", "--follow") == "done\n"
 
 
-def test_what_is_forgotten_does_not_come_back(stand: Stand, say: Say) -> None:
+def test_what_is_forgotten_does_not_come_back(bench: PowerBench, say: Say) -> None:
     say("configure", ALPHA, "--store")
     assert say("configure", "--forget") == "nothing is stored any more\n"
     found = look(say)["configuration"]
     assert (found["state"], found["stored"]) == ("confirmed", "defaults")
-    stand.off("controller")
-    stand.controller_on()
+    bench.off("controller")
+    bench.controller_on()
     assert look(say)["configuration"]["state"] == "none"
 
 
-def test_stored_with_the_drives_off_only(stand: Stand, say: Say) -> None:
+def test_stored_with_the_drives_off_only(bench: PowerBench, say: Say) -> None:
     say("configure", ALPHA)
-    with stand.controller() as controller:
+    with bench.controller() as controller:
         controller.enable()
     assert "hodograph stop --off first" in say("configure", "--store", status=REFUSED)
     say("stop", "--off")
@@ -189,29 +191,29 @@ def test_stored_with_the_drives_off_only(stand: Stand, say: Say) -> None:
 @pytest.mark.parametrize(
     "words", [["configure"], ["configure", ALPHA, "--forget"], ["configure", "--set-node", "128"]]
 )
-def test_configure_without_sense(stand: Stand, say: Say, words: list[str]) -> None:
+def test_configure_without_sense(bench: PowerBench, say: Say, words: list[str]) -> None:
     assert say(*words, status=2)
 
 
-def test_a_stored_node_number(stand: Stand, say: Say) -> None:
+def test_a_stored_node_number(bench: PowerBench, say: Say) -> None:
     assert "5 after the next power-on" in say("configure", "--set-node", "5")
     assert look(say)["node"] == 1
-    stand.off("controller")
-    stand.controller_on()
+    bench.off("controller")
+    bench.controller_on()
     assert look(say, "--node", "5")["node"] == 5
     assert "the board's own after the next power-on" in say(
         "configure", "--node", "5", "--set-node", "0"
     )
-    stand.off("controller")
-    stand.controller_on()
+    bench.off("controller")
+    bench.controller_on()
     assert look(say)["node"] == 1
 
 
 @pytest.mark.parametrize("file", sorted(PAPER_ALPHA.parent.glob("*.toml")), ids=lambda f: f.stem)
-def test_host_and_controller_have_the_same_crc(stand: Stand, file: Path) -> None:
+def test_host_and_controller_have_the_same_crc(bench: PowerBench, file: Path) -> None:
     """Whatever was configured before: from each to each, and what is there already costs no write."""
-    stand.off("drives")
-    with stand.controller() as controller:
+    bench.off("drives")
+    with bench.controller() as controller:
         for machine in (load_machine(PAPER_ALPHA), load_machine(file)):
             controller.configure(machine, "float")
             assert controller.configuration_crc() is not None
@@ -219,10 +221,10 @@ def test_host_and_controller_have_the_same_crc(stand: Stand, file: Path) -> None
         assert controller.configure(load_machine(file), "fixed")
 
 
-def test_a_store_file_that_is_none(stand: Stand, tmp_path: Path) -> None:
+def test_a_store_file_that_is_none(bench: PowerBench, tmp_path: Path) -> None:
     wrong = tmp_path / "wrong"
     wrong.write_text("no store")
-    command = controller_command(stand.machine, stand._hub.address, "real-time")
+    command = controller_command(bench.machine, bench._hub.address, "real-time")
     for file, words in (
         (wrong, "is no store of this controller"),
         (tmp_path / "store", "another controller uses this file"),
@@ -239,10 +241,10 @@ def test_a_store_file_that_is_none(stand: Stand, tmp_path: Path) -> None:
 # --- identity ---
 
 
-def test_a_drive_of_another_identity(stand: Stand, say: Say, tmp_path: Path) -> None:
+def test_a_drive_of_another_identity(bench: PowerBench, say: Say, tmp_path: Path) -> None:
     other = machine_file(tmp_path, "[axis.identity]\nproduct = 0x15\n")
     say("upload", ALPHA, "--machine", str(other))
-    stand.clock.sleep(1.0)
+    bench.clock.sleep(1.0)
     trouble = look(say)["boot_trouble"]
     assert (trouble["node"], trouble["index"], trouble["sub"]) == (2, 0x1018, 2)
     for words in (trouble["text"], say("start", status=4)):
@@ -252,13 +254,13 @@ def test_a_drive_of_another_identity(stand: Stand, say: Say, tmp_path: Path) -> 
         )
     right = machine_file(tmp_path, "[axis.identity]\nproduct = 2\nrevision = 0x10000\n", "right")
     say("upload", ALPHA, "--machine", str(right))
-    stand.until_off()
+    bench.until_off()
 
 
 # --- homing ---
 
 
-def test_nothing_moves_before_it_is_homed(stand: Stand, say: Say, tmp_path: Path) -> None:
+def test_nothing_moves_before_it_is_homed(bench: PowerBench, say: Say, tmp_path: Path) -> None:
     machine = ("--machine", str(machine_file(tmp_path, HERE_IS_HOME)))
     assert "not homed" in say("goto", str(machine[1]), "--to", "1", "1", status=REFUSED)
     say("stop", "--off")
@@ -271,7 +273,7 @@ def test_nothing_moves_before_it_is_homed(stand: Stand, say: Say, tmp_path: Path
     assert look(say)["unhomed_nodes"] == []
 
 
-def test_on_purpose(stand: Stand, say: Say, tmp_path: Path) -> None:
+def test_on_purpose(bench: PowerBench, say: Say, tmp_path: Path) -> None:
     machine = ("--machine", str(machine_file(tmp_path, HERE_IS_HOME)))
     say("goto", ALPHA, *machine, "--unhomed")
     assert "not homed" in say("start", status=REFUSED)
@@ -289,11 +291,11 @@ def test_on_purpose(stand: Stand, say: Say, tmp_path: Path) -> None:
 def test_a_fault_reset_keeps_the_zero(
     hub: LocalHub, clock: VirtualClock, tmp_path: Path, say: Say
 ) -> None:
-    stand = Stand(hub, clock, tmp_path)
+    bench = PowerBench(hub, clock, tmp_path)
     machine = ("--machine", str(machine_file(tmp_path, HERE_IS_HOME)))
     try:
-        stand.drives_on("fault code=0x2310 node=2 at=300\n")
-        stand.controller_on()
+        bench.drives_on("fault code=0x2310 node=2 at=300\n")
+        bench.controller_on()
         say("upload", ALPHA, *machine)
         say("home")
         say("start", "--follow", status=6)
@@ -302,7 +304,7 @@ def test_a_fault_reset_keeps_the_zero(
         say("goto", ALPHA, *machine)
         assert say("start", "--follow") == "done\n"
     finally:
-        stand.close()
+        bench.close()
 
 
 @pytest.mark.parametrize("pause_s", [0.0, long(0.3), long(3.0)])
@@ -310,7 +312,7 @@ def test_a_fault_reset_keeps_the_zero(
     "switched", [("drives",), ("controller",), ("drives", "controller")], ids="+".join
 )
 def test_power_cycles_cost_the_zero(
-    stand: Stand, say: Say, tmp_path: Path, switched: tuple[str, ...], pause_s: float
+    bench: PowerBench, say: Say, tmp_path: Path, switched: tuple[str, ...], pause_s: float
 ) -> None:
     """Drives lose it; a new controller cannot know. What is stored is restored in each case."""
     file = str(machine_file(tmp_path, HERE_IS_HOME))
@@ -319,14 +321,14 @@ def test_power_cycles_cost_the_zero(
     say("home")
     assert homed(say) == [True, False]
     for name in switched:
-        stand.off(name)
-    stand.clock.sleep(pause_s)
+        bench.off(name)
+    bench.clock.sleep(pause_s)
     if "drives" in switched:
-        stand.drives_on()
+        bench.drives_on()
     if "controller" in switched:
-        stand.controller_on()
-    stand.clock.sleep(1.0)
-    stand.until_off()
+        bench.controller_on()
+    bench.clock.sleep(1.0)
+    bench.until_off()
     assert homed(say) == [False, False]
     assert "not homed" in say("start", status=REFUSED)
     say("stop", "--off")
@@ -334,16 +336,16 @@ def test_power_cycles_cost_the_zero(
     assert say("start", "--follow") == "done\n"
 
 
-def test_drives_switched_while_they_run(stand: Stand, say: Say, tmp_path: Path) -> None:
+def test_drives_switched_while_they_run(bench: PowerBench, say: Say, tmp_path: Path) -> None:
     file = str(machine_file(tmp_path, HERE_IS_HOME))
     say("upload", ALPHA, "--machine", file)
     say("home")
     say("start")
-    stand.clock.sleep(0.3)
-    stand.off("drives")
-    stand.clock.sleep(0.5)
-    stand.drives_on()
-    stand.clock.sleep(1.0)
+    bench.clock.sleep(0.3)
+    bench.off("drives")
+    bench.clock.sleep(0.5)
+    bench.drives_on()
+    bench.clock.sleep(1.0)
     assert look(say)["state"] == "fault"
     say("reset")
     assert homed(say) == [False, False]

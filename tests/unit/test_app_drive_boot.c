@@ -193,7 +193,7 @@ static void test_a_fixed_mapping_passes_if_it_is_the_right_one(void)
     drive(0)->values.tpdo3_mapping_parameter.mapped_object_1 = 0x60FD0020;
     drive(0)->values.rpdo1_communication_parameter.event_timer = 200;
     boot();
-    TEST_ASSERT_TRUE(bench.controller.boot.facts[0].known[DRIVE_INPUTS_MAPPED]);
+    TEST_ASSERT_TRUE(bench.controller.boot.properties[0].known[DRIVE_INPUTS_MAPPED]);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 11, 1, 1));
     expect_trouble(2, 0x160003, SDO_ABORT_READ_ONLY);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 11, 0, 1));
@@ -209,8 +209,8 @@ static void test_inputs_without_their_pdo(void)
     drive(1)->values.tpdo3_mapping_parameter.mapped_object_1 = 0x60410010;
     drive(1)->values.digital_inputs = 4;
     boot();
-    TEST_ASSERT_FALSE(bench.controller.boot.facts[0].known[DRIVE_INPUTS_MAPPED]);
-    TEST_ASSERT_FALSE(bench.controller.boot.facts[1].known[DRIVE_INPUTS_MAPPED]);
+    TEST_ASSERT_FALSE(bench.controller.boot.properties[0].known[DRIVE_INPUTS_MAPPED]);
+    TEST_ASSERT_FALSE(bench.controller.boot.properties[1].known[DRIVE_INPUTS_MAPPED]);
     TEST_ASSERT_TRUE((drive(1)->values.tpdo3_communication_parameter.cob_id & 0x80000000u) != 0u);
     TEST_ASSERT_EQUAL_INT64(4, app_bench_read(&bench, 0x201B, 2));
     drive(0)->values.digital_inputs = 2;
@@ -337,10 +337,10 @@ static void test_what_a_drive_says_of_itself_is_kept(void)
     drive(1)->values.identity_object.vendor_id = 0x123;
     drive(1)->values.identity_object.serial_number = 99;
     boot();
-    const struct drive_properties *facts = bench.controller.boot.facts;
-    TEST_ASSERT_TRUE(drive_is_simulated(&facts[0]));
-    TEST_ASSERT_FALSE(drive_is_simulated(&facts[1]));
-    TEST_ASSERT_EQUAL_UINT32(99, facts[1].value[DRIVE_SERIAL]);
+    const struct drive_properties *properties = bench.controller.boot.properties;
+    TEST_ASSERT_TRUE(drive_is_simulated(&properties[0]));
+    TEST_ASSERT_FALSE(drive_is_simulated(&properties[1]));
+    TEST_ASSERT_EQUAL_UINT32(99, properties[1].value[DRIVE_SERIAL]);
     TEST_ASSERT_EQUAL_INT64(2, app_bench_read(&bench, 0x2028, 1));
     TEST_ASSERT_EQUAL_INT64(0x123, app_bench_read(&bench, 0x2027, 2));
     TEST_ASSERT_EQUAL_INT64(99, app_bench_read(&bench, 0x202A, 2));

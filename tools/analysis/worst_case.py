@@ -240,7 +240,7 @@ def restless(ticks: int = 3000) -> list[tuple[int, int]]:
 
 
 def jitter(ticks: int = 3000) -> list[tuple[int, int]]:
-    """Near 200 %, another wish every second tick."""
+    """Near 200 %, another commanded override every second tick."""
     return [(k, 200 - k % 4 * 2) for k in range(0, ticks, 2)]
 
 

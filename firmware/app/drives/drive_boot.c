@@ -80,7 +80,7 @@ static void judge_read(struct drive_boot *boot)
 {
     const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
     if (as_wanted(&boot->op, value)) {
-        drive_properties_read(boot->configuration.facts, boot->op.fact, value);
+        drive_properties_read(boot->configuration.properties, boot->op.fact, value);
         advance(boot);
     } else if (boot->reading_back) {
         refused(boot, boot->refused_code, value);
@@ -125,7 +125,7 @@ static void take_response(struct drive_boot *boot)
 static void begin_drive(struct drive_boot *boot)
 {
     drive_configuration_begin(&boot->configuration, &boot->config, boot->axis,
-                              &boot->facts[boot->axis]);
+                              &boot->properties[boot->axis]);
     boot->reading_back = false;
     boot->reads = 0;
 }
@@ -134,7 +134,8 @@ static void begin_drive(struct drive_boot *boot)
 static void finish_drive(struct drive_boot *boot)
 {
     const bool module = boot->axis >= boot->config.axis_count;
-    boot->simulated = boot->simulated && (module || drive_is_simulated(&boot->facts[boot->axis]));
+    boot->simulated =
+        boot->simulated && (module || drive_is_simulated(&boot->properties[boot->axis]));
     boot->axis++;
     if (boot->axis == drive_configuration_nodes(&boot->config)) {
         boot->axis = 0;

@@ -3,10 +3,10 @@
  * drive_boot: finds the drives and the I/O module, configures them by SDO (drive_configuration) and starts them (NMT),
  * one after the other, and begins again from the first when one does not answer or refuses.
  *
- * A write that is refused is fine when the object reads back as wanted: so a drive with a fixed
- * mapping passes if it is the right one.
+ * A refused write is no error if the object already has the wanted value. So a drive with a fixed PDO mapping is accepted
+ * if the mapping is the right one.
  *
- * Frames in, frames out; main loop.
+ * Called by app/controller.c. Frames in, frames out; main loop.
  */
 #ifndef APP_DRIVES_DRIVE_BOOT_H
 #define APP_DRIVES_DRIVE_BOOT_H
@@ -47,7 +47,7 @@ struct drive_boot {
     struct drive_configuration configuration;
     struct drive_op op;
     struct drive_properties
-        facts[DRIVE_NODES]; /* of the drives configured so far, then the I/O module */
+        properties[DRIVE_NODES]; /* of the drives configured so far, then the I/O module */
     struct drive_trouble trouble;
     enum drive_boot_phase phase;
     uint32_t pause_us;

@@ -423,7 +423,8 @@ static bool configured(const struct drive_configuration *configuration, enum dri
     case WHEN_VELOCITY:
         return (configuration->config->feedforward & CONFIG_VELOCITY_FEEDFORWARD) != 0u;
     case WHEN_HOMING:
-        return axis->homing_method != 0 && drive_supports(configuration->facts, CIA402_MODE_HOMING);
+        return axis->homing_method != 0 &&
+               drive_supports(configuration->properties, CIA402_MODE_HOMING);
     case WHEN_WINDOW:
         return axis->following_window_counts != UINT32_MAX;
     case WHEN_VENDOR:
@@ -469,17 +470,17 @@ static bool concerns(const struct drive_configuration *configuration, enum drive
     case WHEN_ALWAYS:
         return true;
     case WHEN_SIMULATED:
-        return drive_is_simulated(configuration->facts);
+        return drive_is_simulated(configuration->properties);
     case WHEN_REAL:
-        return !drive_is_simulated(configuration->facts);
+        return !drive_is_simulated(configuration->properties);
     case WHEN_INPUTS:
-        return configuration->facts->known[DRIVE_INPUTS];
+        return configuration->properties->known[DRIVE_INPUTS];
     case WHEN_NOT_MAPPED:
-        return !configuration->facts->known[DRIVE_INPUTS_MAPPED];
+        return !configuration->properties->known[DRIVE_INPUTS_MAPPED];
     case WHEN_NO_TORQUE:
-        return !configuration->facts->known[DRIVE_TORQUE_MAPPED];
+        return !configuration->properties->known[DRIVE_TORQUE_MAPPED];
     case WHEN_NO_VELOCITY:
-        return !configuration->facts->known[DRIVE_VELOCITY_MAPPED];
+        return !configuration->properties->known[DRIVE_VELOCITY_MAPPED];
     default:
         return configured(configuration, when);
     }
@@ -609,13 +610,13 @@ static void next_row(struct drive_configuration *configuration)
 
 void drive_configuration_begin(struct drive_configuration *configuration,
                                const struct config *config, uint8_t axis,
-                               struct drive_properties *facts)
+                               struct drive_properties *properties)
 {
     memset(configuration, 0, sizeof *configuration);
-    memset(facts, 0, sizeof *facts);
+    memset(properties, 0, sizeof *properties);
     configuration->config = config;
     configuration->axis = axis;
-    configuration->facts = facts;
+    configuration->properties = properties;
 }
 
 bool drive_configuration_op(struct drive_configuration *configuration, struct drive_op *op)
@@ -627,7 +628,7 @@ bool drive_configuration_op(struct drive_configuration *configuration, struct dr
             return true;
         }
         if (is_pdo(row) && row->kind != ROW_PDO_OUTPUTS && concerns(configuration, row->when)) {
-            drive_properties_read(configuration->facts, drive_pdos[row->argument].fact, 1);
+            drive_properties_read(configuration->properties, drive_pdos[row->argument].fact, 1);
         }
         next_row(configuration);
     }

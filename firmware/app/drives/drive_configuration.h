@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_configuration: the configuration of one drive, or of the I/O module, as a list of operations on its dictionary, in order:
- * CiA 301 and CiA 402-2, docs/reference/protocol.md section 2. The table is in drive_configuration.c; one row for each object,
- * or PDO.
+ * drive_configuration: the operations that configure one drive, or the I/O module, in their order: reads and writes of its
+ * object dictionary (CiA 301, CiA 402-2, docs/reference/protocol.md section 2). The table in drive_configuration.c has a
+ * row for each object or PDO. drive_boot executes the operations.
  *
- *     drive_configuration_begin(&configuration, &config, axis, &facts);
+ *     drive_configuration_begin(&configuration, &config, axis, &properties);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
  *
- * What the drive reports meanwhile (facts) decides what follows. Main loop.
+ * What follows depends on the properties that the drive reports meanwhile. Main loop.
  */
 #ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
 #define APP_DRIVES_DRIVE_CONFIGURATION_H
@@ -58,16 +58,17 @@ struct drive_op {
 
 struct drive_configuration {
     const struct config *config;
-    struct drive_properties *facts;
+    struct drive_properties *properties;
     uint8_t axis;
     uint8_t row;
     uint8_t item; /* of the row, when it is a PDO */
 };
 
-/* `config` and `facts` must stay; the facts are forgotten. `axis` = axis_count of the configuration: the I/O module. */
+/* `config` and `properties` must stay valid; the contents of `properties` are cleared. `axis` = axis_count of the
+ * configuration: the I/O module. */
 void drive_configuration_begin(struct drive_configuration *configuration,
                                const struct config *config, uint8_t axis,
-                               struct drive_properties *facts);
+                               struct drive_properties *properties);
 
 /* The present operation; false at the end. */
 bool drive_configuration_op(struct drive_configuration *configuration, struct drive_op *op);

@@ -35,21 +35,21 @@ static void take_value(const struct drive_polling *polling, struct machine *mach
     port_unlock();
 }
 
-static bool inputs_polled(const struct drive_properties *facts)
+static bool inputs_polled(const struct drive_properties *properties)
 {
-    return facts->known[DRIVE_INPUTS] && !facts->known[DRIVE_INPUTS_MAPPED];
+    return properties->known[DRIVE_INPUTS] && !properties->known[DRIVE_INPUTS_MAPPED];
 }
 
 /* The configuration belongs to the main loop, so it is read without the lock. */
 static bool ask_next(struct drive_polling *polling, const struct machine *machine,
-                     const struct drive_properties *facts, struct can_msg *out)
+                     const struct drive_properties *properties, struct can_msg *out)
 {
     const uint8_t count = machine->config.axis_count;
     polling->poll_index = (uint8_t)((polling->poll_index + 1u) % (count * OBJECTS));
     polling->pause_us = DRIVE_POLLING_US / count;
     const uint8_t axis = (uint8_t)(polling->poll_index % count);
     const bool inputs = polling->poll_index >= count;
-    if (inputs && !inputs_polled(&facts[axis])) {
+    if (inputs && !inputs_polled(&properties[axis])) {
         polling->pause_us = 0;
         return false;
     }
@@ -60,8 +60,8 @@ static bool ask_next(struct drive_polling *polling, const struct machine *machin
 }
 
 bool drive_polling_process(struct drive_polling *polling, struct machine *machine,
-                           const struct drive_properties *facts, bool allowed, uint32_t elapsed_us,
-                           struct can_msg *out)
+                           const struct drive_properties *properties, bool allowed,
+                           uint32_t elapsed_us, struct can_msg *out)
 {
     if (!allowed) {
         polling->client.status = SDO_CLIENT_IDLE;
@@ -75,5 +75,5 @@ bool drive_polling_process(struct drive_polling *polling, struct machine *machin
     }
     polling->client.status = SDO_CLIENT_IDLE;
     polling->pause_us -= elapsed_us < polling->pause_us ? elapsed_us : polling->pause_us;
-    return polling->pause_us == 0u && ask_next(polling, machine, facts, out);
+    return polling->pause_us == 0u && ask_next(polling, machine, properties, out);
 }

@@ -34,7 +34,7 @@ bool drive_polling_receive(struct drive_polling *polling, const struct can_msg *
 /* To be called in each round of the main loop. `allowed`: no other module uses the SDO channels of the drives. True when
  * *out is to be sent. */
 bool drive_polling_process(struct drive_polling *polling, struct machine *machine,
-                           const struct drive_properties *facts, bool allowed, uint32_t elapsed_us,
-                           struct can_msg *out);
+                           const struct drive_properties *properties, bool allowed,
+                           uint32_t elapsed_us, struct can_msg *out);
 
 #endif

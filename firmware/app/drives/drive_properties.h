@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_properties: what a drive said about itself while it was configured. Main loop. */
+/* drive_properties: values that a drive reported while it was configured: identity, modes, PDO mapping, position. Written by
+ * drive_boot, read by homing, drive_polling and the objects 0x2027 ... Main loop. */
 #ifndef APP_DRIVES_DRIVE_PROPERTIES_H
 #define APP_DRIVES_DRIVE_PROPERTIES_H
 
@@ -32,26 +33,28 @@ struct drive_properties {
     bool known[DRIVE_FACTS]; /* else the drive has no such object */
 };
 
-static inline void drive_properties_read(struct drive_properties *facts, unsigned fact,
+static inline void drive_properties_read(struct drive_properties *properties, unsigned fact,
                                          uint32_t value)
 {
     if (fact < DRIVE_FACTS) {
-        facts->value[fact] = value;
-        facts->known[fact] = true;
+        properties->value[fact] = value;
+        properties->known[fact] = true;
     }
 }
 
 /* Whether it is one of the project's simulated drives. Pure. */
-static inline bool drive_is_simulated(const struct drive_properties *facts)
+static inline bool drive_is_simulated(const struct drive_properties *properties)
 {
-    return facts->known[DRIVE_VENDOR] && facts->value[DRIVE_VENDOR] == DRIVE_VENDOR_SIMULATED &&
-           facts->known[DRIVE_PRODUCT] && facts->value[DRIVE_PRODUCT] == DRIVE_PRODUCT_SIMULATED;
+    return properties->known[DRIVE_VENDOR] &&
+           properties->value[DRIVE_VENDOR] == DRIVE_VENDOR_SIMULATED &&
+           properties->known[DRIVE_PRODUCT] &&
+           properties->value[DRIVE_PRODUCT] == DRIVE_PRODUCT_SIMULATED;
 }
 
 /* Whether 0x6502 has a mode of operation. Pure. */
-static inline bool drive_supports(const struct drive_properties *facts, int mode)
+static inline bool drive_supports(const struct drive_properties *properties, int mode)
 {
-    return (facts->value[DRIVE_MODES] & CIA402_SUPPORTS(mode)) != 0u;
+    return (properties->value[DRIVE_MODES] & CIA402_SUPPORTS(mode)) != 0u;
 }
 
 #endif

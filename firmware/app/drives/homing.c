@@ -18,7 +18,7 @@ bool homing_busy(const struct homing *homing)
     return homing->phase != HOMING_IDLE;
 }
 
-/* ---- One drive on its way: what its statusword says, and how long it may take ---- */
+/* ---- Homing of one drive: state by its statusword, time limit ---- */
 
 uint32_t homing_time_s(const struct config *config, uint8_t axis)
 {
@@ -133,10 +133,10 @@ static uint8_t next_axis(const struct machine *machine, uint8_t after)
 }
 
 static enum machine_refusal drives_refusal(const struct machine *machine,
-                                           const struct drive_properties *facts)
+                                           const struct drive_properties *properties)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (wanted(machine, i) && !drive_supports(&facts[i], CIA402_MODE_HOMING)) {
+        if (wanted(machine, i) && !drive_supports(&properties[i], CIA402_MODE_HOMING)) {
             return MACHINE_NO_HOMING_MODE;
         }
     }
@@ -145,12 +145,12 @@ static enum machine_refusal drives_refusal(const struct machine *machine,
 }
 
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
-                                  const struct drive_properties *facts)
+                                  const struct drive_properties *properties)
 {
     port_lock();
     enum machine_refusal refusal = machine_begin_homing(machine);
     if (refusal == MACHINE_ACCEPTED) {
-        refusal = drives_refusal(machine, facts);
+        refusal = drives_refusal(machine, properties);
         if (refusal != MACHINE_ACCEPTED) {
             machine_end_homing(machine);
         }

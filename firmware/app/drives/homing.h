@@ -5,12 +5,12 @@
  *
  *     off -> mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
  *
- * Methods, speeds and offset have been written when the drive was found (CiA 402-2, homing mode). The machine is in
- * HOMING meanwhile; when it leaves that state by itself (stop, quick stop, a fault) homing is over: before the drives
- * are enabled again they are configured anew, which brings mode 8 back.
+ * Method, speeds and offset were written when the drive was configured (CiA 402-2, homing mode). The machine is in state
+ * HOMING. A stop, a quick stop or a fault leaves that state and ends homing. The drives are then configured again before
+ * they can be enabled, which restores mode 8.
  *
- * Main loop; takes the port's lock where it touches the machine. Times are counted in ticks, so they mean the same on a
- * host that is too slow.
+ * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine. Times are counted in ticks,
+ * so they have the same meaning on a host that is too slow.
  */
 #ifndef APP_DRIVES_HOMING_H
 #define APP_DRIVES_HOMING_H
@@ -35,7 +35,7 @@
 enum homing_phase {
     HOMING_IDLE,
     HOMING_OFF,    /* until the drive is off: it may have got that command just before */
-    HOMING_MODE,   /* 0x6060 = 6, until 0x6061 says so */
+    HOMING_MODE,   /* writes 0x6060 = 6, until 0x6061 is 6 */
     HOMING_ENABLE, /* to Operation enabled */
     HOMING_MOVE,   /* the drive seeks its zero */
     HOMING_DISABLE,
@@ -51,9 +51,9 @@ struct homing {
 
 void homing_init(struct homing *homing);
 
-/* Begins, or says why not; `facts` of each axis. */
+/* Begins homing, or returns why not; `properties` of each axis. */
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
-                                  const struct drive_properties *facts);
+                                  const struct drive_properties *properties);
 
 /* True while it uses the SDO channels of the drives. */
 bool homing_busy(const struct homing *homing);

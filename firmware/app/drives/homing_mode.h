@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * homing_mode: brings a drive into a mode of operation by SDO: writes 0x6060, then reads 0x6061 until it says so.
+ * homing_mode: brings a drive into a mode of operation by SDO: writes 0x6060, then reads 0x6061 until it has the mode.
  *
  *     homing_mode_begin(&mode);
  *     each poll: if (homing_mode_process(&mode, node, 6, elapsed_us, &out, &result)) -> send out

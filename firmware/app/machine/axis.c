@@ -87,7 +87,7 @@ static bool moves_in(enum cia402_state state)
            state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
-/* Anew in each state; power finds the axis at rest. */
+/* Reset in each state: an axis is at rest when its power comes on. */
 static void count_rest(struct axis *axis, uint32_t tolerance_counts)
 {
     if (!moves_in(axis->state)) {
@@ -117,7 +117,7 @@ void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max)
     }
 }
 
-/* A statusword that once says "not enabled" must not move the target of a drive that may follow it still. */
+/* One statusword with "not enabled" must not move the target: the drive may still follow it. */
 static void note_enabled(struct axis *axis)
 {
     if (axis->goal == CIA402_GOAL_ENABLED) {

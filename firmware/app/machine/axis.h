@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * axis: one drive as the tick uses it: what it reported last, its goal and target, what it is sent.
+ * axis: the state of one drive in the controller: its last reported values, its goal and target, and the setpoint that is
+ * sent. Used by all files of app/machine and by the tick.
  *
  * Guarded by the port's lock: written by the receive and timer interrupts, read by the main loop in a critical section.
  * Positions in counts.
@@ -68,11 +69,11 @@ struct axis {
 
 void axis_init(struct axis *axis, uint8_t node);
 
-/* Forgets the drive, which is to be found and configured anew. Whether it is homed stays, when the node is the same:
+/* Forgets the drive, which has to be found and configured again. Whether it is homed stays, when the node is the same:
  * that ends only by axis_reconnected, a boot-up message, or missing heartbeats. Under the lock. */
 void axis_forget(struct axis *axis, uint8_t node);
 
-/* The drive has been found again and says where it is: one that is more than `tolerance_counts` from where it was seen
+/* The drive has been found again and has reported its position: one that is more than `tolerance_counts` from where it was seen
  * last does not have its zero any more. Under the lock. */
 void axis_reconnected(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
 

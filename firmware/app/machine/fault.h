@@ -26,7 +26,7 @@
 
 /* Homing. */
 #define FAULT_HOMING_MODE   (EMCY_MANUFACTURER | 0x10u) /* 0x6060 refused; abort code, or 0x6061 */
-#define FAULT_HOMING_FAILED (EMCY_MANUFACTURER | 0x11u) /* the drive says so; statusword */
+#define FAULT_HOMING_FAILED (EMCY_MANUFACTURER | 0x11u) /* the drive reports it; statusword */
 #define FAULT_HOMING_LATE   (EMCY_MANUFACTURER | 0x12u) /* no end in time; statusword */
 
 struct fault {

@@ -119,7 +119,7 @@ struct machine {
     bool configured; /* drives are configured; BOOT then waits for their first answers */
     uint8_t
         unresponsive_node; /* state BOOT again: this node was started and did not answer; 0: none */
-    bool boot_due;         /* the main loop shall find and configure the drives (anew) */
+    bool boot_due;         /* the main loop has to find and configure the drives */
     bool
         mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
     bool unhomed_allowed; /* the next start is accepted though axes are not homed */

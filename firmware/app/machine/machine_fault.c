@@ -9,7 +9,7 @@
 
 /* ---- Into a fault: which reaction it gets, and what replaces its reason ---- */
 
-/* What 0x2003 says, and that it has changed. */
+/* Sets the content of 0x2003 and marks it as changed. */
 static void set_fault(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail)
 {
     machine->fault = (struct fault){.code = code, .node = node, .detail = detail};
@@ -117,7 +117,7 @@ static void step_not_reset(struct machine *machine, const struct axis *axis)
     machine_switch_off(machine);
 }
 
-/* In Fault, says its statusword, and so did its EMCY: a statusword alone may come from a mapping that is not ours. */
+/* In Fault by its statusword and by an EMCY: a statusword alone may come from a foreign PDO mapping. */
 static bool stays_in_fault(const struct axis *axis)
 {
     return axis_in_fault(axis) && axis->error_code != EMCY_NO_ERROR;

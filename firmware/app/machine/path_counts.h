@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* path_counts: the point of a program in counts of its path axes. */
+/* path_counts: converts the point of a program from mm to counts of the machine's axes. Used by app/machine/motion. */
 #ifndef APP_MACHINE_PATH_COUNTS_H
 #define APP_MACHINE_PATH_COUNTS_H
 

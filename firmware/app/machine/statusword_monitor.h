@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * statusword_monitor: bits of a drive's statusword beside those of the state, while it is in Operation enabled.
+ * statusword_monitor: finds wrong bits in the statusword of a drive in Operation enabled, besides the bits of its state.
+ * Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock.
  *
  * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the
- * command value" (12). Following error (13, in CSP) must not come. A wrong bit is a trouble when it is wrong in more
- * than STATUSWORD_MONITOR_TOLERATED answers in a row. The internal limit (11) is a warning, not watched here.
+ * command value" (12). Following error (13, in CSP) must stay clear. A bit is reported when it is wrong in more than
+ * STATUSWORD_MONITOR_TOLERATED answers in a row. The internal limit (11) is a warning and not checked here.
  */
 #ifndef APP_MACHINE_STATUSWORD_MONITOR_H
 #define APP_MACHINE_STATUSWORD_MONITOR_H

@@ -26,7 +26,7 @@ static int fail(char *reason, size_t size, int error, const char *text, const ch
     return -error;
 }
 
-/* Where nothing better is known than what the system says. */
+/* For errors of which only the text of the system is known. */
 static int fail_plainly(char *reason, size_t size, int error, const char *interface)
 {
     (void)snprintf(reason, size, "cannot use %s: %s", interface, strerror(error));

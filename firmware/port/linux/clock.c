@@ -145,7 +145,7 @@ static int take_grant(void)
     return 1;
 }
 
-/* A signal, or a descriptor that is no bus, ends the wait at the present time: the hub is asked for a grant at once, which
+/* A signal, or a descriptor that is no bus, ends the wait at the present time: the hub is requested to grant it at once, which
  * changes nothing when one is on its way. */
 static int await_grant(const struct pollfd *others, size_t count, bool *interrupted)
 {
@@ -174,7 +174,7 @@ static int await_grant(const struct pollfd *others, size_t count, bool *interrup
     return granted < 0 ? granted : 0;
 }
 
-/* Says that we wait, and once more when a signal came before: the second word is how the hub learns of it. */
+/* Tells the hub that this process waits. A signal that came before is reported by a second message. */
 static int begin_wait(uint64_t timeout_ns)
 {
     const uint64_t left_ns = LOCAL_BUS_NEVER - self.now_ns;

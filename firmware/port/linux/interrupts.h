@@ -4,9 +4,9 @@
  *
  * It sleeps until a frame comes or a tick is due, hands over every waiting frame, then runs the tick. Both handlers run
  * with the lock of port_lock() held. At real-time pace it asks for SCHED_FIFO and locked memory; where that is not
- * permitted it says so once and runs as an ordinary thread. Ticks are delayed for a main loop that gets no processor
- * time (schedule.h). At fast pace it is a batch thread: it shall not take the processor from the simulated drives it
- * waits for.
+ * permitted it prints one line and runs as an ordinary thread. Ticks are delayed for a main loop that gets no processor
+ * time (schedule.h). At fast pace it is a batch thread, so that the simulated drives for which it waits
+ * get the processor first.
  *
  * In virtual time (clock.h) there is no thread: the main loop runs the interrupts while it sleeps, so that what the
  * controller does is one sequence.

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* interrupts_thread: how the thread of the interrupts is made: as one that others wait for, or as one that waits for
- * others. Main loop. */
+/* interrupts_thread: creates the thread for the interrupts: under SCHED_FIFO for real time, or as a batch thread for the fast
+ * pace. Used by port/linux/interrupts. Main loop. */
 #ifndef PORT_LINUX_INTERRUPTS_THREAD_H
 #define PORT_LINUX_INTERRUPTS_THREAD_H
 
 #include <pthread.h>
 #include <stdbool.h>
 
-/* Starts `run` under SCHED_FIFO, with memory locked; where that is not permitted says so once and starts it as an
+/* Starts `run` under SCHED_FIFO, with memory locked; where that is not permitted prints one line and starts it as an
  * ordinary thread. 0 or an errno. */
 int interrupts_thread_real_time(pthread_t *thread, void *(*run)(void *unused), bool *permitted);
 

@@ -10,7 +10,7 @@
 /* Whether this names a local bus: a path, which has a '/' in it. Network interfaces have none. */
 bool local_connection_named(const char *bus);
 
-/* Connects to the hub at this path, says `hello` and waits for its welcome. Returns a descriptor that does not block, the
+/* Connects to the hub at this path, sends `hello` and waits for its welcome. Returns a descriptor that does not block, the
  * caller's to close, or a negative errno: -ENOENT or -ECONNREFUSED where nobody serves the path, -EPROTO where whoever does is no hub of
  * this version. */
 int local_connection_open(const char *path, const struct local_bus_control *hello,

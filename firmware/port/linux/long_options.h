@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* long_options: reads the command line of a program, one option after the other, by getopt_long. Anything else than the
- * known options is wrong; one line says what. A beginning of a name that only one option has stands for it.
+ * known options is wrong; one line reports it. A beginning of a name that only one option has stands for it.
  *
  *     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
  *     for (int option = long_options_next(&line); option > 0; option = long_options_next(&line)) ...

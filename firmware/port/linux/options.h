@@ -24,7 +24,7 @@ struct options {
 enum options_result {
     OPTIONS_OK,
     OPTIONS_HELP,  /* --help: the text has been printed */
-    OPTIONS_WRONG, /* one line on stderr says what */
+    OPTIONS_WRONG, /* one line on stderr has the reason */
 };
 
 enum options_result options_parse(struct options *options, int argc, char **argv);

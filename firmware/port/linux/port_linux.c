@@ -55,7 +55,7 @@ static int open_bus(void)
     char name[32];
     (void)snprintf(name, sizeof name, "controller-%u", self.options.node);
     (void)clock_join(self.options.bus,
-                     name); /* opening the socket says what is wrong with the bus */
+                     name); /* opening the socket reports what is wrong with the bus */
     if (can_socket_open(&self.socket, self.options.bus, reason, sizeof reason) == 0) {
         return 0;
     }

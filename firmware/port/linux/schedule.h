@@ -4,7 +4,7 @@
  *
  * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped and the following ones
  * are not bunched: two starts are at least three quarters of a period apart, so that a small lateness is made up over
- * some ticks. After one of more than a period the clock of the ticks is set anew.
+ * some ticks. After a delay of more than a period the clock of the ticks is set again.
  *
  * A tick may request that the next one waits until everybody is ready (schedule_await), for a guard time at most: it is
  * then late rather than on time. At lock step it may also request it as soon as that. The guard time is counted in

@@ -64,7 +64,7 @@ static bool delivered(void)
     return uart_passed(self.mark);
 }
 
-/* The clock alone says when the next tick is due. */
+/* Only the clock decides when the next tick is due. */
 static uint32_t after_tick(const struct link_request *request)
 {
     (void)request;

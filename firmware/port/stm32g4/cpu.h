@@ -27,7 +27,7 @@ void cpu_interrupt_off(uint32_t number);
 /* Sleeps until an interrupt has been served since the last call. */
 void cpu_sleep(void);
 
-/* Starts anew, as after power-on. Does not return. */
+/* Restarts the chip, as after power-on. Does not return. */
 void cpu_reset(void);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * faults: what the chip calls when nothing else helps: a word of the flash that cannot be corrected (NMI), a hard
- * fault. One line on the console, and the chip starts anew: SYNC stops, so the drives stop by themselves.
+ * fault. One line on the console, and the chip restarts: SYNC stops, so the drives stop by themselves.
  */
 #ifndef PORT_STM32G4_FAULTS_H
 #define PORT_STM32G4_FAULTS_H

@@ -8,7 +8,7 @@
  *
  * Erasing a bank erases its last page only, which holds what makes the rest count (app/bank_record.h); every other page
  * is erased when the first write reaches it. So no call takes longer than a page and what is written takes. A bank that
- * is broken off anywhere needs no repair: the next erase begins anew.
+ * is broken off anywhere needs no repair: the next erase begins again.
  *
  * Writes collect eight bytes, which is what the flash programs and protects by its error correction at once; each
  * double word is programmed once. Main loop.

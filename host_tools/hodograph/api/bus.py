@@ -48,7 +48,7 @@ def local_bus(speed: float | None = None) -> Iterator[str]:
 class Controller:
     """The controller of a machine, on a bus; made by `connect`.
 
-    Every method raises BusError when the controller does not answer, RefusedError when it says no, RunError for a
+    Every method raises BusError when the controller does not answer, RefusedError when it refuses, RunError for a
     fault in motion.
     """
 

@@ -52,7 +52,7 @@ class Section:
 
     @cached_property
     def path(self) -> Path:
-        """Its curve, which can be planned anew with other limits; the machine is needed for that."""
+        """Its curve. `plan` of it takes other limits, and needs the machine."""
         return path_of_section(self._section)
 
     @cached_property

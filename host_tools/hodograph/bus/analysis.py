@@ -71,7 +71,7 @@ def analyse_recording(
 
 
 def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: str) -> BusRun:
-    """The run that a recording holds, as it came out when it was recorded; `name` says where it is from.
+    """The run in a recording, with the results that it had when it was recorded. `name`: of the recording.
 
     What was recorded beside a run (booting, going to the start, other runs) is left out. Raises RunError.
     """

@@ -47,7 +47,7 @@ class Clock(Protocol):
 
     @property
     def is_virtual(self) -> bool:
-        """Whether time is what a hub says, and stands still while we compute."""
+        """Whether a hub sets the time. Such a time stands still while this process computes."""
         ...
 
     def now_s(self) -> float:
@@ -431,7 +431,7 @@ def _connect(path: str) -> socket.socket:
 def _greet(
     connection: socket.socket, kind: int, flags: int, number: int, name: str
 ) -> tuple[int, int, int]:
-    """Says hello to the hub: flags, number and time of its welcome. Raises OSError, with the connection closed."""
+    """Sends hello to the hub: flags, number and time of its welcome. Raises OSError, with the connection closed."""
     try:
         connection.send(_control(kind, flags=flags, number=number, name=name))
         connection.settimeout(_WELCOME_S)

@@ -121,7 +121,7 @@ def guarded(command: list[str]) -> list[str]:
 
 
 class Process:
-    """A child and what it says. In virtual time (`clock`) it takes part under `name`.
+    """A child process with its output. In virtual time (`clock`) it takes part under `name`.
 
     It forms its own session, so that Ctrl-C reaches only us and the axes can be stopped first, and gets SIGTERM when we
     die. All are pinned to one core: waking across cores costs more than it gains.

@@ -63,7 +63,7 @@ def max_drives(period_us: int, bitrate: int, choice: PdoChoice | None = None) ->
 
 
 def require_fit(machine: Machine) -> None:
-    """Raises InputError, which says what would fit, when the machine's tick does not fit its period."""
+    """Raises InputError when the frames of a tick do not fit the period; the message has what would fit."""
     found = machine_bus_time(machine)
     if found.fits:
         return

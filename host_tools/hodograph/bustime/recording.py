@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The load of recorded traffic, its real bits counted, beside what the model says.
+"""The load of recorded traffic, with its real bits counted, beside the load by the model.
 
 Time on the bus is that of the SYNCs (their number times the period), so the load of a run at full pace is that of
 the same run at its nominal pace, as far as the frames of the ticks go. Heartbeats and SDO follow the wall clock.

@@ -282,5 +282,5 @@ def _batches(design: Design, journal: Journal, workers: Engine) -> Iterator[Task
 
 
 def default_folder(file: Path) -> Path:
-    """Where results go if nobody says: beside nothing, here, by the name of the campaign file."""
+    """The default folder for results: in the current folder, with the name of the campaign file."""
     return Path(file.stem)

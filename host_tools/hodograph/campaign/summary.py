@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a campaign says in short: each group of runs (all but grid and sample the same) in a line."""
+"""Summary of a campaign: one line for each group of runs, which differ in grid and sample only."""
 
 from __future__ import annotations
 

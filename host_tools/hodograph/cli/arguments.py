@@ -532,7 +532,7 @@ def _check(command: Command) -> None:
 
 
 def _machine_file(parser: ArgumentParser, then: str = "") -> None:
-    """FILE, which may be left out; `then` says what is done with it."""
+    """Adds an optional FILE; `then`: help text about its use."""
     parser.add_argument(
         "file",
         metavar="FILE",

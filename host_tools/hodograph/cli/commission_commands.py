@@ -12,7 +12,7 @@ from ..bus.own_bus import bus_address
 from ..bustime import require_fit
 from ..commission import (
     Assignment,
-    DriveFacts,
+    DriveProperties,
     Finding,
     Identity,
     NodeReader,
@@ -24,11 +24,11 @@ from ..commission import (
     machine_text,
     matched,
     opened_bus,
-    read_facts,
+    read_properties,
     require_no_controller,
 )
 from ..commission.check import FAULT, OK
-from ..commission.drive_facts import MODES
+from ..commission.drive_properties import MODES
 from ..config import load_machine
 from ..config.axis_table import MAX_AXES
 from ..errors import BusError, InputError
@@ -51,7 +51,9 @@ def scan(options: Namespace) -> None:
             f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
         )
     if options.output is not None:
-        _write(options, address, [facts for facts in scanned.nodes if facts.is_drive])
+        _write(
+            options, address, [properties for properties in scanned.nodes if properties.is_drive]
+        )
     if options.json:
         written = None if options.output is None else str(options.output)
         print_json({"bus": str(address), **scanned.document(), "file": written})
@@ -66,7 +68,7 @@ def scan(options: Namespace) -> None:
 class _Scanned:
     """The nodes of a bus, those without number, and the numbers that were given to some of these."""
 
-    nodes: list[DriveFacts]
+    nodes: list[DriveProperties]
     unconfigured: Unconfigured
     assigned: dict[Identity, int]
 
@@ -76,7 +78,7 @@ class _Scanned:
             asdict(identity) | {"assigned": self.assigned.get(identity)}
             for identity in self.unconfigured.identities
         ]
-        return {"nodes": [facts.json() for facts in self.nodes], "unconfigured": without}
+        return {"nodes": [properties.json() for properties in self.nodes], "unconfigured": without}
 
     def lines(self) -> Iterator[str]:
         """For people."""
@@ -84,8 +86,8 @@ class _Scanned:
             node = self.assigned.get(identity)
             became = "no node number" if node is None else f"is node {node} now"
             yield f"LSS: {identity}: {became}"
-        for facts in self.nodes:
-            yield from _lines(facts)
+        for properties in self.nodes:
+            yield from _lines(properties)
 
 
 def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
@@ -97,25 +99,25 @@ def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
         nodes = found_nodes(network, options.wait)
         if not options.no_lss:
             unconfigured = find_unconfigured(network)
-        found = [read_facts(NodeReader(network, node)) for node in nodes]
-        taken = {facts.node: _identity(facts) for facts in found}
+        found = [read_properties(NodeReader(network, node)) for node in nodes]
+        taken = {properties.node: _identity(properties) for properties in found}
         for identity, node in matched(wanted, unconfigured.identities, taken):
             assign(network, identity, node, store=options.store)
             assigned[identity] = node
         if assigned:
             new = found_nodes(network, options.wait, assigned.values())
-            found += [read_facts(NodeReader(network, node)) for node in new]
-            found.sort(key=lambda facts: facts.node)
+            found += [read_properties(NodeReader(network, node)) for node in new]
+            found.sort(key=lambda properties: properties.node)
     return _Scanned(found, unconfigured, assigned)
 
 
-def _identity(facts: DriveFacts) -> Identity:
+def _identity(properties: DriveProperties) -> Identity:
     """As LSS compares it: what a node does not report is 0."""
-    numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
+    numbers = (properties.vendor, properties.product, properties.revision, properties.serial)
     return Identity(*(number or 0 for number in numbers))
 
 
-def _write(options: Namespace, address: BusAddress, drives: list[DriveFacts]) -> None:
+def _write(options: Namespace, address: BusAddress, drives: list[DriveProperties]) -> None:
     if not drives:
         raise BusError(
             f"{address}: no drive by CiA 402 among the nodes: no machine file is written"
@@ -126,31 +128,33 @@ def _write(options: Namespace, address: BusAddress, drives: list[DriveFacts]) ->
     write_files({options.output: text}, force=options.force)
 
 
-def _lines(facts: DriveFacts) -> Iterator[str]:
-    names = [text for text in (facts.name, facts.hardware, facts.software) if text]
-    kind = "drive" if facts.is_drive else f"no drive (device type 0x{facts.device_type:08X})"
-    yield f"node {facts.node}: {kind}{', ' if names else ''}{', '.join(names)}"
-    numbers = (facts.vendor, facts.product, facts.revision, facts.serial)
+def _lines(properties: DriveProperties) -> Iterator[str]:
+    names = [text for text in (properties.name, properties.hardware, properties.software) if text]
+    kind = (
+        "drive" if properties.is_drive else f"no drive (device type 0x{properties.device_type:08X})"
+    )
+    yield f"node {properties.node}: {kind}{', ' if names else ''}{', '.join(names)}"
+    numbers = (properties.vendor, properties.product, properties.revision, properties.serial)
     identity = ["-" if number is None else f"0x{number:08X}" for number in numbers]
     yield "  vendor {}, product {}, revision {}, serial {}".format(*identity)
-    if not facts.is_drive:
+    if not properties.is_drive:
         return
-    modes = [MODES.get(mode, str(mode)) for mode in facts.modes]
+    modes = [MODES.get(mode, str(mode)) for mode in properties.modes]
     yield f"  modes: {', '.join(modes) or 'not reported'}"
     for text, value in (
-        ("encoder increments a turn", facts.encoder_increments),
-        ("gear", facts.gear_ratio),
-        ("counts a turn of the shaft", facts.feed_counts),
-        ("position counts", facts.position_counts),
-        ("least position counts", facts.limit_min_counts),
-        ("greatest position counts", facts.limit_max_counts),
-        ("following error window counts", facts.window_counts),
-        ("quick stop counts/s^2", facts.quick_stop_counts_s2),
+        ("encoder increments a turn", properties.encoder_increments),
+        ("gear", properties.gear_ratio),
+        ("counts a turn of the shaft", properties.feed_counts),
+        ("position counts", properties.position_counts),
+        ("least position counts", properties.limit_min_counts),
+        ("greatest position counts", properties.limit_max_counts),
+        ("following error window counts", properties.window_counts),
+        ("quick stop counts/s^2", properties.quick_stop_counts_s2),
     ):
         if value is not None:
             yield f"  {text}: {value:.15g}"
-    if facts.error_code:
-        yield f"  error code 0x{facts.error_code:04X}"
+    if properties.error_code:
+        yield f"  error code 0x{properties.error_code:04X}"
 
 
 def check(options: Namespace) -> None:

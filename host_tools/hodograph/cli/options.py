@@ -173,7 +173,7 @@ def controller(parser: argparse.ArgumentParser) -> None:
 
 
 def timeout(parser: argparse.ArgumentParser, usual: str) -> None:
-    """--timeout; `usual` says what is without it."""
+    """Adds --timeout; `usual`: help text about the default."""
     parser.add_argument(
         "--timeout",
         type=seconds,

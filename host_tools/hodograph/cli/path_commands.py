@@ -179,7 +179,7 @@ def _print_feed(pipeline: Pipeline, program: Program | None, at_s: np.ndarray | 
 
 
 def _program_of(pipeline: Pipeline) -> Program | None:
-    """The program, for what `feed` says of stops; None without a machine, or where `compile` would refuse it."""
+    """The program, for the stops that `feed` prints; None without a machine, or where `compile` would refuse it."""
     if pipeline.machine_or_none is None:
         return None
     try:

@@ -330,7 +330,7 @@ def _free_rate(machine: Machine, address: BusAddress) -> float | None:
 
 
 class _Progress:
-    """Says now and then where the job is."""
+    """Prints now and then where the job is."""
 
     def __init__(self, every_s: float) -> None:
         self._every_s, self._due_s = every_s, time.monotonic() + every_s

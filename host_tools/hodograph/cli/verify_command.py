@@ -38,7 +38,7 @@ from .path_commands import decode_file, print_notes
 from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
 COUNTS_PER_MM = 1_000_000
-"""Where no machine says anything else."""
+"""Default without a machine."""
 
 _MOST_LINES = 20
 

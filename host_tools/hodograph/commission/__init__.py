@@ -5,14 +5,14 @@ Nothing here writes to a drive, but `assign`, which gives a drive its node numbe
 """
 
 from .check import Finding, check_axis
-from .drive_facts import DriveFacts, read_facts
+from .drive_properties import DriveProperties, read_properties
 from .lss import Assignment, Identity, Unconfigured, assign, find_unconfigured, matched
 from .machine_text import machine_text
 from .nodes import NodeReader, found_nodes, opened_bus, require_no_controller
 
 __all__ = [
     "Assignment",
-    "DriveFacts",
+    "DriveProperties",
     "Finding",
     "Identity",
     "NodeReader",
@@ -24,6 +24,6 @@ __all__ = [
     "machine_text",
     "matched",
     "opened_bus",
-    "read_facts",
+    "read_properties",
     "require_no_controller",
 ]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from ..config import Machine
 from ..config.axis_table import Axis
-from .drive_facts import CSP, HOMING, MODES, PROFILE, supported_modes
+from .drive_properties import CSP, HOMING, MODES, PROFILE, supported_modes
 from .nodes import NodeReader
 
 _SCREW_SHARE = 1e-3
@@ -26,7 +26,7 @@ OK, NOTE, FAULT = "ok", "note", "fault"
 class Finding:
     """One object of a drive.
 
-    verdict  "ok"; "note": the machine runs, with what `text` says; "fault": it does not
+    verdict  "ok"; "note": the machine runs, with the restriction in `text`; "fault": it does not run
     """
 
     index: int

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ..config.axis_table import MAX_AXES
-from .drive_facts import CSP, HOMING, DriveFacts
+from .drive_properties import CSP, HOMING, DriveProperties
 
 NAMES = ("x", "y", "z", "a", "b", "c")
 COUNTS_PER_MM = 1_000_000
@@ -15,7 +15,7 @@ _FEED, _ACCELERATION, _JERK = 20, 200, 5000
 """To begin with: low."""
 
 
-def machine_text(drives: Sequence[DriveFacts], bitrate: int, where: str) -> str:
+def machine_text(drives: Sequence[DriveProperties], bitrate: int, where: str) -> str:
     """The text of a machine file for 1 … 6 drives, in the order of their node numbers; `where` names the bus."""
     nodes = {drive.node for drive in drives}
     controller = next(node for node in range(1, 128) if node not in nodes)
@@ -35,11 +35,11 @@ def machine_text(drives: Sequence[DriveFacts], bitrate: int, where: str) -> str:
     return "\n".join(parts)
 
 
-def _axis(drive: DriveFacts, name: str) -> str:
+def _axis(drive: DriveProperties, name: str) -> str:
     return "\n".join([*_said(drive), "[[axis]]", *_keys(drive, name), "", *_identity(drive), ""])
 
 
-def _said(drive: DriveFacts) -> Iterator[str]:
+def _said(drive: DriveProperties) -> Iterator[str]:
     names = [text for text in (drive.name, drive.hardware, drive.software) if text]
     yield f"# Node {drive.node}: {', '.join(names) or 'no name'}"
     if CSP not in drive.modes:
@@ -58,7 +58,7 @@ def _said(drive: DriveFacts) -> Iterator[str]:
             yield f"# {value:.15g} {text}"
 
 
-def _keys(drive: DriveFacts, name: str) -> Iterator[str]:
+def _keys(drive: DriveProperties, name: str) -> Iterator[str]:
     yield f'name = "{name}"                      # SET if the axis has another name'
     yield f"node = {drive.node}"
     yield f"counts_per_mm = {COUNTS_PER_MM}         # SET, the same for all axes{_screw(drive)}"
@@ -74,18 +74,18 @@ def _keys(drive: DriveFacts, name: str) -> Iterator[str]:
         yield "# homing = { method = 37 }        # SET: how the drive finds zero (docs/reference/files.md)"
 
 
-def _screw(drive: DriveFacts) -> str:
+def _screw(drive: DriveProperties) -> str:
     if drive.feed_counts is None:
         return ": counts for a turn of the shaft over its way in mm"
     return f": {drive.feed_counts:.15g} over the way in mm of a turn"
 
 
-def _has_limits(drive: DriveFacts) -> bool:
+def _has_limits(drive: DriveProperties) -> bool:
     low, high = drive.limit_min_counts, drive.limit_max_counts
     return low is not None and high is not None and -_NO_LIMIT < low < high < _NO_LIMIT
 
 
-def _travel(drive: DriveFacts) -> tuple[float, float]:
+def _travel(drive: DriveProperties) -> tuple[float, float]:
     if not _has_limits(drive):
         return -10.0, 10.0
     assert drive.limit_min_counts is not None
@@ -93,7 +93,7 @@ def _travel(drive: DriveFacts) -> tuple[float, float]:
     return drive.limit_min_counts / COUNTS_PER_MM, drive.limit_max_counts / COUNTS_PER_MM
 
 
-def _identity(drive: DriveFacts) -> Iterator[str]:
+def _identity(drive: DriveProperties) -> Iterator[str]:
     given = {"vendor": drive.vendor, "product": drive.product, "revision": drive.revision}
     keys = {key: value for key, value in given.items() if value}
     if keys:

@@ -27,7 +27,7 @@ class Equipment:
     brake_volts: float | None = None
 
     def given(self) -> dict[str, float]:
-        """What the file says, by name."""
+        """The contents of the file, by name."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 

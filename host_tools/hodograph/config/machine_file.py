@@ -30,7 +30,7 @@ class Supervision:
 
 @dataclass(frozen=True)
 class Machine:
-    """What a machine file says. The limits are the controller's own: they always bind.
+    """The contents of a machine file. The limits are the controller's own: they always bind.
 
     stop_time_ms  a program whose fault stop may take longer is refused
     offset_mm     one number for each axis of the path

@@ -78,7 +78,7 @@ class SpacePathSpec:
 
 @dataclass(frozen=True, eq=False)
 class PathFile:
-    """What a path file says. `feed` and `machine_file` are None when it has none."""
+    """The contents of a path file. `feed` and `machine_file` are None when it has none."""
 
     file: Path
     name: str
@@ -198,7 +198,7 @@ def _listed(root: Table, table: Table, number: int) -> ListedPath:
 
 
 def _path_file(root: Table, table: Table, outputs: Table, outputs_name: str) -> PathFile:
-    """What a file says of one of its paths, whose outputs are in the table `outputs`."""
+    """One of the paths of a file, whose outputs are in the table `outputs`."""
     file = root.file
     machine = root.table("machine", ("file",), required=False)
     path = _path(table)

@@ -24,7 +24,7 @@ _FOLLOWS_TICKS = 100
 """So long at least a drive has to follow its setpoint at the place of rest: it settles there."""
 
 _PROVISIONAL = {0x1000, 0xFF02}
-"""What the controller says of a drive until the drive's own emergency code has come (docs/guides/faults.md, policy)."""
+"""Codes of the controller for a drive until the drive's own emergency code has come (docs/guides/faults.md, policy)."""
 
 Times = tuple[int | None, float | None]
 """Ticks, milliseconds."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recovery of a fault: what has ended is started anew, the fault is reset, the program runs again."""
+"""Recovery after a fault: restarts the processes that have ended, resets the fault, runs the program again."""
 
 from __future__ import annotations
 

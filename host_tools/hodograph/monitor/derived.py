@@ -33,8 +33,8 @@ class ProgramPath:
     """Follows setpoints along the curve, so that it knows the arc length of each.
 
     The arc length is not on the bus: it is the distance along the setpoints, corrected by the projection on the curve.
-    Where the setpoints are not on the curve (a move to the start, say), it is looked for anew. Raises InputError for
-    an image that is not a program.
+    Where the setpoints are not on the curve, for example in a move to the start, the place is searched again.
+    Raises InputError for an image that is not a program.
     """
 
     def __init__(self, image: bytes, counts_per_mm: int) -> None:
@@ -175,7 +175,7 @@ _HALF_WINDOW_S = 0.010
 _LEAST_HALF = 3
 _ORDER = 4
 _LONGEST_GAP = 1000
-"""Lost SYNCs that are filled with NaN; after more the filters begin anew."""
+"""Lost SYNCs that are filled with NaN; after more the filters restart."""
 
 
 @dataclass(frozen=True, eq=False)

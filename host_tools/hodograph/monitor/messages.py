@@ -57,7 +57,7 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 def path_message(
     path: ProgramPath | None, note: str = "", marks: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
-    """The program's curve to draw, in space with z; axes after z over arc length; `note` says why there is none, or
+    """The program's curve to draw, in space with z; axes after z over arc length; `note`: why there is none, or
     what is odd about it. `marks`: places where outputs switch.
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}

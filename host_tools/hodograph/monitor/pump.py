@@ -51,7 +51,7 @@ class Layout:
     period_us: int
     bitrate: int
     limits: StepLimits | None = None
-    """Of setpoints; None: nobody says what they are."""
+    """Limits of setpoint steps; None: not known."""
     path_axes: int = 2
     """How many of the axes follow a path."""
     controller: int = 1
@@ -110,7 +110,7 @@ class Pump:
         return self._thread.is_alive()
 
     def restart(self) -> None:
-        """Opens the source anew: a recording begins again."""
+        """Opens the source again: a recording restarts."""
         self._again.set()
 
     def show(self, image: bytes | None, note: str = "") -> None:

@@ -139,7 +139,7 @@ class Server:
             closing.add_done_callback(self._closing.discard)
 
     async def _welcome(self, socket: web.WebSocketResponse) -> bool | None:
-        """Whether the browser that says hello may command; None when it may not even see."""
+        """Whether a browser may command, from its hello message; None: it may not even watch."""
         with suppress(asyncio.TimeoutError, TypeError, ValueError):
             hello = _read(await socket.receive_str(timeout=_HELLO_S))
             token = hello.get("token") if hello.get("type") == "hello" else None

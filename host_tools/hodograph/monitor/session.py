@@ -56,7 +56,7 @@ class Live:
 
 @dataclass(frozen=True)
 class Replay:
-    """A recording; `open` begins it anew."""
+    """A recording; `open` restarts it."""
 
     name: str
     speed: float

@@ -77,7 +77,7 @@ class RigStop:
     """What became of the last hold, stop or fault stop: struct offline_stop.
 
     tick       the first setpoint that could follow; rest_tick the first one at rest, None: there was none yet
-    bound_s    what the stop table says for the place where it was ordered
+    bound_s    of the stop table, at the place where it was commanded
     from_mm, rest_mm  arc lengths of the last setpoint before it and at rest
     """
 

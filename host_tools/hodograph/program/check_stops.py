@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rules of docs/reference/protocol.md 1.4: what a stop can take beside what the table says;
+"""Rules of docs/reference/protocol.md 1.4: how long a stop can take, and its bound in the table;
 docs/theory/numerics.md section 7.
 
 In floating point and without what the controller's integers (firmware/core/stop_check.c) round up: a bound that

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class ProgramError(IntEnum):
-    """Code of a refusal (object 0x2000 sub 3). `text` says it in English."""
+    """Code of a refusal (object 0x2000 sub 3). `text`: the reason in English."""
 
     SIZE = -1
     MAGIC = -2

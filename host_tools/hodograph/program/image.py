@@ -339,7 +339,7 @@ def open_fault(image: bytes) -> ProgramError | None:
 
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
-    """What an image says beside a `Program`: whether flags of the header and the padding of the
+    """Content of an image that is not in `Program`: whether flags of the header and the padding of the
     name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
     """
 

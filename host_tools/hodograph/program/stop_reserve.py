@@ -94,7 +94,7 @@ def late_mostly(program: Program, stop_time_s: float) -> bool:
 def useful_steps(
     program: Program, stop_time_s: float, steps: Sequence[ReserveStep]
 ) -> list[ReserveStep]:
-    """The steps that are worth a round, of those that have not been tried: chosen by how late the stops are."""
+    """Which of the remaining steps to try next, chosen by how late the stops are."""
     if late_mostly(program, stop_time_s):
         return []
     if program.stops.worst(FAULT).time_s > _TOO_LATE * stop_time_s:

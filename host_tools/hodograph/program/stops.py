@@ -57,7 +57,7 @@ class WorstStop:
 
 @dataclass(frozen=True, eq=False)
 class Stops:
-    """What the image says of stops, for M pieces; the second axis is the kind, HOLD or FAULT.
+    """The stop table of an image, for M pieces; the second axis is the kind, HOLD or FAULT.
 
     codes      (M, 2, 3) of jerk, deceleration, jerk
     bound_us   (M, 2) from the command to rest, for a stop that is requested in this piece

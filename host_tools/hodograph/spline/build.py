@@ -53,7 +53,7 @@ def from_control_polygon(points: object, closed: bool) -> SplineResult:
 
     `points`: complex (n,) or real (n, 2), mm; open from 4 points on, closed from 3 on (each point
     once; a repeated tail of three is dropped with a note). Raises InputError for bad points and
-    PlanError, naming the span, where there is no decent spline.
+    PlanError, naming the span, where there is no acceptable spline.
     """
     p, notes = checked_points(points, closed, 3 if closed else 4, "control point")
     guide = control_polygon_guide(p, closed)

@@ -61,7 +61,7 @@ def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
             break
     if verdict.problem:
         raise PlanError(
-            f"no decent spline: {verdict.problem}; move or add points around it, "
+            f"no acceptable spline: {verdict.problem}; move or add points around it, "
             "or make neighbouring spans more alike in length"
         )
     w = state.system.coefficients(state.z)

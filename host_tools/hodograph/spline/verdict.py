@@ -39,7 +39,7 @@ class Verdict:
 
     @property
     def problem(self) -> str:
-        """Empty for a decent solution, else what is wrong, naming the span."""
+        """Empty for an acceptable solution, else what is wrong, naming the span."""
         if self.cusps:
             return f"span {self.cusps[0]} would turn on the spot (a cusp)"
         if self.loops:

@@ -33,7 +33,7 @@ _ROUND = 1e-9
 
 
 class ShapeError(ValueError):
-    """A shape has no meaning; the message says why. Readers add the place."""
+    """A shape has no meaning; the message has the reason. Readers add the place."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -99,7 +99,7 @@ def number_of(tag: Tag) -> float:
 
 
 class Tags:
-    """The tags of a file one after the other, with a look at the next one. Comments (999) are skipped."""
+    """The tags of a file one after the other; `next` is the next one. Comments (999) are skipped."""
 
     def __init__(self, file: BinaryIO, name: str) -> None:
         self._file = file

@@ -50,7 +50,7 @@ def length_px(text: str, whole_px: float) -> float:
 
 
 def is_relative(text: str) -> bool:
-    """Whether a length is in percent, or says nothing."""
+    """Whether a length is in percent, or not given."""
     return text.strip() in ("", "auto") or text.strip().endswith("%")
 
 
@@ -75,7 +75,7 @@ def _after_separator(text: str, at: int) -> int:
 
 
 def transform(text: str) -> Affine:
-    """What the attribute `transform` says."""
+    """The transformation of the attribute `transform`."""
     whole = Affine()
     at = _after_separator(text, 0)
     while at < len(text):
@@ -161,7 +161,7 @@ _FLAG = re.compile(r"[01]")
 
 
 def draw_path(contours: Contours, data: str, line: int) -> int:
-    """Draw what the attribute `d` of a path says; how many pieces of it have no length."""
+    """Draws the attribute `d` of a path; returns how many pieces of it have no length."""
     pen = _Pen(contours, line)
     for command, values, at in _commands(data):
         try:

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.commission import DriveFacts, Finding, check_axis, machine_text
+from hodograph.commission import DriveProperties, Finding, check_axis, machine_text
 from hodograph.commission.check import FAULT, NOTE, OK
-from hodograph.commission.drive_facts import read_facts, supported_modes
+from hodograph.commission.drive_properties import read_properties, supported_modes
 from hodograph.config import load_machine
 from hodograph.config.machine_file import Machine
 
@@ -163,7 +163,7 @@ def test_supported_modes() -> None:
 
 # -- machine files -------------------------------------------------------------------------------------
 
-SERVO = DriveFacts(
+SERVO = DriveProperties(
     node=5,
     device_type=0x20192,
     name="Servo \u00b5 1",
@@ -185,12 +185,12 @@ SERVO = DriveFacts(
         ([replace(SERVO, limit_min_counts=0, limit_max_counts=0)], (-10.0, 10.0)),
         ([replace(SERVO, limit_min_counts=-(2**31), limit_max_counts=2**31 - 1)], (-10.0, 10.0)),
         ([replace(SERVO, node=n) for n in range(1, 8)], (-150.0, 150.000001)),
-        ([DriveFacts(7, 0x192)], (-10.0, 10.0)),
+        ([DriveProperties(7, 0x192)], (-10.0, 10.0)),
         ([replace(SERVO, name='a "name"\\ with # signs')], (-150.0, 150.000001)),
     ],
 )
 def test_files_can_be_read(
-    drives: list[DriveFacts], travel: tuple[float, float], tmp_path: Path
+    drives: list[DriveProperties], travel: tuple[float, float], tmp_path: Path
 ) -> None:
     file = tmp_path / "machine.toml"
     file.write_text(machine_text(drives, 500_000, "socketcan:can0"), encoding="utf-8")
@@ -210,7 +210,7 @@ def test_files_say_what_is_missing() -> None:
     assert tomllib.loads(text)
 
 
-def test_facts_of_a_node_that_is_no_drive() -> None:
-    facts = read_facts(Fake({(0x1000, 0): 0x191, (0x1018, 1): 9}))  # type: ignore[arg-type]
-    assert not facts.is_drive
-    assert (facts.vendor, facts.modes, facts.name) == (9, (), None)
+def test_properties_of_a_node_that_is_no_drive() -> None:
+    properties = read_properties(Fake({(0x1000, 0): 0x191, (0x1018, 1): 9}))  # type: ignore[arg-type]
+    assert not properties.is_drive
+    assert (properties.vendor, properties.modes, properties.name) == (9, (), None)

@@ -286,7 +286,7 @@ _PLAIN = (0x6100, 0xFF10)
 
 
 def detail_text(code: int, detail: int) -> str:
-    """What object 0x2003 sub 3 says beside a code of the controller, empty when nothing: mostly the statusword."""
+    """The detail in object 0x2003 sub 3 as text, by the code of the controller; empty: none. Mostly a statusword."""
     if code in _COUNTS:
         return f"{detail} {_COUNTS[code]}"
     if not detail:

@@ -53,7 +53,7 @@ def configuration_crc32(wanted: Sequence[tuple[Object, int]], dictionary: Object
     """The CRC-32 that a controller with this configuration has in 0x2050 sub 1 (docs/reference/protocol.md
     section 3.4).
 
-    `dictionary`: the controller's, which says how many bytes a value has.
+    `dictionary`: of the controller; gives the bytes of each value.
     """
     crc = 0
     for (index, sub), value in sorted(wanted, key=lambda entry: (entry[0][0], entry[0][1] or 0)):

@@ -180,7 +180,7 @@ class Node:
 
     def patiently(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
         """What an action on one object gives that takes a turn by itself; while the server has a transfer of another
-        client under way it is tried again for a while, then a BusError says so.
+        client under way it is tried again for a while, then BusError is raised.
         """
         limit_s = self.clock.now_s() + BUSY_S
         while True:

@@ -24,11 +24,11 @@ _CORRUPT = (-4, -80, -81)
 
 @dataclass(frozen=True)
 class StreamStatus:
-    """What object 0x2060 says.
+    """The content of object 0x2060.
 
     committed_s   motion from here to the rest at the end of the newest accepted chunk
     line, way_mm  where the motion is: source line of the executed chunk, arc length of the job
-    remaining_s   from here to the end of the job, as the newest accepted chunk says; None: not known
+    remaining_s   from here to the end of the job, by the newest accepted chunk; None: not known
     """
 
     state: int

@@ -24,7 +24,7 @@ period.
 """
 
 _FATE_S = 1.0
-"""How long the state of the program is asked for after an upload that broke off."""
+"""How long the state of the program is read after an upload that broke off."""
 
 Progress = Callable[[int], None]
 

@@ -26,7 +26,7 @@ US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 GRADED_US = (0.03125, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 0.96875)
 BASIC_US = (0.0, 0.5, 1.0)
 ALLOWED = 5e-4
-"""Excess that a plan may have, as a share of a limit."""
+"""By how much a plan may exceed a limit, as a share of it."""
 
 _MOST_ROUNDS = 9
 _HURRIED_GAIN = 0.1

@@ -31,7 +31,7 @@ def spatial_from_control_polygon(
 
     `points`: real (n, 3), mm; otherwise as `from_control_polygon`. Points of one z give the planar spline, bit for bit.
     `extra`: (n, E), values of extra axes at the points of the polygon; mm, or degrees.
-    Raises InputError for bad points and PlanError, naming the span, where there is no decent spline.
+    Raises InputError for bad points and PlanError, naming the span, where there is no acceptable spline.
     """
     _check_extra(points, extra, "control point")
     return _with_extra(_of_polygon(points, closed), extra, closed, polygon=True)
@@ -134,7 +134,7 @@ def _solved(
     verdict = judge(preimage, hodograph * length[:, :, None], guide.closed)
     if verdict.problem:
         raise PlanError(
-            f"no decent spline: {verdict.problem}; move or add points around it, "
+            f"no acceptable spline: {verdict.problem}; move or add points around it, "
             "or make neighbouring spans more alike in length"
         )
     return SpatialSplineResult(

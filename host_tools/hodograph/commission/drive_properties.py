@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a node says of itself: identity, modes, scaling, limits."""
+"""The properties that a node reports: identity, modes, scaling, limits. Read by `hodograph scan` and `check`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CSP, HOMING = 8, 6
 
 
 @dataclass(frozen=True)
-class DriveFacts:
+class DriveProperties:
     """A node. None: it does not have the object.
 
     modes               numbers of CiA 402, from 0x6502
@@ -74,10 +74,10 @@ class DriveFacts:
         return asdict(self) | {"modes": list(self.modes), "is_drive": self.is_drive}
 
 
-def read_facts(reader: NodeReader) -> DriveFacts:
+def read_properties(reader: NodeReader) -> DriveProperties:
     """Asks a node. Raises BusError when it does not answer, or has no device type."""
     device_type = reader.number(0x1000) or 0
-    facts: dict[str, Any] = {
+    properties: dict[str, Any] = {
         "name": reader.text(0x1008),
         "hardware": reader.text(0x1009),
         "software": reader.text(0x100A),
@@ -87,8 +87,8 @@ def read_facts(reader: NodeReader) -> DriveFacts:
         "serial": reader.number(0x1018, 4),
     }
     if device_type & 0xFFFF == PROFILE:
-        facts |= _drive(reader)
-    return DriveFacts(reader.node, device_type, **facts)
+        properties |= _drive(reader)
+    return DriveProperties(reader.node, device_type, **properties)
 
 
 def _drive(reader: NodeReader) -> dict[str, Any]:
