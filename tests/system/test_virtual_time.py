@@ -261,12 +261,9 @@ def test_the_pace_of_real_time_where_it_is_asked_for() -> None:
     """--speed 1: virtual time is never ahead of real time."""
     with LocalHub(speed=1.0) as hub:
         bus = LocalBus(hub.address.channel)
-        begun_s = time.monotonic()
-        bus.clock.sleep(0.001)  # the pace counts from here
-        paced_s = time.monotonic()
+        begun_s = time.monotonic()  # before the pace counts: this process may be late afterwards
         bus.clock.sleep(0.3)
-        assert time.monotonic() - paced_s >= 0.29
-        assert begun_s <= paced_s
+        assert time.monotonic() - begun_s >= 0.29
         bus.shutdown()
 
 
@@ -285,8 +282,7 @@ def test_the_pace_of_real_time_with_many_events() -> None:
     before_s = host_takes_s()
     with LocalHub(speed=1.0) as hub:
         bus = LocalBus(hub.address.channel)
-        bus.clock.sleep(0.001)
-        begun_s = time.monotonic()
+        begun_s = time.monotonic()  # as above
         for _ in range(steps):
             bus.clock.sleep(step_s)
         paced_s = time.monotonic() - begun_s

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import lapack
 
 from .bernstein import Complex
 
@@ -22,6 +21,9 @@ def solve_tridiagonal(lower: Complex, diagonal: Complex, upper: Complex, rhs: Co
         if diagonal[0] == 0.0:
             raise SingularSystem
         return np.asarray(rhs / diagonal[0])
+    # Here, since its import takes a quarter of the time in which a command that solves nothing starts.
+    from scipy.linalg import lapack
+
     _, _, _, x, info = lapack.zgtsv(lower[1:], diagonal, upper[:-1], rhs)
     if info != 0:
         raise SingularSystem

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import lapack
 
 from ..banded import SingularSystem
 from ..bernstein import Real
@@ -50,6 +49,9 @@ def _solve(lower: Real, diagonal: Real, upper: Real, rhs: Real) -> Real:
     _place(band, diagonal, 0)
     _place(band, lower[1:], -1)
     _place(band, upper[:-1], 1)
+    # Here, since its import takes a quarter of the time in which a command that solves nothing starts.
+    from scipy.linalg import lapack
+
     _, _, x, info = lapack.dgbsv(_REACH, _REACH, band, rhs, overwrite_ab=1)
     if info != 0 or not np.isfinite(x).all():
         raise SingularSystem
