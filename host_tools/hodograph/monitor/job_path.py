@@ -47,9 +47,7 @@ class JobPath:
         self._last_point: Floats | None = None
 
     def add(self, chunk: Chunk) -> None:
-        """Adds the next chunk of the job; a chunk of another job begins a new path. One that turns axes alone has no path
-        in mm.
-        """
+        """Adds the next chunk of the job. A chunk of another job begins a new path; turning alone draws nothing."""
         program = chunk.program
         if chunk.header.first or chunk.header.job != self._job:
             self._job = chunk.header.job
