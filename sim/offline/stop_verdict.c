@@ -168,7 +168,7 @@ static int overrides_keep(const struct stop_setting *setting, struct stop_piece 
                           const struct keeping *all, const struct path_brake_numbers *numbers)
 {
     struct stop_overridden which = piece->suspect_override;
-    uint8_t surely[2u * STOP_SHARES];
+    uint8_t surely[2u * STOP_SHARES] = {0};
     if (!all->surely) {
         rates_surely_keep(setting, all->inverse, piece, numbers, surely);
     }
