@@ -211,6 +211,18 @@ def test_tiny_goto_is_exact(controller: Controller) -> None:
         assert controller.targets(2) == [round(float(x) * 1e6), 0]
 
 
+def test_a_goto_that_another_command_stops_is_not_said_to_have_arrived(
+    controller: Controller, clock: VirtualClock
+) -> None:
+    with running(clock, "goto", str(ALPHA), "--to", "100", "0") as child:
+        controller.wait_for((RUNNING,), LIMIT_S)
+        clock.sleep(0.2)
+        assert main(["stop"]) == 0
+        assert (child.wait(LIMIT_S), child.out) == (6, ""), child.err
+        assert "the move was stopped on its way, the axes rest at x " in child.err.splitlines()[-1]
+    assert 0 < controller.targets(1)[0] < 100_000_000
+
+
 def test_configuration_is_refused_while_moving(
     controller: Controller, slow_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

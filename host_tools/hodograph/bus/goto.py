@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..config import PLANE_AXES, SPACE_AXES, Machine
-from ..errors import InputError, RefusedError
+from ..errors import InputError, RefusedError, RunError
 from ..feed import FeedRequest, Limits, plan_path
 from ..pipeline import (
     axis_limits,
@@ -131,7 +131,8 @@ def goto(
     these do not, x moves a small distance and comes back: a program has no motion without a distance.
 
     The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes
-    with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move.
+    with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move,
+    and RunError when another command has stopped the axes on the way.
     """
     axes = machine.path_axes
     for axis, counts in zip(axes, end_counts, strict=False):
@@ -159,5 +160,20 @@ def goto(
         controller.upload(line_image(a, b, machine))
         controller.start(unhomed=unhomed)
         controller.wait_for((READY,), math.inf, tick)
+        _require_arrival(controller, machine, b)
         distance_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])
     return distance_mm
+
+
+def _require_arrival(controller: Controller, machine: Machine, end: Place) -> None:
+    """Raises RunError: the axes rest, but not where the move ends."""
+    axes, at = machine.path_axes[: len(end)], controller.targets(len(end))
+    wanted = [round(place * scale) for place, scale in zip(end, machine.path_counts, strict=False)]
+    if any(abs(own - there) > 1 for own, there in zip(at, wanted, strict=True)):
+        where = ", ".join(
+            f"{axis.name} {counts / axis.counts_per_unit:g} {axis.unit}"
+            for axis, counts in zip(axes, at, strict=True)
+        )
+        raise RunError(
+            f"{controller.who()}: the move was stopped on its way, the axes rest at {where}: hodograph goto again"
+        )
