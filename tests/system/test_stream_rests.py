@@ -17,7 +17,7 @@ from hodograph.bus.sdo.objects import HELD, RESUME
 from hodograph.bus.sdo.stream_channel import PROGRAM_STOP, stream_status
 from hodograph.cli import stream_command
 from hodograph.cli.main import main
-from hodograph.job_run import Look
+from hodograph.job_run import BusCheck
 
 MILL = EXAMPLES / "machines" / "mill.toml"
 PART = "F6000\nG61\nG1 X4\nG4 P0.1\nM0\nG1 Y3\nM1\nG1 X0 Y0\nM2\n"
@@ -38,18 +38,18 @@ def test_program_stops_wait_for_the_operator_or_a_resume(
     """The first one ends by Enter, the second one by a resume from elsewhere; all in one job of the controller."""
     asked: list[str] = []
 
-    def operator(text: str, look: Look) -> None:
+    def operator(text: str, check: BusCheck) -> None:
         asked.append(text)
         with connect(hub.address, 1, 1_000_000) as controller:
             for _ in range(3):
-                look()
+                check()
             assert controller.state() == HELD
             assert stream_status(controller).state == PROGRAM_STOP
             if len(asked) == 2:
                 controller.command(RESUME)
         for _ in range(100):
             if len(asked) == 2:
-                look()
+                check()
 
     monkeypatch.setattr(stream_command, "await_enter", operator)
     part, log = _part(tmp_path), tmp_path / "bus.log"

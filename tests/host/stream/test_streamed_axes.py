@@ -255,7 +255,7 @@ def test_a_job_goes_on_where_axes_turn_alone(tmp_path: Path, machine: Machine) -
     job = JobFiles((file,), machine, TOLERANCE, ReadOptions())
     found = nearest_place(job, entry, (6.0, 0.0, 0.0, 3.0, 26.5))
     assert (found.place.section, found.line) == (number, 6)
-    assert abs(found.place.way_q40 * 2.0**-40 - 3.5) < 1e-3
+    assert abs(found.place.arc_q40 * 2.0**-40 - 3.5) < 1e-3
     assert found.distance_mm < 1e-3
 
 
