@@ -11,6 +11,13 @@
 #define MOST_HALVINGS 20 /* of a cell */
 #define CUT_STEPS     30
 
+/* A function that stays one, so that its frame is not on the stack while the caller attends to the main loop's work. */
+#if defined(__GNUC__)
+#define CHECK_APART __attribute__((noinline))
+#else
+#define CHECK_APART
+#endif
+
 static const struct real zero = {0, 0};
 
 /* A stretch of a piece on a segment, u from middle - half to middle + half. */
@@ -25,6 +32,7 @@ struct cell {
 
 struct check {
     const struct program *program;
+    const struct program_limits *limits;
     uint32_t axis_count;
     struct motion limit;    /* m = 0: none */
     struct real per_period; /* 1/s */
@@ -217,27 +225,45 @@ static int check_step(const struct check *check, const struct motion *now)
     return 0;
 }
 
+/* The begin of a stretch against the end of the one before. */
+static CHECK_APART int check_begin(struct check *check, const struct feed_polynomial *poly,
+                                   const struct path *path, struct real low, struct real high)
+{
+    struct cell cell;
+    struct motion now;
+    path_motion_clear(&now);
+    set_cell(&cell, poly, path, low, high);
+    motion_at(&cell, real_make(-1, 0), &now);
+    const int code = check->unknown != 0 ? 0 : check_step(check, &now);
+    check->unknown = 0;
+    motion_at(&cell, real_make(1, 0), &check->last);
+    return code;
+}
+
+/* A part of a stretch without halving; the result and *certain are those of check_cell. */
+static CHECK_APART int check_part(const struct check *check, const struct feed_polynomial *poly,
+                                  const struct path *path, struct real low, struct real high,
+                                  int *certain)
+{
+    struct cell cell;
+    set_cell(&cell, poly, path, low, high);
+    return check_cell(check, &cell, certain);
+}
+
 /* The stretch of a piece on one segment, halved where need be. */
 static int check_stretch(struct check *check, const struct feed_polynomial *poly,
                          const struct path *path, struct real low, struct real high)
 {
-    struct cell cell;
-    struct motion now;
     const struct real width = real_sub(high, low);
-    path_motion_clear(&now);
-    uint32_t at = 0; /* the cell from at to at + 1 of 2^halvings */
+    uint32_t at = 0; /* the part from at to at + 1 of 2^halvings */
     int32_t halvings = 0;
-    set_cell(&cell, poly, path, low, high);
-    motion_at(&cell, real_make(-1, 0), &now);
-    int code = check->unknown != 0 ? 0 : check_step(check, &now);
-    check->unknown = 0;
-    motion_at(&cell, real_make(1, 0), &check->last);
+    int code = check_begin(check, poly, path, low, high);
     while (code == 0 && (at >> halvings) == 0u) {
         int certain = 0;
         const struct real part = real_scale(width, -halvings);
         const struct real from = real_add(low, real_times(part, (int32_t)at));
-        set_cell(&cell, poly, path, from, real_add(from, part));
-        code = check_cell(check, &cell, &certain);
+        program_check_attend(check->limits); /* near a limit a piece may have very many parts */
+        code = check_part(check, poly, path, from, real_add(from, part), &certain);
         if (code == 0) {
             at++;
             while ((at & 1u) == 0u && halvings > 0) {
@@ -310,7 +336,7 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
 int limit_check_all(const struct program *p, const struct program_limits *limits, uint32_t *index)
 {
     struct motion rest;
-    struct check check = {.program = p, .axis_count = p->header.axis_count};
+    struct check check = {.program = p, .limits = limits, .axis_count = p->header.axis_count};
     uint32_t segment = 0;
     int code = 0;
     const int any = path_motion_limits(&check.limit, limits, check.axis_count);
@@ -325,7 +351,6 @@ int limit_check_all(const struct program *p, const struct program_limits *limits
     for (uint32_t i = 0; i < p->header.piece_count && code == 0; i++) {
         *index = i;
         code = check_piece(&check, i, &segment);
-        program_check_attend(limits);
     }
     code = code != 0 ? code : check_step(&check, &rest);
     *index = code != 0 ? *index : 0u;

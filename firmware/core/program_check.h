@@ -122,8 +122,8 @@ struct program_limits {
     uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
     uint32_t chunk;        /* 1: a chunk's program may begin in motion (core/chunk.h) */
-    /* Called with `self` at every piece by the long parts of the check, so that a main loop can send heartbeats
-     * meanwhile. May be NULL. */
+    /* Called with `self` at every segment and piece, and at every part of a piece near the limits of axes, so that a main
+     * loop can send heartbeats and make coefficient records meanwhile. May be NULL. */
     void (*attend)(void *self);
     void *self;
 };

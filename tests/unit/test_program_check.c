@@ -114,6 +114,55 @@ static void test_travel_is_tight(void)
     golden_close(&p);
 }
 
+static void count_call(void *self)
+{
+    uint32_t *calls = self;
+    (*calls)++;
+}
+
+static uint32_t calls_of_check(const struct program *p, struct program_limits limits, int expected)
+{
+    struct program_fault fault;
+    uint32_t calls = 0;
+    limits.attend = count_call;
+    limits.self = &calls;
+    TEST_ASSERT_EQUAL_INT(expected, program_check(p, &limits, &fault));
+    return calls;
+}
+
+/* The least velocity of x in um/s with which a program is accepted. */
+static uint32_t least_velocity_limit(const struct program *p, struct program_limits limits)
+{
+    struct program_fault fault;
+    uint32_t low = 1;
+    uint32_t high = 10000000;
+    while (high - low > 1) {
+        limits.axis_velocity_um_s[0] = low + (high - low) / 2;
+        if (program_check(p, &limits, &fault) == 0) {
+            high = limits.axis_velocity_um_s[0];
+        } else {
+            low = limits.axis_velocity_um_s[0];
+        }
+    }
+    return high;
+}
+
+/* A main loop has work to do while segments, pieces, their limits and both kinds of stops are checked, and at each of the
+ * many parts of a piece near the limits of an axis. */
+static void test_a_check_attends_to_other_work_all_the_time(void)
+{
+    struct program p;
+    struct program_limits limits = golden_no_limits();
+    golden_open(&p, "alpha_quintic.hdgp");
+    limits.axis_velocity_um_s[0] = 10000000;
+    const uint32_t far_off = calls_of_check(&p, limits, 0);
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT32(p.header.segment_count + 4u * p.header.piece_count,
+                                        far_off);
+    limits.axis_velocity_um_s[0] = least_velocity_limit(&p, limits);
+    TEST_ASSERT_GREATER_THAN_UINT32(far_off + 10u, calls_of_check(&p, limits, 0));
+    golden_close(&p);
+}
+
 /* Each bit of an image counts: flipped, it is refused by the CRC. */
 static void test_any_flipped_bit_is_refused(void)
 {
@@ -157,6 +206,7 @@ int main(void)
     RUN_TEST(test_golden_programs);
     RUN_TEST(test_feed_bound_is_tight);
     RUN_TEST(test_travel_is_tight);
+    RUN_TEST(test_a_check_attends_to_other_work_all_the_time);
     RUN_TEST(test_any_flipped_bit_is_refused);
     RUN_TEST(test_truncation_at_any_byte_is_refused);
     RUN_TEST(test_unknown_code_has_a_text);
