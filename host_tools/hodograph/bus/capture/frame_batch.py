@@ -14,6 +14,7 @@ import os
 import socket
 import struct
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,20 +111,8 @@ class FrameBatch:
         self._messages = (_MMsgHdr * BATCH)()
         control_base = ctypes.addressof(control)
         self._stamps = np.frombuffer(self._control, dtype=_STAMP)
-        self._control_lengths = np.ndarray(
-            BATCH,
-            dtype=np.uint64,
-            buffer=memoryview(self._messages).cast("B"),
-            offset=_MsgHdr.control_length.offset,
-            strides=(ctypes.sizeof(_MMsgHdr),),
-        )
-        self._lengths = np.ndarray(
-            BATCH,
-            dtype=np.uint32,
-            buffer=memoryview(self._messages).cast("B"),
-            offset=_MMsgHdr.length.offset,
-            strides=(ctypes.sizeof(_MMsgHdr),),
-        )
+        self._control_lengths = self._field(_MsgHdr.control_length.offset, np.dtype(np.uint64))
+        self._lengths = self._field(_MMsgHdr.length.offset, np.dtype(np.uint32))
         for i in range(BATCH):
             self._vectors[i].base = ctypes.addressof(frames) + i * packet_bytes
             self._vectors[i].length = packet_bytes
@@ -133,6 +122,16 @@ class FrameBatch:
             header.control = control_base + i * _CONTROL_BYTES
             header.control_length = _CONTROL_BYTES
         self._call = ctypes.CDLL(None, use_errno=True).recvmmsg
+
+    def _field(self, offset: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+        """A field (BATCH,) of all messages, in place."""
+        return np.ndarray(
+            BATCH,
+            dtype=dtype,
+            buffer=memoryview(self._messages).cast("B"),
+            offset=offset,
+            strides=(ctypes.sizeof(_MMsgHdr),),
+        )
 
     def receive(self, descriptor: int) -> int:
         """Fills the buffers with what is there; the number of packets, 0 when there is none. Raises OSError."""
