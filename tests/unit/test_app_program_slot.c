@@ -63,11 +63,12 @@ static void test_a_check_lets_the_main_loop_give_signs_of_life(void)
     slot.attend = count_call;
     slot.self = &calls;
     TEST_ASSERT_EQUAL_INT(0, upload());
-    TEST_ASSERT_EQUAL_UINT(2, calls); /* stops of both kinds of the one piece; no limits of axes */
+    TEST_ASSERT_EQUAL_UINT(4,
+                           calls); /* segment, piece, its stops of both kinds; no limits of axes */
     limited.crc32++;
     program_slot_refresh(&slot, &limited);
     TEST_ASSERT_TRUE(slot.acceptable);
-    TEST_ASSERT_EQUAL_UINT(2 + 3, calls);
+    TEST_ASSERT_EQUAL_UINT(4 + 5, calls);
 }
 
 static void test_a_good_image_becomes_the_program(void)
