@@ -71,7 +71,7 @@ _MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
 """Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
 
 _SLOWER, _MOST_SLOWER = 0.7, 12
-"""Share of its mean feed that a piece gets where this does not help, and how many times."""
+"""Share of its mean feed that a piece gets where more reserve does not help, and how many times."""
 
 _THOROUGH_CHORDS = 1000
 """Sections with at most so many chords, and so many feed pieces, are searched for stops with all trials where few do
@@ -146,7 +146,7 @@ class SectionPipeline(Pipeline):
         pieces = plan.pieces_over(int(joints_q40[-1]), joints_q40)
         codes = np.minimum(pieces.override_rate_codes, pieces.override_second_codes)
         ends_mm = np.append(pieces.start_q40, joints_q40[-1]).astype(np.float64) * 2.0**-40
-        seconds = np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+        seconds = pieces.duration_s
         return [
             FeedZone(low, high, max(_SLOWER * (high - low) / duration_s, LEAST_FEED_MM_S))
             for low, high, duration_s, least in zip(
@@ -257,11 +257,8 @@ class JobSection:
         """Of a section that turns axes: a bound of how far they are from the program; of one that turns them alone, the
         length of its path too.
         """
-        bound = self.deviation_deg
-        found: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
-        return (
-            found if self.stands_at is None else {"turned_deg": self.fitted.curve.length_mm} | found
-        )
+        turned = {} if self.stands_at is None else {"turned_deg": self.fitted.curve.length_mm}
+        return turned | _turning_bound(self.deviation_deg)
 
     @property
     def deviation_deg(self) -> float | None:
@@ -369,9 +366,7 @@ class Job:
 
     def summary(self) -> dict[str, object]:
         """What became of the toolpath, for JSON."""
-        bound = self.deviation_deg
-        turning: dict[str, object] = {} if bound is None else {"deviation_bound_deg": bound}
-        return turning | {
+        return _turning_bound(self.deviation_deg) | {
             "lines": self.lines,
             "sections": len(self.sections),
             "segments": self.segments,
@@ -446,6 +441,11 @@ def _with_outputs(
         replace(one, pipeline=replace(one.pipeline, given_events=events))
         for one, events in zip(sections, every, strict=True)
     )
+
+
+def _turning_bound(bound_deg: float | None) -> dict[str, object]:
+    """The bound of a turning deviation, for JSON; nothing where no axis turns."""
+    return {} if bound_deg is None else {"deviation_bound_deg": bound_deg}
 
 
 def missing_axes(machine: Machine) -> str:
@@ -594,8 +594,9 @@ class SectionMaker:
 
     def _check_turning(self, angles: Real, lines: Int) -> None:
         """Raises InputError, naming the line, where a, b or c turns, which is no axis of the machine's path."""
+        missing = missing_axes(self.machine)
         for k, name in enumerate(AXES[3:]):
-            if name in missing_axes(self.machine) and angles[:, k].any():
+            if name in missing and angles[:, k].any():
                 line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
                 raise no_such_axis(self.file, int(line), name, self.machine)
 

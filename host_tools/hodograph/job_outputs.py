@@ -145,10 +145,10 @@ class EventMaker:
         repeated = self._repeated()
         _, rest = _split(section.before, is_first=is_first)
         begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, rest)]
-        way = self._on_the_way(section)
+        moving = self._on_the_way(section)
         end_q40 = round(section.length_mm * 2**40)
         early = list(behind) if is_last else _split(behind, is_first=False)[0]
-        return SectionEvents(repeated, [*begin, *way, *self.changed(end_q40, early)])
+        return SectionEvents(repeated, [*begin, *moving, *self.changed(end_q40, early)])
 
     def _on_the_way(self, section: SectionCommands) -> list[Event]:
         """Events of commands and of changes of the feed, in the order of their places."""

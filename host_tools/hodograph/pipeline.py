@@ -199,7 +199,7 @@ def proved_stops(
     (firmware/core/brake_check.h).
     """
     check = BrakeCheck(native, NativeLimits(**asdict(program_limits(machine))))
-    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    duration_s = program.pieces.duration_s
     out = []
     for kind, name in ((HOLD, "hold"), (FAULT, "fault")):
         codes = program.stops.codes[:, kind]

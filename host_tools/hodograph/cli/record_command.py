@@ -113,7 +113,7 @@ class _Recording:
 def _jumps(
     recording: BusRecording, address: BusAddress, options: Namespace, machine: Machine | None
 ) -> list[Jump] | None:
-    """Limits of setpoint steps, from the machine file or the controller; None: neither is known."""
+    """Steps beyond the limits of the machine file, else of the controller; None: neither gives its limits."""
     if not recording.steps:
         return []
     if machine is not None:

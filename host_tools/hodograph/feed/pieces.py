@@ -83,6 +83,11 @@ class FeedPieces:
         return seconds_per_s2(self.override_second_codes[:, level])
 
     @property
+    def duration_s(self) -> Real:
+        """Durations (M,)."""
+        return np.ldexp(self.duration_q32_s.astype(np.float64), -32)
+
+    @property
     def total_q32_s(self) -> int:
         """Duration of the program, exactly."""
         return int(self.duration_q32_s.sum(dtype=np.int64))

@@ -98,7 +98,7 @@ def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramErro
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
     own_s, own_mm, waits = own_bounds(program, kind)
-    duration = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    duration = program.pieces.duration_s
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
     way = np.maximum(np.diff(start), 0.0)
     window_s = WINDOW_TICKS * program.period_us * 1e-6
@@ -130,7 +130,7 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
     number = np.where(given[:, None], numbers(codes), 1.0)
     settled = _settled(program, feed.min(axis=2), acceleration.min(axis=2), number[:, JERK_UP])
     longest, last = _runs(~settled)
-    wait_s = longest * np.ldexp(pieces.duration_q32_s.astype(np.float64), -32)
+    wait_s = longest * pieces.duration_s
     speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
     rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0)
     time_s, way_mm = np.zeros(speed.size), np.zeros(speed.size)

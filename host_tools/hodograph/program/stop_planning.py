@@ -151,7 +151,7 @@ def _refined(
     whole, parents = codes, np.arange(tree.program.piece_count)
     longest_s = max(LONGEST_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_PARTS)
     while True:
-        long = np.ldexp(tree.program.pieces.duration_q32_s.astype(np.float64), -32) > longest_s
+        long = tree.program.pieces.duration_s > longest_s
         found = codes[:, :, DECELERATION] != 0
         below = (found & (codes < codes.max(axis=0)).any(axis=2)).any(axis=1)
         chosen = long & below & tree.long_enough()
@@ -180,7 +180,7 @@ def _waiting_less(
     waits = _long_waits(tree.program, limits[HOLD], codes)
     longest_s = max(FINE_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_FINE_PARTS)
     while True:
-        seconds = np.ldexp(tree.program.pieces.duration_q32_s.astype(np.float64), -32)
+        seconds = tree.program.pieces.duration_s
         chosen = waits & (seconds > longest_s) & tree.long_enough()
         if not chosen.any():
             break
@@ -201,7 +201,7 @@ def _better_than_waiting(program: Program, limits: StopLimits) -> NDArray[np.boo
     """
     codes = program.stops.codes[:, HOLD]
     mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes)
-    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    duration_s = program.pieces.duration_s
     out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
     next_s = 0.0
     for i in range(duration_s.size - 1, -1, -1):
@@ -220,7 +220,7 @@ def _long_waits(
     which no brake fits. A hold also waits in a piece whose numbers gain nothing: where the program brakes hard by
     itself, no brake with a lower jerk of release can begin.
     """
-    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    seconds = program.pieces.duration_s
     mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes[:, HOLD])
     ahead_s = 0.5 * seconds + np.append(mean_s[1:] + 0.5 * seconds[1:], 0.0)
     brakes = (codes[:, HOLD, DECELERATION] > 0) & (mean_s < ahead_s)
@@ -237,7 +237,7 @@ def _gains(
     parents: NDArray[np.int64],
 ) -> NDArray[np.bool_]:
     """Which groups of parts (`parents`, (M,): their numbers) have shorter stops `after` than `before` (M, 2, 3)."""
-    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    seconds = program.pieces.duration_s
     out: NDArray[np.bool_] = np.zeros(int(parents[-1]) + 1, dtype=np.bool_)
     for kind in (HOLD, FAULT):
         old, new = (
@@ -269,7 +269,7 @@ def _better_without(program: Program, kind: int, groups: Sequence[object]) -> ND
     make no bound shorter by that.
     """
     own_s, _, waits = own_bounds(program, kind)
-    duration_s = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    duration_s = program.pieces.duration_s
     out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
     next_s = END_TICKS * program.period_us * 1e-6
     for _, group in groupby(range(duration_s.size - 1, -1, -1), key=groups.__getitem__):

@@ -66,6 +66,9 @@ _USED_SHARE = 0.96
 _OWN_SHARE = 0.4
 """Of that time: places that need no zone are taken if they are so far from the next one."""
 
+_HAIR_S = 1e-4
+"""Places that are so close are the same one."""
+
 _MOST_LATE = 0.3
 
 _FEW_LATE = 0.05
@@ -106,7 +109,7 @@ def useful_steps(
 
 def reserve_zones(program: Program, stop_time_s: float, step: ReserveStep) -> list[ReserveZone]:
     """Zones in all stretches of a program from which a fault stop may take longer than `stop_time_s`."""
-    t, s = _axes(program)
+    t, s = _piece_ends(program)
     late = late_pieces(program, stop_time_s)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], late, [False])).astype(np.int8)))
     begin, end = t[edges[0::2]], t[edges[1::2]]
@@ -158,7 +161,7 @@ def stop_places(program: Program) -> StopPlaces:
     """Pieces that have stop parameters, and so have all that may be chosen in their place (check_stops.WINDOW)."""
     own_s, _, waits = own_bounds(program, FAULT)
     given = (program.stops.codes[:, FAULT, DECELERATION] > 0) & (waits == 0.0)
-    time_s, place_mm = _axes(program)
+    time_s, place_mm = _piece_ends(program)
     count = own_s.size
     # A piece counts that begins less than the window behind the end of the first one.
     behind_s = time_s[1:] + WINDOW_TICKS * program.period_us * 1e-6
@@ -180,7 +183,7 @@ def zones_at_places(
     is returned.
     """
     own, other = stop_places(program), stop_places(lowered)
-    own_time, own_place = _axes(program)
+    own_time, own_place = _piece_ends(program)
     begin_s = np.interp(other.begin_mm, own_place, own_time)
     end_s = np.interp(other.end_mm, own_place, own_time)
     zones: list[ReserveZone] = []
@@ -209,12 +212,9 @@ def zones_at_places(
     return zones
 
 
-_HAIR_S = 1e-4
-
-
-def _axes(program: Program) -> tuple[Real, Real]:
+def _piece_ends(program: Program) -> tuple[Real, Real]:
     """Program times and arc lengths (M + 1,) of the ends of pieces."""
-    seconds = np.ldexp(program.pieces.duration_q32_s.astype(np.float64), -32)
+    seconds = program.pieces.duration_s
     ends = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
     return np.concatenate((np.zeros(1), np.cumsum(seconds))), ends
 
@@ -222,7 +222,7 @@ def _axes(program: Program) -> tuple[Real, Real]:
 def _zone_around(
     lowered: Program, places: StopPlaces, k: int, share: float, spread: float
 ) -> ReserveZone:
-    time_s, place_mm = _axes(lowered)
+    time_s, place_mm = _piece_ends(lowered)
     ends_s = (places.begin_s[k] - spread * _BEFORE_S, places.end_s[k] + spread * _BEHIND_S)
     low_mm, high_mm = np.interp(ends_s, time_s, place_mm).tolist()
     return ReserveZone(low_mm, high_mm, share)

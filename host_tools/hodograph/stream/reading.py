@@ -29,7 +29,6 @@ from ..job import (
     toolpath_commands,
 )
 from ..job_outputs import EventMaker
-from ..spline import PHSpline, coordinates
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
@@ -278,10 +277,7 @@ class _Rest:
             or self.next_part.section.stands_at != self._part.section.stands_at
         ):
             return None
-        curve = self.next_part.section.pipeline.curve
-        if isinstance(curve, PHSpline):
-            return np.asarray(coordinates(curve.nodal_points[:1])[0])
-        return np.asarray(curve.axes_nodes[0])
+        return np.asarray(self.next_part.section.pipeline.curve.axes_nodes[0])
 
     def blocks(self) -> Iterator[Block]:
         part: _Part | None = self._part

@@ -13,8 +13,7 @@ from ..config import load_paths
 from ..errors import InputError
 from ..names import is_toolpath
 from ..pipeline import Pipeline
-from ..spline import PHSpline
-from .geometry import Block, Curve, points_at
+from .geometry import Block, Curve
 from .journal import Entry
 from .plan import JobFiles, Place
 from .reading import StreamReader
@@ -112,7 +111,7 @@ def _found(
     block: Block, arc_mm: float, place: Place, at: Real, standing_mm: tuple[float, ...]
 ) -> Nearest:
     """A place of a block, without the work offset."""
-    point = np.concatenate((standing_mm, _places(block.curve, np.array([arc_mm]))[0]))
+    point = np.concatenate((standing_mm, block.curve.axes_point(arc_mm)))
     segment, _ = block.curve.locate(arc_mm)
     line = int(block.line[int(segment)])
     return Nearest(place, line, tuple(point.tolist()), float(np.linalg.norm(point - at)))
@@ -137,9 +136,4 @@ def _refined(curve: Curve, target: Real, s: Real, k: int) -> float:
 
 
 def _distances(curve: Curve, s: Real, target: Real) -> Real:
-    return np.asarray(np.linalg.norm(_places(curve, s) - target, axis=1))
-
-
-def _places(curve: Curve, s: Real) -> Real:
-    """All axes (n, A) at arc lengths (n,)."""
-    return points_at(curve, s) if isinstance(curve, PHSpline) else curve.axes_point(s)
+    return np.asarray(np.linalg.norm(curve.axes_point(s) - target, axis=1))

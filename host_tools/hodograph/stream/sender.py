@@ -32,6 +32,7 @@ from ..config import Machine
 from ..errors import HodographError, RunError
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native import NativeProgram
+from ..pipeline import program_start_counts
 from .chunk import Chunk
 from .journal import Journal
 from .plan import JobPlan, PlannedSection, PlanRests
@@ -205,12 +206,9 @@ class Sender:
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
-        program, machine = NativeProgram(chunk.image), self.machine
-        moved = machine.turning if program.first_axis else machine
-        _, points = program.setpoints(self.kernel, moved.path_counts, 0, 1)
-        standing = zip(section.standing_mm, machine.offset_mm, machine.path_counts, strict=False)
-        start: list[int] = [round((at + offset) * counts) for at, offset, counts in standing]
-        start += points[0].tolist()
+        start = program_start_counts(
+            NativeProgram(chunk.image), self.machine, self.kernel, section.standing_mm
+        )
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:
             close_stream(self.at.controller)

@@ -125,24 +125,35 @@ class Divider:
             self._move(command)
         elif isinstance(command, PathMode):
             self._mode(command)
-        elif isinstance(command, Spindle) and self._changes_power(command):
-            self.before.append(command) if not self.moved else self._on_the_way(command)
+        elif isinstance(command, Spindle):
+            self._spindle(command)
         elif isinstance(command, _STOPS):
-            self.stop()
-            self.before.append(command)
+            self._stopped_for(command)
         elif isinstance(command, DigitalOutput | AnalogOutput):
             self._output(command)
         elif isinstance(command, ToolSelect | ToolOffset | OverrideSwitch | Message):
-            self.before.append(command) if not self.moved else self._on_the_way(command)
+            self._without_stop(command)
         elif isinstance(command, ProgramEnd):
-            self.stop()
+            self._stopped_for(command)
+
+    def _stopped_for(self, command: Command) -> None:
+        self.stop()
+        self.before.append(command)
+
+    def _without_stop(self, command: Command) -> None:
+        if self.moved:
+            self._on_the_way(command)
+        else:
             self.before.append(command)
 
-    def _changes_power(self, command: Spindle) -> bool:
-        """Whether the command changes S only, of a laser that follows the feed."""
+    def _spindle(self, command: Spindle) -> None:
+        """The axes stop for it, but where it changes S only, of a laser that follows the feed."""
         before, self.rotation = self.rotation, command.rotation
-        dynamic = command.rotation is Rotation.COUNTERCLOCKWISE
-        return self.laser_mode and dynamic and before is command.rotation
+        dynamic = before is command.rotation is Rotation.COUNTERCLOCKWISE
+        if self.laser_mode and dynamic:
+            self._without_stop(command)
+        else:
+            self._stopped_for(command)
 
     def _move(self, move: Move) -> None:
         turned = self._turned_alone(move)
@@ -243,8 +254,7 @@ class Divider:
         if command.synchronised:
             self._on_the_way(command)
         else:
-            self.stop()
-            self.before.append(command)
+            self._stopped_for(command)
 
     def _on_the_way(self, command: Command) -> None:
         self.events.append(PathEvent(self.builder.length_mm, command))
@@ -320,9 +330,9 @@ def _far_apart(section: Section, inner: list[int]) -> list[int]:
     long_mm = max(SHORTEST_MM, _LONG_TOLERANCES * section.tolerance_mm)
 
     def is_far(begin: int, end: int) -> bool:
-        way = np.linalg.norm(reference.point[end] - reference.point[begin])
-        length = reference.place_mm[end] - reference.place_mm[begin]
-        return bool(way >= SHORTEST_MM or length >= long_mm)
+        distance_mm = np.linalg.norm(reference.point[end] - reference.point[begin])
+        length_mm = reference.place_mm[end] - reference.place_mm[begin]
+        return bool(distance_mm >= SHORTEST_MM or length_mm >= long_mm)
 
     kept = [0]
     for k in inner:
