@@ -6,7 +6,8 @@ The two tables below are the whole of the rules. A C layer is a folder (or singl
 longest prefix of the path; a Python layer is a package or module directly under hodograph, or one within it that has a
 row of its own (who may use a package may use all of it). A file may use
 its own layer, and those its row names. A folder without a row is a breach too, so that new ones are
-thought about. Besides: no circles between files, and no I/O or heap headers in C_FREESTANDING.
+thought about. Besides: no circles between modules (a Python file, or a C source with the header of its name), and no
+I/O or heap headers in C_FREESTANDING.
 
 Own code, because import-linter knows Python only: the tables, circles and messages here are the same for C.
 """
@@ -16,7 +17,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -286,7 +287,7 @@ def c_layer(path: str) -> str | None:
 
 
 def check_c(root: Path) -> Iterator[Breach]:
-    """Breaches of C_RULES and circles of includes."""
+    """Breaches of C_RULES and circles of modules."""
     uses = []
     for path in _files(root, _C_ROOTS, (".c", ".h")):
         layer = c_layer(path)
@@ -306,7 +307,7 @@ def check_c(root: Path) -> Iterator[Breach]:
                 yield Breach(
                     path, number, f"{layer} may not use {target} (may: {_row(C_RULES[layer])})"
                 )
-    yield from _circles(uses)
+    yield from _circles(uses, _c_module)
 
 
 def _system_breach(path: str, line: int, layer: str, header: str) -> Iterator[Breach]:
@@ -411,26 +412,32 @@ def _native_includes(root: Path) -> Iterator[Breach]:
                     )
 
 
-def _circles(uses: Iterable[Use]) -> Iterator[Breach]:
-    """One breach for each circle, at the line that closes it."""
+def _c_module(path: str) -> str:
+    """A source and the header of its name are one module."""
+    return path.removesuffix(".c").removesuffix(".h")
+
+
+def _circles(uses: Iterable[Use], module: Callable[[str], str] = str) -> Iterator[Breach]:
+    """One breach for each circle of modules, at the line that closes it; `module`: that of a file."""
     graph: dict[str, list[Use]] = {}
     for use in uses:
-        if use.source != use.target:
-            graph.setdefault(use.source, []).append(use)
+        if module(use.source) != module(use.target):
+            graph.setdefault(module(use.source), []).append(use)
     done: set[str] = set()
 
-    def walk(file: str, trail: list[str]) -> Iterator[Breach]:
-        for use in graph.get(file, []):
-            if use.target in trail:
-                circle = [*trail[trail.index(use.target) :], use.target]
-                yield Breach(file, use.line, "circle: " + " -> ".join(circle))
-            elif use.target not in done:
-                yield from walk(use.target, [*trail, use.target])
-        done.add(file)
+    def walk(trail: list[str]) -> Iterator[Breach]:
+        for use in graph.get(trail[-1], []):
+            target = module(use.target)
+            if target in trail:
+                circle = [*trail[trail.index(target) :], target]
+                yield Breach(use.source, use.line, "circle: " + " -> ".join(circle))
+            elif target not in done:
+                yield from walk([*trail, target])
+        done.add(trail[-1])
 
-    for file in sorted(graph):
-        if file not in done:
-            yield from walk(file, [file])
+    for name in sorted(graph):
+        if name not in done:
+            yield from walk([name])
 
 
 def _files(root: Path, folders: Iterable[str], endings: tuple[str, ...]) -> Iterator[str]:

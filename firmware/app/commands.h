@@ -4,7 +4,7 @@
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
 
-#include "app/controller.h"
+#include "app/controller_state.h"
 
 enum command {
     COMMAND_ENABLE = 1,

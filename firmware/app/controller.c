@@ -13,30 +13,9 @@
 
 #define SDO_TIMEOUT_US     2000000u
 #define SDO_BLOCK_SEGMENTS 127u
-#define SEND_TRIES         40u
-#define SEND_PAUSE_US      500u
 #define LAST_OBJECT        0xFFFFu
 #define OFF_TIME_US        1000000u
 #define STOP_BOUND_MOST_US 60000000u
-
-bool controller_configured(const struct controller *controller)
-{
-    return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
-}
-
-void controller_send(const struct can_msg *message)
-{
-    for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {
-        port_wait(SEND_PAUSE_US);
-    }
-}
-
-void controller_start_itself(struct controller *controller)
-{
-    struct can_msg start;
-    nmt_master_command(NMT_START, controller->node, &start);
-    (void)nmt_slave_receive(&controller->nmt, &start);
-}
 
 /* ---- Values at power-on and at a reset ---- */
 
@@ -128,24 +107,6 @@ static void beat_in_stream(void *self)
     controller->urgent = 0;
     port_unlock();
     stream_process(&controller->stream, &controller->machine);
-}
-
-static void set_checking(struct controller *controller, bool checks)
-{
-    port_lock();
-    controller->checks_chunk = checks;
-    controller->urgent = 0;
-    port_unlock();
-}
-
-void controller_check_begins(struct controller *controller)
-{
-    set_checking(controller, true);
-}
-
-void controller_check_ends(struct controller *controller)
-{
-    set_checking(controller, false);
 }
 
 void controller_init(struct controller *controller, uint8_t node)
@@ -318,16 +279,6 @@ static bool next_frame(struct controller *controller, struct can_msg *in)
     return got;
 }
 
-static void poll_heartbeat(struct controller *controller, uint32_t elapsed_us)
-{
-    struct can_msg out;
-    if (heartbeat_producer_process(&controller->heartbeat,
-                                   controller->values.producer_heartbeat_time,
-                                   controller->nmt.state, elapsed_us, &out)) {
-        controller_send(&out);
-    }
-}
-
 static void poll_nmt(struct controller *controller)
 {
     struct can_msg out;
@@ -441,16 +392,6 @@ static uint32_t counted_us(uint32_t elapsed_us)
     return elapsed_us < CONTROLLER_ELAPSED_MAX_US ? elapsed_us : CONTROLLER_ELAPSED_MAX_US;
 }
 
-/* The time of the work counts for nobody else: what the others have sent meanwhile has not been looked at. */
-void controller_beat(void *self)
-{
-    struct controller *controller = self;
-    const uint32_t now_us = port_time_us();
-    poll_heartbeat(controller, now_us - controller->polled_us);
-    controller->polled_us = now_us;
-    port_progress();
-}
-
 void controller_poll(struct controller *controller)
 {
     struct can_msg in;
@@ -461,7 +402,7 @@ void controller_poll(struct controller *controller)
     const uint32_t elapsed_us = counted_us(now_us - controller->polled_us);
     controller->polled_us = now_us;
     poll_nmt(controller);
-    poll_heartbeat(controller, elapsed_us);
+    controller_heartbeat(controller, elapsed_us);
     poll_server(controller, elapsed_us);
     poll_boot(controller, elapsed_us);
     poll_homing(controller, elapsed_us);

@@ -15,22 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "app/drives/drive_boot.h"
-#include "app/drives/drive_monitor.h"
-#include "app/drives/drive_polling.h"
-#include "app/drives/homing.h"
-#include "app/frame_queue.h"
-#include "app/machine/machine.h"
-#include "app/parameter_store.h"
-#include "app/program_slot.h"
-#include "app/stream.h"
-#include "app/tick.h"
-#include "canopen/emcy.h"
-#include "canopen/heartbeat.h"
-#include "canopen/nmt.h"
-#include "canopen/od.h"
-#include "canopen/sdo_server.h"
-#include "od_controller.h"
+#include "app/controller_state.h"
 
 /* The longest the main loop may sleep without a frame: the resolution of its timeouts. */
 #define CONTROLLER_POLL_US 5000u
@@ -38,48 +23,6 @@
 /* The most time that one round counts in the timeouts of the protocols. So a main loop that was busy (a program check),
  * or a host that stalled, does not count as silence of the other nodes. */
 #define CONTROLLER_ELAPSED_MAX_US 20000u
-
-/* The configuration that holds: one that the host has confirmed, or one restored from the store. */
-struct configured {
-    bool known;
-    bool restored;
-    uint32_t crc32;
-};
-
-struct controller {
-    /* shared with the interrupts, under the port's lock */
-    struct machine machine;
-    struct tick tick;
-    struct frame_queue queue;
-    bool checks_chunk; /* the main loop is busy with a chunk while the motion may go on: */
-    uint16_t
-        urgent; /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
-    /* main loop only */
-    struct config config; /* the same values as machine.config */
-    struct configured configured;
-    struct parameter_store store;
-    struct program_slot slot;
-    struct stream stream;
-    struct drive_boot boot;
-    struct drive_monitor monitor;
-    struct drive_polling polling;
-    struct homing homing;
-    struct od od;
-    struct od_controller values;
-    struct sdo_server server;
-    struct nmt_slave nmt;
-    struct heartbeat_producer heartbeat;
-    struct emcy_producer emcy;
-    uint32_t polled_us;             /* port_time_us() of the last poll */
-    uint32_t reported_serial;       /* machine.fault_serial of the last EMCY */
-    enum machine_state noted_state; /* last one logged */
-    enum cia402_state noted_drive[AXES_MAX];
-    struct drive_trouble noted_trouble;
-    enum machine_refusal refusal; /* of the last command */
-    bool ending; /* the shutdown has begun: nothing is switched on or started any more */
-    uint8_t node;
-    bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
-};
 
 /* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored
  * one (0x2054) replaces. */
@@ -94,23 +37,5 @@ void controller_poll(struct controller *controller);
 /* Ends in bounded time: stops along the path if running, switches the drives off, leaves them
  * pre-operational. True when all of that succeeded. Interrupts are still on afterwards. */
 bool controller_shut_down(struct controller *controller);
-
-/* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
-bool controller_configured(const struct controller *controller);
-
-/* To be called at each step of long work in the main loop, such as the check of a program: sends the heartbeat if it is
- * due and calls port_progress(). `self`: the controller. */
-void controller_beat(void *self);
-
-/* Around the check of a chunk: commands to stop that come meanwhile take effect at once. */
-void controller_check_begins(struct controller *controller);
-void controller_check_ends(struct controller *controller);
-
-/* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
-void controller_start_itself(struct controller *controller);
-
-/* Sends from the main loop, waiting a little when the port is full; then the frame is dropped: every protocol above
- * tolerates a lost frame. */
-void controller_send(const struct can_msg *message);
 
 #endif

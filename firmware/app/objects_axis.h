@@ -18,7 +18,7 @@
 
 #include <stdint.h>
 
-#include "app/controller.h"
+#include "app/controller_state.h"
 
 /* Process data. */
 uint64_t object_read_statusword(struct controller *controller, const struct od_entry *entry);

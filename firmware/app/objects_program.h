@@ -4,7 +4,7 @@
 #ifndef APP_OBJECTS_PROGRAM_H
 #define APP_OBJECTS_PROGRAM_H
 
-#include "app/controller.h"
+#include "app/controller_state.h"
 
 /* A reader, of the sub-indices from 2 on: two's complement in 64 bits; 0 where the value needs a program and there is
  * none. Checks the program anew when the configuration has changed since (program_slot_refresh). Not under the lock. */

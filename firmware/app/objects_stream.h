@@ -4,7 +4,7 @@
 #ifndef APP_OBJECTS_STREAM_H
 #define APP_OBJECTS_STREAM_H
 
-#include "app/controller.h"
+#include "app/controller_state.h"
 
 #define OBJECT_STREAM 0x2060u
 

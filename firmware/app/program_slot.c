@@ -9,6 +9,7 @@
 #include "app/program_table.h"
 #include "core/coefficients.h"
 #include "core/first_axis.h"
+#include "core/program_check.h"
 #include "port/port.h"
 
 void program_slot_init(struct program_slot *slot)

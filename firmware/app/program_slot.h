@@ -19,7 +19,7 @@
 
 #include "app/machine/config.h"
 #include "core/program.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 
 /* Values of object 0x2000 sub 2. */
 enum program_slot_state {

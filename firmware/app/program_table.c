@@ -7,7 +7,7 @@
 
 #include "app/bank_record.h"
 #include "core/coefficients.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 #include "port/port.h"
 
 struct place {

@@ -4,7 +4,7 @@
 #ifndef APP_REPORT_H
 #define APP_REPORT_H
 
-#include "app/controller.h"
+#include "app/controller_state.h"
 
 /* Reports what has changed since the last call: faults (EMCY), states, the drive that boot waits for, internal
  * limits. */

@@ -584,7 +584,7 @@ static int parts_keep(struct brake_check *check, const struct stops *stops,
         struct states from;
         struct part *last = &parts[count - 1u];
         states_of(poly, last, stops->most_turned, &from);
-        program_check_attend(check->limits);
+        program_limits_attend(check->limits);
         if (brakes_keep(check, stops->own, &stops->numbers, &from) != 0) {
             count--;
         } else if (count == MOST_PARTS || check->looks > check->most_looks) {

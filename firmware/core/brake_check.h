@@ -16,7 +16,8 @@
 #define HODOGRAPH_CORE_BRAKE_CHECK_H
 
 #include "core/path_bounds.h"
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* Contents private, but for `looks`. */
 struct brake_check {

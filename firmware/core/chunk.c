@@ -10,6 +10,7 @@
 #include "core/first_axis.h"
 #include "core/little_endian.h"
 #include "core/override_ramp.h"
+#include "core/program_check.h"
 #include "core/qmath.h"
 
 #define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */

@@ -21,7 +21,7 @@
 
 #include "core/interpolator.h"
 #include "core/program.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 
 #define CHUNK_HEADER_SIZE   80u
 #define CHUNK_VERSION       1u

@@ -4,7 +4,8 @@
 #ifndef HODOGRAPH_CORE_EVENT_CHECK_H
 #define HODOGRAPH_CORE_EVENT_CHECK_H
 
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* All events of a program whose segments and pieces have passed their own checks. Linear: pieces and events advance
  * together. Returns 0 or PROGRAM_ERR_EVENT_... with the index of the event. */

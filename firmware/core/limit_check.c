@@ -262,7 +262,7 @@ static int check_stretch(struct check *check, const struct feed_polynomial *poly
         int certain = 0;
         const struct real part = real_scale(width, -halvings);
         const struct real from = real_add(low, real_times(part, (int32_t)at));
-        program_check_attend(check->limits); /* near a limit a piece may have very many parts */
+        program_limits_attend(check->limits); /* near a limit a piece may have very many parts */
         code = check_part(check, poly, path, from, real_add(from, part), &certain);
         if (code == 0) {
             at++;

@@ -15,7 +15,8 @@
 #ifndef HODOGRAPH_CORE_LIMIT_CHECK_H
 #define HODOGRAPH_CORE_LIMIT_CHECK_H
 
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* Share of a limit of acceleration or jerk that the steps at a joint may use, in 1/1000. */
 #define LIMIT_CHECK_STEP_PERMILLE 5

@@ -14,7 +14,7 @@
 #define HODOGRAPH_CORE_PATH_MOTION_H
 
 #include "core/program.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 #include "core/real.h"
 
 #define FEED_DEGREE 7

@@ -185,7 +185,7 @@ int piece_check_all(const struct program *p, const struct program_limits *limits
             return PROGRAM_ERR_DURATION;
         }
         before = c;
-        program_check_attend(limits);
+        program_limits_attend(limits);
     }
     *index = p->header.piece_count - 1u;
     int code = check_last(p, &before);

@@ -6,7 +6,8 @@
 #ifndef HODOGRAPH_CORE_PIECE_CHECK_H
 #define HODOGRAPH_CORE_PIECE_CHECK_H
 
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* All pieces in order, and their sum of durations. Returns 0 or the code of the first rule broken;
  * *index is then its piece. */

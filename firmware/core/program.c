@@ -7,7 +7,6 @@
 
 #include "core/crc32.h"
 #include "core/little_endian.h"
-#include "core/program_check.h"
 #include "core/qmath.h"
 
 #define CRC_FROM 16u /* the CRC covers everything after itself */

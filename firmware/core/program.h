@@ -14,9 +14,10 @@
 
 #include <stdint.h>
 
+#include "core/program_rules.h"
+
 struct kernel; /* core/kernel.h */
 
-#define PROGRAM_AXES  6u /* greatest number of path axes */
 #define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
 #define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
 #define PROGRAM_EXTRAS        (PROGRAM_AXES - PROGRAM_SPACE)
@@ -162,7 +163,7 @@ struct program {
 
 /* Opens an image of `size` bytes: magic, version, axis count, header size, counts against the size, CRC. The
  * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in
- * the size. Returns 0 or a negative PROGRAM_ERR_... of core/program_check.h; *p is then not usable.
+ * the size. Returns 0 or a negative PROGRAM_ERR_... of core/program_rules.h; *p is then not usable.
  */
 int program_open(struct program *p, const uint8_t *image, uint32_t size);
 

@@ -217,7 +217,7 @@ int segment_check_all(const struct program *p, const struct program_limits *limi
             return code;
         }
         before = g;
-        program_check_attend(limits);
+        program_limits_attend(limits);
     }
     *index = p->header.segment_count - 1u;
     return check_end(p, &first, &before);

@@ -5,7 +5,8 @@
 #ifndef HODOGRAPH_CORE_SEGMENT_CHECK_H
 #define HODOGRAPH_CORE_SEGMENT_CHECK_H
 
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* All segments in order. Returns 0 or the code of the first rule broken; *index is then its
  * segment. */

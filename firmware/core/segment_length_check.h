@@ -6,7 +6,8 @@
 #ifndef HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H
 #define HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H
 
-#include "core/program_check.h"
+#include "core/program.h"
+#include "core/program_rules.h"
 
 /* Any two adjacent segments (not the first, not the last of the program) are longer than the distance of one tick at
  * 200 % of the highest feed of the pieces on them; a feed below 2^-10 mm/s counts as 2^-10 mm/s. Segments and pieces

@@ -398,7 +398,7 @@ static int check_kind(const struct program *p, enum program_stop_kind kind,
         }
         longest_us = stop.bound_us > longest_us ? stop.bound_us : longest_us;
         longest_um = bound.distance_um > longest_um ? bound.distance_um : longest_um;
-        program_check_attend(limits);
+        program_limits_attend(limits);
     }
     *index = 0;
     return said->time_us == longest_us && said->distance_um >= longest_um ? 0

@@ -14,7 +14,7 @@
 #include <stdint.h>
 
 #include "core/program.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 
 /* Ticks that a stop takes beyond its continuous curve: until the command takes effect, and because it brakes in whole
  * ticks (tests/unit/test_path_brake.c). */

@@ -5,7 +5,7 @@
 #ifndef NODE_DRIVE_OD_H
 #define NODE_DRIVE_OD_H
 
-#include "node/drive_node.h"
+#include "node/drive_state.h"
 
 /* Their context is a struct drive_node. */
 extern const struct od_hooks drive_od_hooks;

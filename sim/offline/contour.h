@@ -20,27 +20,7 @@
 #include <stdint.h>
 
 #include "core/program.h"
-
-/* One segment: position - origin = sum of r[k] xi^(k+1), k = 0 ... 4. Private to the module. */
-struct contour_segment {
-    double start_mm;
-    double length_mm;
-    double per_length;   /* 1 / length */
-    double slope[2];     /* d(xi)/d(s / length) at both ends */
-    double end_speed[2]; /* d(s)/d(xi) at both ends */
-    double origin[3];
-    double r[5][3];
-};
-
-struct contour {
-    const struct contour_segment *segments;
-    uint32_t count;
-    uint32_t cursor; /* where the last commanded arc length was: speeds up the search, changes no
-                        result */
-    double length_mm;
-    uint32_t axes; /* of the curve: 2, or 3 in space */
-    bool closed;
-};
+#include "offline/contour_curve.h"
 
 /* Expands a checked program into segments[program->header.segment_count], which must outlive
  * *contour. */

@@ -84,9 +84,19 @@ def test_circles_are_found(tmp_path: Path) -> None:
     assert len(found) == 2
     assert all("circle: " in breach for breach in found)
     assert (
-        "firmware/core/interpolator.h -> firmware/core/program.h -> firmware/core/interpolator.h"
+        "firmware/core/interpolator -> firmware/core/program -> firmware/core/interpolator"
         in found[0]
     )
+
+
+def test_a_source_and_its_header_are_one_module(tmp_path: Path) -> None:
+    files = {
+        "firmware/core/nearest.h": "",
+        "firmware/core/nearest.c": '#include "core/nearest.h"\n#include "core/search.h"\n',
+        "firmware/core/search.h": '#include "core/nearest.h"\n',
+    }
+    (found,) = tree(tmp_path, files)
+    assert "circle: firmware/core/nearest -> firmware/core/search" in found
 
 
 def test_this_tree_has_none() -> None:

@@ -13,7 +13,7 @@
 #include <stdint.h>
 
 #include "canopen/od.h"
-#include "core/program_check.h"
+#include "core/program_rules.h"
 
 /* Those of a program are the first ones, in the order of its path; the others hold their position. */
 #define AXES_MAX PROGRAM_AXES

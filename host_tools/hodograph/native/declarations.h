@@ -2,7 +2,7 @@
 /* What Python sees of the C side (cffi API mode: the C compiler checks it against the real headers and fills in
  * what stands as "..."). Meanings and units: the headers named here. */
 
-/* core/program.h, core/program_check.h */
+/* core/program.h, core/program_rules.h, core/program_check.h */
 struct program_header {
     uint32_t image_size;
     uint32_t period_us;

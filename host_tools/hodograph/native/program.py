@@ -59,7 +59,7 @@ class NativeLimits:
 
 @dataclass(frozen=True)
 class NativeFault:
-    """The first rule that a program breaks: code of core/program_check.h, segment or piece, meaning."""
+    """The first rule that a program breaks: code of core/program_rules.h, segment or piece, meaning."""
 
     code: int
     index: int

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Why a program is refused: the codes of the controller, in its own names and numbers.
 
-The same table as `enum program_error` in firmware/core/program_check.h (a test compares them).
+The same table as `enum program_error` in firmware/core/program_rules.h (a test compares them).
 """
 
 from __future__ import annotations

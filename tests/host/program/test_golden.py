@@ -56,7 +56,7 @@ def test_every_file_is_in_the_table_and_every_code_in_a_file() -> None:
 
 
 def test_codes_are_those_of_the_controller() -> None:
-    header = (ROOT / "firmware" / "core" / "program_check.h").read_text()
+    header = (ROOT / "firmware" / "core" / "program_rules.h").read_text()
     pairs = re.findall(r"PROGRAM_ERR_(\w+) =\s*(-\d+)", header)
     assert {name: int(number) for name, number in pairs} == {c.name: int(c) for c in ProgramError}
 

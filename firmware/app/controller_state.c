@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: MIT */
+/* Implements app/controller_state.h (see there): what the parts of the controller need of the whole. */
+#include "app/controller_state.h"
+
+#include "port/port.h"
+
+#define SEND_TRIES    40u
+#define SEND_PAUSE_US 500u
+
+bool controller_configured(const struct controller *controller)
+{
+    return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
+}
+
+void controller_send(const struct can_msg *message)
+{
+    for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {
+        port_wait(SEND_PAUSE_US);
+    }
+}
+
+void controller_start_itself(struct controller *controller)
+{
+    struct can_msg start;
+    nmt_master_command(NMT_START, controller->node, &start);
+    (void)nmt_slave_receive(&controller->nmt, &start);
+}
+
+void controller_heartbeat(struct controller *controller, uint32_t elapsed_us)
+{
+    struct can_msg out;
+    if (heartbeat_producer_process(&controller->heartbeat,
+                                   controller->values.producer_heartbeat_time,
+                                   controller->nmt.state, elapsed_us, &out)) {
+        controller_send(&out);
+    }
+}
+
+/* The time of the work counts for nobody else: what the others have sent meanwhile has not been looked at. */
+void controller_beat(void *self)
+{
+    struct controller *controller = self;
+    const uint32_t now_us = port_time_us();
+    controller_heartbeat(controller, now_us - controller->polled_us);
+    controller->polled_us = now_us;
+    port_progress();
+}
+
+static void set_checking(struct controller *controller, bool checks)
+{
+    port_lock();
+    controller->checks_chunk = checks;
+    controller->urgent = 0;
+    port_unlock();
+}
+
+void controller_check_begins(struct controller *controller)
+{
+    set_checking(controller, true);
+}
+
+void controller_check_ends(struct controller *controller)
+{
+    set_checking(controller, false);
+}
