@@ -49,10 +49,11 @@ OD_NAMES := $(if $(wildcard firmware/app/controller.eds),controller) $(if $(wild
 OD_C     := $(OD_NAMES:%=$(BUILD)/generated/od_%.c)
 OD_H     := $(OD_NAMES:%=$(BUILD)/generated/od_%.h)
 
-LIBS        := app node injector bridge hub faults port mps2 stm32g4 canopen can sim core od
+LIBS        := app node injector bridge hub faults port mps2 stm32g4 canopen can sim core numerics od
 core_SRC    := $(wildcard firmware/core/*.c)
 canopen_SRC := $(wildcard firmware/canopen/*.c)
 sim_SRC     := $(wildcard sim/plant/*.c sim/offline/*.c)
+numerics_SRC := $(wildcard host_tools/numerics/*.c)
 app_SRC     := $(filter-out %/main.c,$(wildcard firmware/app/*.c firmware/app/*/*.c))
 port_SRC    := $(filter-out %/main.c,$(wildcard firmware/port/linux/*.c firmware/port/common/*.c))
 node_SRC    := $(filter-out %/main.c,$(wildcard sim/node/*.c))
@@ -83,7 +84,7 @@ UNIT_FAKES    := $(wildcard tests/unit/fake_*.c)
 support_SRC   := $(filter-out $(UNIT_FAKES),$(UNIT_SUPPORT))
 
 OWN_C    := $(wildcard firmware/targets/*.c) $(foreach l,$(filter-out od,$(LIBS)),$($(l)_SRC)) $(foreach b,$(BINS),$($(b)_MAIN))
-OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h tests/unit/*.h tests/fuzz/*.h)
+OWN_H    := $(wildcard firmware/*/*.h firmware/app/*/*.h firmware/port/*/*.h sim/*/*.h host_tools/numerics/*.h tests/unit/*.h tests/fuzz/*.h)
 FUZZ_SRC      := $(wildcard tests/fuzz/*.c)
 FUZZ_NAMES    := $(patsubst tests/fuzz/%.c,%,$(wildcard tests/fuzz/fuzz_*.c))
 # Replays the corpora; libFuzzer has a main() of its own.
@@ -96,7 +97,7 @@ BARE_C   := $(filter-out $(OWN_C),$(wildcard firmware/port/*/*.c firmware/target
 ## ---- flags -----------------------------------------------------------------------------------
 
 WARN      := -Wall -Wextra -Wpedantic -Wconversion -Wdouble-promotion -Werror
-INCLUDES  := -Ifirmware -Isim -I$(BUILD)/generated
+INCLUDES  := -Ifirmware -Isim -Ihost_tools -I$(BUILD)/generated
 COMMON    := -std=c99 $(WARN) -ffp-contract=off -fPIC $(INCLUDES)
 UNITY_DIR := $(BUILD)/unity
 UNITY_DEF := -DUNITY_INCLUDE_DOUBLE -DUNITY_SUPPORT_64
@@ -424,7 +425,7 @@ $(BUILD)/clang/obj/%.c.tidy-deps: $(BUILD)/clang/obj/%.o
 CPPCHECK := --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \
             --suppress=missingIncludeSystem --suppress=shiftTooManyBitsSigned $(INCLUDES)
 lint-cppcheck: $(READY)/packages-lint $(OD_H)
-	$(call say,cppcheck,firmware sim)
+	$(call say,cppcheck,firmware sim host_tools)
 	@mkdir -p $(BUILD)/lint/cppcheck
 	$(Q)cppcheck $(CPPCHECK) -j$(shell nproc) --cppcheck-build-dir=$(BUILD)/lint/cppcheck $(OWN_C) $(BARE_C) $(TARGET_TEST_SRC)
 lint-clang-format: $(VENV)/.ready
@@ -483,8 +484,8 @@ lint-eds: $(VENV)/.ready
 NATIVE := host_tools/hodograph/native/_native.abi3.so
 .PHONY: native
 native: $(NATIVE)
-$(NATIVE): host_tools/hodograph/native/build_native.py host_tools/hodograph/native/declarations.h $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a \
-           $(wildcard firmware/core/*.h sim/plant/*.h sim/offline/*.h) $(VENV)/.editable
+$(NATIVE): host_tools/hodograph/native/build_native.py host_tools/hodograph/native/declarations.h $(BUILD)/host/libhodograph_core.a $(BUILD)/host/libhodograph_sim.a $(BUILD)/host/libhodograph_numerics.a \
+           $(wildcard firmware/core/*.h sim/plant/*.h sim/offline/*.h host_tools/numerics/*.h) $(VENV)/.editable
 	$(call say,cffi,$@)
 	$(Q)$(PY) $< --build $(BUILD)
 	@touch $@

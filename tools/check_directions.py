@@ -60,6 +60,7 @@ C_RULES: dict[str, set[str]] = {
         "generated",
     },
     "sim/plant": set(),
+    "host_tools/numerics": set(),
     "sim/offline": {"firmware/core", "sim/plant"},
     "sim/node": {
         "firmware/can",
@@ -93,7 +94,10 @@ C_RULES: dict[str, set[str]] = {
 }
 
 # Where neither operating system nor heap may be needed: the only system headers allowed.
-C_FREESTANDING = ("firmware/can", "firmware/core", "firmware/canopen", "firmware/app", "sim/plant")
+C_FREESTANDING = (
+    *("firmware/can", "firmware/core", "firmware/canopen", "firmware/app", "sim/plant"),
+    "host_tools/numerics",
+)
 C_PURE_HEADERS = {"assert.h", "float.h", "limits.h", "math.h", "stdbool.h", "stddef.h", "stdint.h"}
 C_PURE_HEADERS |= {"string.h", "inttypes.h"}
 
@@ -103,7 +107,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "events": set(),
     "data": set(),
     "spline": {"errors"},
-    "feed": {"errors", "names", "spline"},
+    "feed": {"errors", "names", "spline", "native"},
     "config": {"errors", "names", "events", "feed", "spline"},
     "toolpath": {"errors", "names", "spline", "native"},
     "native": {"errors", "names", "events", "config"},
@@ -250,10 +254,11 @@ PYTHON_RULES: dict[str, set[str]] = {
 }
 
 # What the native module may take from the C side.
-NATIVE_MAY_INCLUDE = ("core/", "plant/", "offline/")
+NATIVE_MAY_INCLUDE = ("core/", "numerics/", "plant/", "offline/")
 
 _INCLUDE = re.compile(r'^\s*#\s*include\s+(?:"(?P<own>[^"]+)"|<(?P<system>[^>]+)>)')
-_C_ROOTS = ("firmware", "sim")
+_C_ROOTS = ("firmware", "sim", "host_tools/numerics")
+_INCLUDE_ROOTS = ("firmware", "sim", "host_tools")
 
 
 @dataclass(frozen=True, order=True)
@@ -336,7 +341,7 @@ def _resolve(root: Path, path: str, own: str) -> str | None:
     """The file an include means, relative to the root; generated ones as generated/NAME."""
     if re.fullmatch(r"od_\w+\.h", own):
         return f"generated/{own}"
-    for base in (*_C_ROOTS, str(Path(path).parent)):
+    for base in (*_INCLUDE_ROOTS, str(Path(path).parent)):
         if (root / base / own).is_file():
             return (Path(base) / own).as_posix()
     return None
@@ -408,7 +413,7 @@ def _native_includes(root: Path) -> Iterator[Breach]:
                     yield Breach(
                         path,
                         number,
-                        f'the native module may not use "{header}" (may: core, plant, offline)',
+                        f'the native module may not use "{header}" (may: core, numerics, plant, offline)',
                     )
 
 

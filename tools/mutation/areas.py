@@ -40,6 +40,7 @@ AREAS = (
     Area("canopen", ("firmware/canopen/*.c",)),
     Area("app", ("firmware/app/**/*.c",)),
     Area("plant", ("sim/plant/*.c",)),
+    Area("numerics", ("host_tools/numerics/*.c",)),
     Area("offline", ("sim/offline/*.c",)),
     Area("node", ("sim/node/*.c",)),
     Area("injector", ("sim/injector/*.c", "sim/faults/*.c")),

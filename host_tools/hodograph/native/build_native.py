@@ -3,7 +3,7 @@
 
     python build_native.py [--build DIR]
 
-Links DIR/host/libhodograph_{sim,core}.a (DIR: `build` at the root of the tree), which `make c` makes,
+Links DIR/host/libhodograph_{sim,core,numerics}.a (DIR: `build` at the root of the tree), which `make c` makes,
 and puts `_native.abi3.so` beside this file. The Makefile calls it. For `pip install`, setup.py takes `extension`, which
 compiles the sources itself.
 """
@@ -27,6 +27,7 @@ HEADERS = (
     "core/chunk.h",
     "core/path_outputs.h",
     "core/feed_override.h",
+    "numerics/quadratic_program.h",
     "plant/drive.h",
     "offline/contour.h",
     "offline/offline.h",
@@ -36,9 +37,10 @@ HEADERS = (
     "offline/stop_trial.h",
     "offline/axis_run.h",
 )
-LIBRARIES = ("sim", "core")
-SOURCES = ("firmware/core", "sim/plant", "sim/offline")
+LIBRARIES = ("sim", "core", "numerics")
+SOURCES = ("firmware/core", "sim/plant", "sim/offline", "host_tools/numerics")
 """Folders whose sources these libraries are made of."""
+INCLUDES = ("firmware", "sim", "host_tools")
 CFLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 
 
@@ -68,7 +70,7 @@ def extension(root: Path) -> Any:
     sources = sorted(
         str(file.relative_to(root)) for folder in SOURCES for file in (root / folder).glob("*.c")
     )
-    ffi = _ffi(sources=sources, include_dirs=["firmware", "sim"], extra_link_args=["-s"])
+    ffi = _ffi(sources=sources, include_dirs=list(INCLUDES), extra_link_args=["-s"])
     own: Any = ffi.distutils_extension(tmpdir="build/native")
     own.py_limited_api = True
     own.define_macros.append(("Py_LIMITED_API", "0x030b0000"))
@@ -82,7 +84,7 @@ def build(build_dir: Path) -> Path:
         if not archive.is_file():
             raise FileNotFoundError(f"{archive} is missing: run `make c` first")
     ffi = _ffi(
-        include_dirs=[str(ROOT / "firmware"), str(ROOT / "sim")],
+        include_dirs=[str(ROOT / folder) for folder in INCLUDES],
         extra_objects=[str(archive) for archive in archives],
     )
     work = build_dir / "native"

@@ -305,6 +305,22 @@ struct smoothing {
 size_t smoothing_work(uint32_t count, uint32_t ways);
 void smoothing_solve(const struct smoothing *s, double barrier, double *shift, double *work);
 
+/* numerics/quadratic_program.h */
+struct quadratic_program {
+    uint32_t intervals, rows;
+    double penalty, curvature, tolerance;
+    const double *gradient, *hessian, *low, *high, *coefficient;
+    const int64_t *interval;
+    const double *least, *most;
+};
+struct quadratic_report {
+    uint32_t iterations;
+    double violated, gradient, gap;
+};
+size_t quadratic_work(uint32_t intervals, uint32_t rows);
+int quadratic_solve(const struct quadratic_program *program, double *unknown, double *work,
+                    struct quadratic_report *report);
+
 /* offline/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;

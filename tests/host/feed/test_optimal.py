@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from hodograph.feed.optimal.plan_limits import gather
 from hodograph.feed.optimal.sequence import plan_windows
 from hodograph.feed.optimal.track import Track, joined
 from hodograph.feed.optimal.window import _long_enough
+from hodograph.native.quadratic_program import QuadraticProgram, QuadraticSolution
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify import verify_program
@@ -226,15 +228,16 @@ def test_no_limits_at_all_are_refused() -> None:
 
 
 def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the solver is given, and what it gives, counted, since time depends on the load."""
+    """Rows by iterations of the solver, and what it gives, counted, since time depends on the load."""
     work: list[int] = []
-    solved = solver._solved
+    solve = solver.solve_quadratic
 
-    def counted(task: solver._Task, tolerance: float) -> np.ndarray | None:
-        work[-1] += task.matrix.nnz
-        return solved(task, tolerance)
+    def counted(program: QuadraticProgram, guess: np.ndarray, **options: Any) -> QuadraticSolution:
+        found = solve(program, guess, **options)
+        work[-1] += program.interval.size * found.iterations
+        return found
 
-    monkeypatch.setattr(solver, "_solved", counted)
+    monkeypatch.setattr(solver, "solve_quadratic", counted)
     pieces = []
     for n in (150, 600):
         work.append(0)

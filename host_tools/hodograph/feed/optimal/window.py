@@ -474,7 +474,9 @@ def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float
     if setting.tight is not None:
         rows.high[:] /= setting.tight[rows.interval]
         rows.low[:] /= setting.tight[rows.interval]
-    return Problem(*_cost(setting, p), scale, low, high, rows)
+    guess = scale.copy()
+    guess[1::2] = 0.0
+    return Problem(*_cost(setting, p), scale, guess, low, high, rows)
 
 
 def _rest_scale(grid: Grid, interval: int, q: float) -> tuple[float, float]:
