@@ -121,7 +121,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all unit unit-plain pytest run til faults lint format soak soak-stream bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all test-repeat unit unit-plain pytest run til faults lint format soak soak-stream bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -146,7 +146,7 @@ CHECK_S ?= 40
 check: build $(ASAN_BINS) lint-changed ## what an edit can break, in 90 s: C tests and Python tests that it reaches, lint of what changed
 	@$(PY) tools/run_tests.py --build $(BUILD) --suite check --budget $(CHECK_S)
 
-test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, in 15 min; ends with "N passed, N failed"
+test: $(TESTED) ## the tests that show whether the tree is sound, C and Python, in 10 min; ends with "N passed, N failed"
 	@$(PY) tools/run_tests.py --build $(BUILD)
 
 # One after the other: each has the machine for itself. (By the plain word make: `make -n` would run a line with the variable.)
@@ -154,6 +154,12 @@ ALONE := env -u MAKEFLAGS -u MFLAGS make --no-print-directory BUILD=$(BUILD) STA
 test-all: $(TESTED) ## every test, the long ones too, all proofs and all counts, a minute of each fuzz harness, nothing taken from stamps; ends with "N passed, N failed"
 	@$(PY) tools/run_parts.py --tests tests "$(PY) tools/run_tests.py --build $(BUILD) --suite all" \
 	    --tests proofs "$(ALONE) proofs" --step count "$(ALONE) count" --tests fuzz "$(ALONE) fuzz FUZZ_S=60 SEED=1 FUZZ="
+
+# RUNS: how often; MODES in turn: idle, busy (four processes that compute beside it), one-core
+RUNS  ?= 20
+MODES ?= idle busy one-core
+test-repeat: $(TESTED) ## `make test` over and over, for a night: is its verdict always the same (RUNS=20 MODES="idle busy one-core")
+	@$(PY) tools/repeat_tests.py --runs $(RUNS) --modes "$(MODES)" --out $(BUILD)/repeat
 
 unit: $(UNIT_BINS) ## the C tests only, under the sanitizers
 	@$(PY) tools/run_tests.py --build $(BUILD) --only unit

@@ -14,7 +14,6 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from shared_programs import share_programs
 
 from bench import EXAMPLES, PAPER_ALPHA, VCAN0, Bench, MakeAlpha, MakeBench
 from hodograph.bus.address import BUS_VARIABLE
@@ -23,6 +22,9 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import SimulatedMachine, virtual_clock
 from hodograph.bus.sdo.controller import OFF, connect
 from hodograph.config import load_machine
+from shared_programs import share_programs, stops_planned_once
+
+__all__ = ["stops_planned_once"]
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -85,7 +87,7 @@ def make_bench(request: pytest.FixtureRequest) -> Iterator[MakeBench]:
 
 
 @pytest.fixture(autouse=True)
-def _shared_programs(monkeypatch: pytest.MonkeyPatch) -> None:
+def _shared_programs(monkeypatch: pytest.MonkeyPatch, stops_planned_once: None) -> None:
     share_programs(monkeypatch)
 
 

@@ -97,7 +97,7 @@ def test_other_commands_find_the_bus_of_a_simulated_machine(
     with simulated_machine(environment) as machine:
         status = hodograph(environment, "status", "--json")
         run = hodograph(environment, "run", str(ALPHA), "--json")
-    assert machine.returncode in (0, 130)
+    assert machine.returncode == 0
     assert status.returncode == 0, status.stderr
     assert setpoints(run)
     after = hodograph(environment, "status")

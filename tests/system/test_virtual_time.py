@@ -144,7 +144,7 @@ def test_a_suspended_drive_is_missed_and_found_again(
     clock.suspend("drives")
     clock.sleep(5.0)
     assert controller.state() == 6
-    assert "0x8250" in controller.fault_text() or "0x8130" in controller.fault_text()
+    assert "0x8250, node 2, 2 positions missed in a row" in controller.fault_text()
     clock.resume("drives")
     assert run_command(clock, "reset", "--wait", "10").returncode == 0
     assert controller.state() == OFF

@@ -34,6 +34,9 @@ DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
 """The same where axes after x, y, z move and these do not: mm for each degree or mm of the longest of those moves."""
 FOLLOWING_SHARE = 0.5
 """Of the axis limits, for moves of axes after x, y, z: at their full speed they could not stop within stop_time_ms."""
+QUICK_ABOVE_MM = 50.0
+"""Stops of longer moves in space are searched with few trials: more take up to half a minute, and
+make them shorter by 8 % at most."""
 
 Place = tuple[float, ...]
 """Of path axes, mm or degrees: the two or three that draw a path, or these and the axes that follow them."""
@@ -64,12 +67,13 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
         plants(machine, limits),
         period_us=machine.period_us,
     )
+    is_long_in_space = len(start_mm) > PLANE_AXES and spline.length_mm > QUICK_ABOVE_MM
     options = ProgramOptions(
         "goto",
         (),
         program_limits(machine),
         machine.period_us,
-        stop_terms(machine, limits),
+        replace(stop_terms(machine, limits), quick=is_long_in_space),
     )
     return encode(compile_path(spline, plan, options).program)
 

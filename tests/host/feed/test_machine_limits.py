@@ -16,6 +16,7 @@ from hodograph.feed import AxisLimits, Limits
 from hodograph.feed.limits import MACHINE_SHARE
 from hodograph.native.program import NativeFault, NativeLimits, NativeProgram
 from hodograph.pipeline import Pipeline
+from hodograph.program import StopTerms
 from hodograph.verify import verify_program
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -37,13 +38,21 @@ def machine(**limits: float) -> Machine:
     return replace(found, axes=tuple(replace(axis, **limits) for axis in found.axes))
 
 
+class QuickStops(Pipeline):
+    """Stops are searched with few trials: limits of the motion are what is looked at."""
+
+    @property
+    def stop_terms(self) -> StopTerms:
+        return replace(super().stop_terms, quick=True)
+
+
 def pipeline(folder: Path, points: str, profile: str, policy: str, on: Machine) -> Pipeline:
     file = folder / "path.toml"
     limits = f'[limits]\npolicy = "{policy}"\n'
     file.write_text(
         f'[path]\nclosed = false\nthrough = {points}\nknots = "uniform"\n[feed]\n{FEEDS[profile]}{limits}'
     )
-    return Pipeline(load_path_file(file), on)
+    return QuickStops(load_path_file(file), on)
 
 
 @pytest.mark.parametrize("policy", ["respect", "report"])

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from hodograph.feed.optimal import plan_optimal
 from hodograph.feed.override_levels import FULL
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.native.program import NativeProgram
-from hodograph.program import Program, compile_program, encode
+from hodograph.program import Program, ProgramOptions, StopTerms, compile_program, encode
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify.cells import cut
 from hodograph.verify.instants import motion_at
@@ -77,8 +78,9 @@ class Case:
     plants: tuple[Plant, Plant] | None
 
 
+@cache
 def random_case(seed: int) -> Case:
-    """A program planned under policy "respect", with any profile."""
+    """A program planned under policy "respect", with any profile. Its stops are searched with few trials."""
     rng = np.random.default_rng([seed, 17])
     spline = wavy(seed)
     limits = random_limits(rng, spline.length_mm)
@@ -92,7 +94,8 @@ def random_case(seed: int) -> Case:
         limits = replace(limits, centripetal_mm_s2=1000.0)
     make = plan_optimal if request.optimal else plan_path
     plan = make(spline, request, limits, None, plants)
-    return Case(compile_program(spline, plan), limits, plants)
+    program = compile_program(spline, plan, ProgramOptions(stops=StopTerms(quick=True)))
+    return Case(program, limits, plants)
 
 
 def worst_ratio(case: Case, t_s, rate, slope, second) -> dict[str, float]:

@@ -19,6 +19,8 @@ from hodograph.program.check import check_image
 from hodograph.program.image import with_crc
 from hodograph.simulate import simulate_on, write_trace
 
+pytestmark = pytest.mark.usefixtures("stops_planned_once")
+
 ROOT = Path(__file__).parents[3]
 BASE = (ROOT / "tests" / "data" / "programs" / "alpha_events.hdgp").read_bytes()
 MACHINE = ROOT / "examples" / "machines" / "dispenser.toml"

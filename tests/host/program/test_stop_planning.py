@@ -147,3 +147,9 @@ def test_long_pieces_that_gain_nothing_stay_whole(tmp_path: Path) -> None:
     made = pipeline(tmp_path, points, CONSTANT.replace("90", "40"))
     assert made.program.piece_count == len(made.plan.pieces)
     assert (made.program.pieces.duration_q32_s * 2.0**-32).max() > 0.2
+
+
+def test_the_same_stops_in_every_call() -> None:
+    """Other tests plan the stops of a motion once, and rely on that (shared_programs.py)."""
+    first, second = (load_pipeline(EXAMPLES / "alpha.toml").image for _ in range(2))
+    assert first == second
