@@ -248,6 +248,8 @@ def _listed_path() -> Schema:
         "dwell_ms": _integer("Standstill before this path", 0, LONGEST_DWELL_MS, 0),
         "stop": _choice("Whether a program stop is before it", STOPS, STOPS[0]),
         "output": _list("Outputs that switch on this path", _path_output()),
+        "feed": _feed() | {"description": "The requested feed of this path, in place of [feed]"},
+        "limits": _limits() | {"description": "What its plan keeps, in place of [limits]"},
     }
     return _table("A curve, and the rest before it", properties | rests, required, more)
 
