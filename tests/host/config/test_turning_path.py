@@ -126,7 +126,8 @@ def listed(folder: Path, own: str = "", *, feed: str = "nominal_mm_s = 20") -> P
 def test_a_path_of_a_list_has_feed_and_limits_of_its_own(tmp_path: Path) -> None:
     own = "[path.feed]\nprofile = 'optimal'\nnominal_deg_s = 7\n[path.limits]\nfeed_deg_s = 6\nreserve = 0.25"
     move, turn = load_paths(listed(tmp_path, own))
-    assert move.file.feed is not None and turn.file.feed is not None
+    assert move.file.feed is not None
+    assert turn.file.feed is not None
     assert (move.file.feed.nominal_mm_s, turn.file.feed.nominal_mm_s) == (20.0, 7.0)
     assert (move.file.limits.feed_mm_s, turn.file.limits.feed_mm_s) == (None, 6.0)
     assert (move.file.turns_alone, turn.file.turns_alone) == (False, True)

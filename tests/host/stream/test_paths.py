@@ -155,10 +155,10 @@ def test_paths_with_outputs_about_a_turn(tmp_path: Path, five: Machine) -> None:
     )
     valve = load_machine(machine_file)
     events = [chunk.program.events for _, chunk, _ in _planned(valve, Place(), file)]
-    assert [one["place_q40"][0] for one in events][1:] == [0, 0]
+    assert [one["place"][0] for one in events][1:] == [0, 0]
     assert [len(one) for one in events] == [1, 3, 2]
     begun = _planned(valve, Place(2, 1 << 40), file)[0][1].program.events
-    assert [len(begun), begun["place_q40"][0]] == [2, 0]
+    assert [len(begun), begun["place"][0]] == [2, 0]
 
 
 def test_all_axes_meet(tmp_path: Path, five: Machine) -> None:
@@ -215,7 +215,7 @@ def test_files_with_errors(tmp_path: Path, old: str, new: str, message: str) -> 
 
 def test_a_path_begins_where_the_one_before_ends(tmp_path: Path, machine: Machine) -> None:
     file = _changed(tmp_path, "[[40, 0], [52", "[[40, 0.5], [52")
-    with pytest.raises(InputError, match=r"path 2 begins 0\.5 mm from the end of path 1"):
+    with pytest.raises(InputError, match=r"path 2 begins 0\.5 mm of y from the end of path 1"):
         list(PathsJob(file, machine, 1, CHUNK_BYTES, True).chunks(0, 0))
 
 
