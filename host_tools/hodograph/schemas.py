@@ -11,7 +11,6 @@ from collections.abc import Callable
 from typing import Any
 
 from .campaign.definition import GREATEST_SAMPLES
-from .campaign.variation import AXES as VARIED_AXES
 from .campaign.variation import FIGURES, GRIDS, KINDS
 from .config.axis_table import (
     COUNTS_PER_UNIT_MAX,
@@ -248,6 +247,8 @@ def _listed_path() -> Schema:
         "dwell_ms": _integer("Standstill before this path", 0, LONGEST_DWELL_MS, 0),
         "stop": _choice("Whether a program stop is before it", STOPS, STOPS[0]),
         "output": _list("Outputs that switch on this path", _path_output()),
+        "feed": _feed() | {"description": "The requested feed of this path, in place of [feed]"},
+        "limits": _limits() | {"description": "What its plan keeps, in place of [limits]"},
     }
     return _table("A curve, and the rest before it", properties | rests, required, more)
 
@@ -632,11 +633,11 @@ def _campaign_file() -> Schema:
         {
             "name": _text("For the table of results"),
             "machine": _text("Machine file with these gains"),
-            **{key: _number_or_vector("For both axes, or [x, y]", 2, 2, 0, 1e6) for key in pdff},
+            **{key: _number_or_vector("For all axes, or each", 2, 6, 0, 1e6) for key in pdff},
             "feedforward": _table(
                 "As of [[axis]] of a machine file",
                 {
-                    key: _number_or_vector("For both axes, or [x, y]", 2, 2, 0, 32767)
+                    key: _number_or_vector("For all axes, or each", 2, 6, 0, 32767)
                     for key in forward
                 },
             ),
@@ -694,7 +695,7 @@ def _vary(figure: str) -> Schema:
     }
     return _table(
         f"How {figure} varies",
-        kinds | {"axis": _choice("x or y alone, both alike, or each by itself", VARIED_AXES)},
+        kinds | {"axis": _text('The name of one axis, "all" alike, or "each" by itself')},
         more={
             "oneOf": [{"required": [kind]} for kind in KINDS],
             "if": {"properties": {"axis": {"const": "each"}}, "required": ["axis"]},

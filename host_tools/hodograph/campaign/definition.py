@@ -71,45 +71,49 @@ AS_GIVEN = Gains("own")
 """Without [[gains]]: the machine's own."""
 
 
-def read_gains(root: Table) -> tuple[Gains, ...]:
-    """In the order of the file; raises InputError."""
+def read_gains(root: Table, count: int) -> tuple[Gains, ...]:
+    """In the order of the file, for machines with so many axes on the path; raises InputError."""
     if not root.has("gains"):
         return (AS_GIVEN,)
     tables = root.tables("gains", ("name", "machine", *_PDFF, "feedforward", "interpolation"))
     found: list[Gains] = []
     for table in tables:
-        gains = _gains(table)
+        gains = _gains(table, count)
         if gains.name in [other.name for other in found]:
             raise table.error("name", f'"{gains.name}" is there twice')
         found.append(gains)
     return tuple(found)
 
 
-def _gains(table: Table) -> Gains:
-    changes: dict[str, tuple[float, float]] = {}
-    feed: dict[str, tuple[float, float]] = {}
+def _gains(table: Table, count: int) -> Gains:
+    changes: dict[str, tuple[float, ...]] = {}
+    feed: dict[str, tuple[float, ...]] = {}
     interpolation = None
     if table.has("machine"):
         machine = load_machine(table.present("machine"))
-        drives = machine.models(machine.require_plane("campaign"))
-        changes |= gains_of((drives[0], drives[1]), _PDFF)
-        interpolation = drives[0].interpolation, drives[1].interpolation
-        x, y = (axis.feedforward for axis in machine.require_plane("campaign"))
-        feed |= {name: (getattr(x, name), getattr(y, name)) for name in _FEED}
-    changes |= {name: _both(table, name, 1e6) for name in _PDFF if table.has(name)}
+        axes = machine.path_axes
+        if len(axes) != count:
+            raise table.error(
+                "machine",
+                f"names {machine.file} with {len(axes)} path axes, the machines of the paths have {count}",
+            )
+        drives = machine.models(axes)
+        changes |= gains_of(drives, _PDFF)
+        interpolation = tuple(drive.interpolation for drive in drives)
+        feed |= {name: tuple(getattr(axis.feedforward, name) for axis in axes) for name in _FEED}
+    changes |= {name: _for_axes(table, name, count, 1e6) for name in _PDFF if table.has(name)}
     forward = table.table("feedforward", _FEED, required=False)
-    feed |= {name: _both(forward, name, 32767) for name in _FEED if forward.has(name)}
+    feed |= {name: _for_axes(forward, name, count, 32767) for name in _FEED if forward.has(name)}
     if table.has("interpolation"):
-        interpolation = (table.choice("interpolation", INTERPOLATIONS),) * 2
+        interpolation = (table.choice("interpolation", INTERPOLATIONS),) * count
     return Gains(table.text("name"), tuple(changes.items()), tuple(feed.items()), interpolation)
 
 
-def _both(table: Table, name: str, high: float) -> tuple[float, float]:
-    """A number for both axes, or [x, y]."""
-    if table.is_list(name):
-        return table.pair(name, low=0, high=high)
-    value = table.number(name, low=0, high=high)
-    return value, value
+def _for_axes(table: Table, name: str, count: int, high: float) -> tuple[float, ...]:
+    """A number for all axes, or one for each."""
+    found = table.optional_per_axis(name, count, low=0, high=high)
+    assert found is not None, "the table has it"
+    return found
 
 
 GREATEST_SAMPLES = 10_000_000
@@ -157,14 +161,16 @@ def load_campaign(file: Path) -> Campaign:
     sources = _sources(root, raw)
     kernel = root.choice("kernel", KERNELS) if root.has("kernel") else None
     plants = tuple(_plant(source.machine, kernel) for source in sources)
+    axes = _axes(root, sources)
     design = Design(
         names=_distinct_names([source.path for source in sources]),
+        axes=axes,
         plants=plants,
         profiles=_profiles(root, raw),
         feeds_mm_s=_feeds(root, raw),
-        gains=read_gains(root),
+        gains=read_gains(root, len(axes)),
         faults=read_faults(root, raw, plants),
-        variations=read_variations(root, raw),
+        variations=read_variations(root, raw, axes),
         samples=root.integer("samples", 1, low=1, high=GREATEST_SAMPLES),
         seed=root.integer("seed", 0, low=0, high=2**31),
     )
@@ -195,7 +201,7 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
         if path.turns_alone:
             raise one.error(
                 "paths",
-                f"names {path.file}, which turns axes alone: a campaign takes paths of x and y",
+                f"names {path.file}, which turns axes alone: a campaign takes paths of x, y and z",
             )
         pipeline = Pipeline(path, machine)
         pipeline.feed  # noqa: B018  (says what is missing)
@@ -204,16 +210,28 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
 
 
 def _plant(machine: Machine, kernel: str | None) -> Plant:
-    x, y = machine.require_plane("campaign")
-    drives = machine.models((x, y))
+    axes = machine.path_axes
     return Plant(
-        drives=(drives[0], drives[1]),
-        feedforward=(x.feedforward, y.feedforward),
-        nodes=(x.node, y.node),
+        drives=machine.models(axes),
+        feedforward=tuple(axis.feedforward for axis in axes),
+        nodes=tuple(axis.node for axis in axes),
         kernel=kernel or machine.kernel,
-        counts_per_mm=machine.counts_per_mm,
+        counts_per_unit=machine.path_counts,
         period_us=machine.period_us,
     )
+
+
+def _axes(root: Table, sources: Sequence[Source]) -> tuple[str, ...]:
+    """Names of the axes on the path, of each machine. Raises InputError: they differ."""
+    first, *others = (source.machine.path_names for source in sources)
+    for names in others:
+        if names != first:
+            raise root.error(
+                "paths",
+                f"run on machines with the path axes {', '.join(first)} and {', '.join(names)}: make a campaign of "
+                "each, or name a machine",
+            )
+    return first
 
 
 def _distinct_names(paths: Sequence[PathFile]) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ def _simulated(run: Run, program: NativeProgram) -> Outcome:
         program,
         plant.drives,
         kernel=plant.kernel,
-        counts_per_mm=plant.counts_per_mm,
+        counts_per_mm=plant.counts_per_unit,
         feedforward=plant.feedforward if forward else None,
         faults=run.faults,
         keep_rows=False,

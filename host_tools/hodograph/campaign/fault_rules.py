@@ -32,7 +32,7 @@ class Fault:
     scenario: Scenario | None = None
 
     def rules(
-        self, seed: int, sample: int, nodes: tuple[int, int], period_us: int
+        self, seed: int, sample: int, nodes: tuple[int, ...], period_us: int
     ) -> list[OfflineFault]:
         """The faults of one sample. Raises InputError: a rule that a run without a bus cannot have."""
         return [offline_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
@@ -46,7 +46,7 @@ class Fault:
         ]
 
 
-def offline_fault(rule: str, nodes: tuple[int, int], period_us: int) -> OfflineFault:
+def offline_fault(rule: str, nodes: tuple[int, ...], period_us: int) -> OfflineFault:
     """A line of rules, for the drives with these node numbers. Raises InputError."""
     kind, *words = rule.split()
     if kind not in _VALUES:

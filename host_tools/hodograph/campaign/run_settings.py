@@ -7,6 +7,7 @@ another, and among them those of a group (all but grid and sample the same).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -18,20 +19,18 @@ from ..native import OfflineFault
 from .fault_rules import Fault
 from .variation import Variation, figure
 
-Pair = tuple[Drive, Drive]
-Feedforwards = tuple[Feedforward, Feedforward]
 Varied = tuple[tuple[str, float], ...]
 
 
 @dataclass(frozen=True)
 class Plant:
-    """The simulated machine that a path runs on: models, feedforward and nodes of both axes."""
+    """The simulated machine that a path runs on: models, feedforward, nodes and counts of the axes of the path."""
 
-    drives: Pair
-    feedforward: Feedforwards
-    nodes: tuple[int, int]
+    drives: tuple[Drive, ...]
+    feedforward: tuple[Feedforward, ...]
+    nodes: tuple[int, ...]
     kernel: str
-    counts_per_mm: int
+    counts_per_unit: tuple[int, ...]
     period_us: int
 
 
@@ -39,14 +38,15 @@ class Plant:
 class Gains:
     """Gains and feedforward that replace those of the path's machine; the others stay.
 
-    `changes`: figure of a drive and its value for x and y; `feed`: the same for fields of Feedforward;
-    `interpolation`: how the drives of x and y go from setpoint to setpoint.
+    changes        figure of a drive, and its value for each axis
+    feed           the same for fields of Feedforward
+    interpolation  how the drive of each axis goes from setpoint to setpoint
     """
 
     name: str
-    changes: tuple[tuple[str, tuple[float, float]], ...] = ()
-    feed: tuple[tuple[str, tuple[float, float]], ...] = ()
-    interpolation: tuple[str, str] | None = None
+    changes: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    feed: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    interpolation: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -74,9 +74,13 @@ class Run:
 
 @dataclass(frozen=True)
 class Design:
-    """All that runs can have. None as profile or feed: what the path file asks for."""
+    """All that runs can have. None as profile or feed: what the path file asks for.
+
+    axes  names of the axes of each path, the same for all
+    """
 
     names: tuple[str, ...]
+    axes: tuple[str, ...]
     plants: tuple[Plant, ...]
     profiles: tuple[str | None, ...]
     feeds_mm_s: tuple[float | None, ...]
@@ -144,18 +148,19 @@ class Design:
     @property
     def varied_columns(self) -> tuple[str, ...]:
         """The names in `Run.varied`."""
-        return tuple(f"{'xy'[axis]}.{v.figure}" for v in self.variations for axis in v.axes)
+        return tuple(f"{axis}.{v.figure}" for v in self.variations for axis in v.axes(self.axes))
 
     def _vary(self, plant: Plant, grid: dict[Variation, int], sample: int) -> tuple[Plant, Varied]:
         drives = list(plant.drives)
         varied = []
         for variation in self.variations:
-            for axis in variation.axes:
+            for axis in variation.axes(self.axes):
                 number = variation.number(axis, self.seed, sample, grid.get(variation, 0))
-                value = variation.value(drives[axis], number)
-                drives[axis] = with_figure(drives[axis], variation.figure, value)
-                varied.append((f"{'xy'[axis]}.{variation.figure}", value))
-        return replace(plant, drives=(drives[0], drives[1])), tuple(varied)
+                place = self.axes.index(axis)
+                value = variation.value(drives[place], number)
+                drives[place] = with_figure(drives[place], variation.figure, value)
+                varied.append((f"{axis}.{variation.figure}", value))
+        return replace(plant, drives=tuple(drives)), tuple(varied)
 
 
 def _places(number: int, sizes: list[int]) -> list[int]:
@@ -175,18 +180,20 @@ def with_figure(drive: Drive, name: str, value: float) -> Drive:
     return replace(drive, **changed)
 
 
-def gains_of(drives: Pair, names: tuple[str, ...]) -> tuple[tuple[str, tuple[float, float]], ...]:
-    """These figures of both drives, as `Gains.changes` has them."""
-    return tuple((name, (figure(drives[0], name), figure(drives[1], name))) for name in names)
+def gains_of(
+    drives: Sequence[Drive], names: tuple[str, ...]
+) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """These figures of the drives, as `Gains.changes` has them."""
+    return tuple((name, tuple(figure(drive, name) for drive in drives)) for name in names)
 
 
 def _with_gains(plant: Plant, gains: Gains) -> Plant:
     drives, feed = list(plant.drives), list(plant.feedforward)
-    for axis in (0, 1):
+    for axis in range(len(drives)):
         for name, values in gains.changes:
             drives[axis] = with_figure(drives[axis], name, values[axis])
         if gains.interpolation is not None:
             drives[axis] = replace(drives[axis], interpolation=gains.interpolation[axis])
         for name, values in gains.feed:
             feed[axis] = replace(feed[axis], **{name: values[axis]})
-    return replace(plant, drives=(drives[0], drives[1]), feedforward=(feed[0], feed[1]))
+    return replace(plant, drives=tuple(drives), feedforward=tuple(feed))

@@ -34,7 +34,7 @@ FIGURES = (
 
 KINDS = ("values", "factors", "uniform", "normal", "factor_uniform", "factor_normal")
 GRIDS = ("values", "factors")
-AXES = ("x", "y", "both", "each")
+ALL, EACH = "all", "each"
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Variation:
 
     kind     values, factors: each of `numbers` in turn; uniform: from numbers[0] to numbers[1]; normal: mean
              numbers[0], standard deviation numbers[1]. "factor": times the drive file's figure, else instead of it
-    axis     x or y alone; both: the same draw; each: one of its own
+    axis     the name of one axis; "all": the same draw for all axes; "each": each axis has a draw of its own
     """
 
     figure: str
@@ -56,16 +56,15 @@ class Variation:
         """Whether every number is tried, and nothing drawn."""
         return self.kind in GRIDS
 
-    @property
-    def axes(self) -> tuple[int, ...]:
-        """The axes that it is about."""
-        return {"x": (0,), "y": (1,)}.get(self.axis, (0, 1))
+    def axes(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        """The axes that it is about, of these, which follow the path."""
+        return names if self.axis in (ALL, EACH) else (self.axis,)
 
-    def number(self, axis: int, seed: int, sample: int, grid_place: int) -> float:
+    def number(self, axis: str, seed: int, sample: int, grid_place: int) -> float:
         """What is drawn for an axis: a factor or a value."""
         if self.is_grid:
             return self.numbers[grid_place]
-        drawn_for = "xy"[axis] if self.axis != "both" else "both"
+        drawn_for = ALL if self.axis == ALL else axis
         share = unit(f"{seed} {sample} {self.figure} {drawn_for}")
         first, second = self.numbers
         if self.kind.endswith("uniform"):
@@ -90,15 +89,17 @@ def unit(text: str) -> float:
     return (bits + 0.5) * 2.0**-52
 
 
-def read_variations(root: Table, raw: Mapping[str, Any]) -> tuple[Variation, ...]:
-    """In the order of the file; raises InputError."""
+def read_variations(
+    root: Table, raw: Mapping[str, Any], names: tuple[str, ...]
+) -> tuple[Variation, ...]:
+    """In the order of the file, for machines with these axes on the path; raises InputError."""
     vary = root.table("vary", FIGURES, required=False)
     return tuple(
-        _variation(vary.table(name, (*KINDS, "axis")), name) for name in raw.get("vary", {})
+        _variation(vary.table(name, (*KINDS, "axis")), name, names) for name in raw.get("vary", {})
     )
 
 
-def _variation(table: Table, name: str) -> Variation:
+def _variation(table: Table, name: str, names: tuple[str, ...]) -> Variation:
     kinds = [kind for kind in KINDS if table.has(kind)]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "nothing"
@@ -106,10 +107,10 @@ def _variation(table: Table, name: str) -> Variation:
             kinds[0] if kinds else KINDS[0], f"needs one of {', '.join(KINDS)}, but has {given}"
         )
     kind = kinds[0]
-    axis = table.choice("axis", AXES, "both" if kind in GRIDS else "each")
+    axis = table.choice("axis", (*names, ALL, EACH), ALL if kind in GRIDS else EACH)
     if kind in GRIDS:
-        if axis == "each":
-            raise table.error("axis", 'cannot be "each" for a grid: use "both", "x" or "y"')
+        if axis == EACH:
+            raise table.error("axis", 'cannot be "each" for a grid: use "all", or an axis')
         return Variation(name, kind, table.numbers(kind), axis)
     return Variation(name, kind, _two(table, kind), axis)
 

@@ -26,7 +26,7 @@ from ..bus.sdo.controller import connect
 from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
-from ..config import SPACE_AXES, Machine, load_machine, load_paths
+from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
 from ..job import DEFAULT_TOLERANCE_MM
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
@@ -103,7 +103,7 @@ def _require_job_file(options: Namespace, file: Path) -> None:
 
 def has_paths(file: Path) -> bool:
     """Whether a file is a path file with a list of paths. Raises InputError."""
-    return file.suffix == PATH_SUFFIX and len(load_paths(file)) > 1
+    return file.suffix == PATH_SUFFIX and is_list_of_paths(file)
 
 
 def _machine(options: Namespace) -> Machine:

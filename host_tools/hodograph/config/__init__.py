@@ -4,7 +4,15 @@
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive
 from .machine_file import PLANE_AXES, SPACE_AXES, Machine, Supervision, load_machine, machine_of
-from .path_file import ListedPath, PathFile, PathSpec, SpacePathSpec, load_path_file, load_paths
+from .path_file import (
+    ListedPath,
+    PathFile,
+    PathSpec,
+    SpacePathSpec,
+    is_list_of_paths,
+    load_path_file,
+    load_paths,
+)
 from .table import is_there, read_toml
 
 __all__ = [
@@ -21,6 +29,7 @@ __all__ = [
     "Scaling",
     "SpacePathSpec",
     "Supervision",
+    "is_list_of_paths",
     "is_there",
     "load_drive",
     "load_machine",

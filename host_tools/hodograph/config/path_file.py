@@ -124,6 +124,8 @@ class ListedPath:
 STOPS = ("none", "program", "optional")
 LONGEST_DWELL_MS = 86_400_000
 _RESTS = ("dwell_ms", "stop")
+_OWN = ("feed", "limits")
+"""Sections that a path of a list may have for itself, in place of those of the file."""
 _SECTIONS = ("path", "feed", "limits", "machine", "output")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
 _FEED = ("profile", "nominal_mm_s", "nominal_deg_s", "ramp_time_s", "n_c", "degree")
@@ -159,8 +161,16 @@ def load_path_file(file: Path) -> PathFile:
         )
     root = Table(file, "", read_toml(file), _SECTIONS)
     if root.is_list("path"):
-        raise root.error("path", "is a list of paths, which is a job: only stream and run take it")
-    return _path_file(root, root.table("path", _PATH), root, f"{file}: [[output]]")
+        raise root.error(
+            "path",
+            "is a list of paths, which is a job: only stream takes it, and run as its one file",
+        )
+    return _path_file(root, root.table("path", _PATH), root)
+
+
+def is_list_of_paths(file: Path) -> bool:
+    """Whether a path file has [[path]] in place of [path]. Raises InputError."""
+    return Table(file, "", read_toml(file), _SECTIONS).is_list("path")
 
 
 def load_paths(file: Path) -> tuple[ListedPath, ...]:
@@ -168,7 +178,7 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     root = Table(file, "", {} if is_toolpath(file) else read_toml(file), _SECTIONS)
     if not root.is_list("path"):
         return (ListedPath(load_path_file(file)),)
-    tables = root.tables("path", (*_PATH, *_RESTS, "output"))
+    tables = root.tables("path", (*_PATH, *_RESTS, "output", *_OWN))
     if root.has("output"):
         raise root.error(
             "output", "applies to files with one [path]: put [[path.output]] behind its [[path]]"
@@ -176,13 +186,6 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     found = tuple(_listed(root, table, i) for i, table in enumerate(tables, 1))
     if len({type(one.file.given_path) for one in found}) > 1:
         raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")
-    for number, one in enumerate(found, 1):
-        if one.file.turns_alone:
-            raise root.error(
-                "path",
-                f"number {number} turns axes alone, while x, y and z rest: give it a file of its own, with one [path], "
-                "and run the files one after the other: hodograph run FILE FILE …",
-            )
     for key in _RESTS:
         if tables[0].has(key):
             raise tables[0].error(
@@ -193,19 +196,21 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
 
 def _listed(root: Table, table: Table, number: int) -> ListedPath:
     dwell_ms = table.integer("dwell_ms", 0, low=0, high=LONGEST_DWELL_MS)
-    file = _path_file(root, table, table, f"{root.file}: path {number}: [[path.output]]")
+    file = _path_file(root, table, table, number)
     return ListedPath(file, dwell_ms, table.choice("stop", STOPS, STOPS[0]))
 
 
-def _path_file(root: Table, table: Table, outputs: Table, outputs_name: str) -> PathFile:
-    """One of the paths of a file, whose outputs are in the table `outputs`."""
+def _path_file(root: Table, table: Table, outputs: Table, number: int | None = None) -> PathFile:
+    """A path of a file, with its outputs in the table `outputs`; of a list of paths the one with this number."""
     file = root.file
     machine = root.table("machine", ("file",), required=False)
     path = _path(table)
     unit = "deg" if isinstance(path, SpacePathSpec) and path.turns_alone else "mm"
-    feed = _feed(root.table("feed", _FEED), unit) if root.has("feed") else None
+    lengths = _Lengths(unit, number)
+    with_feed, with_limits = (table if table.has(key) else root for key in _OWN)
+    feed = _feed(with_feed.table("feed", _FEED), lengths) if with_feed.has("feed") else None
     axes = path.axes if isinstance(path, SpacePathSpec) else 2
-    limits = _limits(root.table("limits", _LIMITS, required=False), axes, unit)
+    limits = _limits(with_limits.table("limits", _LIMITS, required=False), axes, lengths)
     return PathFile(
         file=file,
         name=file.stem,
@@ -215,7 +220,7 @@ def _path_file(root: Table, table: Table, outputs: Table, outputs_name: str) -> 
         machine_file=machine.path("file") if machine.has("file") else None,
         outputs=read_path_outputs(
             outputs.tables("output", PATH_OUTPUT, required=False),
-            outputs_name,
+            f"{file}: [[output]]" if number is None else f"{file}: path {number}: [[path.output]]",
             len(path.points) if path.through else None,
         ),
     )
@@ -302,19 +307,46 @@ def _direction(table: Table, key: str) -> NDArray[np.float64] | None:
     return vector
 
 
-def _in_unit(table: Table, key: str, unit: str) -> str:
-    """The key in the unit of length of the path. Raises InputError: the table has it in the other one."""
-    own, other = in_unit(key, unit), in_unit(key, "mm" if unit == "deg" else "deg")
-    if table.has(other):
-        why = "turns axes alone" if unit == "deg" else "moves x, y or z"
-        raise table.error(other, f"does not apply to a path that {why}: give {own}")
-    return own
+@dataclass(frozen=True)
+class _Lengths:
+    """The unit of lengths of a path, "mm" or "deg", and its number in a list; None: the file has one path."""
+
+    unit: str
+    number: int | None
+
+    def key(self, table: Table, key: str) -> str:
+        """The key in this unit. Raises InputError: the table has it in the other one."""
+        own, other = in_unit(key, self.unit), in_unit(key, "mm" if self.unit == "deg" else "deg")
+        if table.has(other):
+            raise table.error(
+                other, f"does not apply to {self._path}: give {own}{self._place(table)}"
+            )
+        return own
+
+    def refuse(self, table: Table, key: str) -> None:
+        """Raises InputError: the table has a key that this path cannot have."""
+        if table.has(key):
+            remedy = self._place(table) and f": give other limits{self._place(table)}"
+            raise table.error(key, f"does not apply to {self._path}{remedy or ': remove it'}")
+
+    @property
+    def _path(self) -> str:
+        moved = "turns axes alone" if self.unit == "deg" else "moves x, y or z"
+        return (
+            f"a path that {moved}" if self.number is None else f"path {self.number}, which {moved}"
+        )
+
+    def _place(self, table: Table) -> str:
+        """Where a path of a list has keys for itself; "": they are there already, or there is no list."""
+        if self.number is None or table.section not in _OWN:
+            return ""
+        return f" in [path.{table.section}] behind its [[path]]"
 
 
-def _feed(table: Table, unit: str) -> FeedRequest:
+def _feed(table: Table, lengths: _Lengths) -> FeedRequest:
     profile = table.choice("profile", PROFILES, "exponential")
     feeds = {"low": LEAST_FEED_MM_S, "high": GREATEST_FEED_MM_S}
-    nominal = _in_unit(table, "nominal_mm_s", unit)
+    nominal = lengths.key(table, "nominal_mm_s")
     if profile == OPTIMAL:
         nominal_mm_s = table.optional_number(nominal, **feeds)
         return FeedRequest(profile, inf if nominal_mm_s is None else nominal_mm_s)
@@ -334,13 +366,12 @@ def _n_c(table: Table) -> float | Literal["optimise"]:
     return table.number("n_c", low=0, high=GREATEST_N_C)
 
 
-def _limits(table: Table, axes: int, unit: str) -> Limits:
+def _limits(table: Table, axes: int, lengths: _Lengths) -> Limits:
     feed, acceleration, jerk = (
-        _in_unit(table, key, unit) for key in ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
+        lengths.key(table, key) for key in ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3")
     )
-    for key in ("centripetal_mm_s2", "cap") if unit == "deg" else ():
-        if table.has(key):
-            raise table.error(key, "does not apply to a path that turns axes alone: remove it")
+    for key in ("centripetal_mm_s2", "cap") if lengths.unit == "deg" else ():
+        lengths.refuse(table, key)
     return Limits(
         feed_mm_s=table.optional_number(feed, **_FEEDS),
         acceleration_mm_s2=table.optional_number(acceleration, **_ACCELERATIONS),

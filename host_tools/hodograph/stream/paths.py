@@ -9,12 +9,12 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
 from ..events import Events, SwitchedOutputs, events_behind, no_events
-from ..pipeline import Pipeline
-from ..program.image import Program
+from ..pipeline import Pipeline, pipeline_of
 from ..program.inspection import end_point_q40
 from ..spline import PHSpline
 from ..spline.build import FoundSpline
@@ -23,6 +23,8 @@ from ..toolpath.moves import Command, Dwell, ProgramStop
 from .chunk import Chunk, ChunkHeader, Rest
 from .chunks import JobPlace, zones_behind
 from .geometry import LEAST_REST_MM, curve_behind
+
+Int = NDArray[np.int64]
 
 _MEETS_Q40 = 1 << 16
 """2^-24 mm: how far a path may begin from the end of the one before (docs/reference/protocol.md 1.7)."""
@@ -34,6 +36,12 @@ class _BegunPipeline(Pipeline):
 
     begin_mm: float = 0.0
     given_events: Events = field(default_factory=no_events)
+    given_standing_mm: tuple[float, ...] = ()
+
+    @property
+    def standing_mm(self) -> tuple[float, ...]:
+        """Where the axes before those of the program stand."""
+        return self.given_standing_mm
 
     @property
     def events(self) -> Events:
@@ -54,11 +62,15 @@ class _BegunPipeline(Pipeline):
 
 @dataclass(frozen=True, eq=False)
 class PathChunk:
-    """A path as a chunk of its job, and what is at rest before it."""
+    """A path as a chunk of its job, and what is at rest before it.
+
+    standing_mm  where the axes before those of its program stand, without the work offset
+    """
 
     chunk: Chunk
     before: tuple[Command, ...]
     duration_s: float
+    standing_mm: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -76,36 +88,43 @@ class PathsJob:
     stops: bool
 
     def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
-        """From path number `first` on, from this arc length of it."""
+        """From path number `first` on, from this arc length of it. Paths on which axes turn alone, and those between
+        them, are jobs of their own in the controller: the axes of a job do not change.
+        """
         paths = load_paths(self.file)
-        if any(one.file.turns_alone for one in paths):
-            raise InputError(
-                f"{self.file}: axes turn alone, which no chunk does: use hodograph run"
-            )
         if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
             first, begin_q40 = first + 1, 0
-        place: JobPlace | None = None
         switched = SwitchedOutputs()
-        for number, listed in enumerate(paths):
-            if number < first:
-                switched.act(self._events(listed))
-                continue
-            last = number + 1 == len(paths)
-            if number == first:
-                pipeline = self._begun(listed, begin_q40, switched)
+        for listed in paths[:first]:
+            switched.act(self._events(pipeline_of(listed.file, self.machine)))
+        place: JobPlace | None = None
+        end_q40: Int | None = None
+        begun = first
+        for number in range(first, len(paths)):
+            listed = paths[number]
+            following = paths[number + 1] if number + 1 < len(paths) else None
+            pipeline = pipeline_of(listed.file, self.machine)
+            if place is None:
+                pipeline, begun = self._begun(pipeline, begin_q40, switched), number
             else:
-                pipeline, begin_q40 = Pipeline(listed.file, self.machine), 0
+                begin_q40 = 0
+                switched.act(self._events(pipeline))
+            if end_q40 is not None:
+                self._require_meeting(number, pipeline, end_q40)
+            last = following is None or following.file.turns_alone != listed.file.turns_alone
             made = self._chunk(
-                listed, pipeline, number, place, begin_q40, job=self.job + first, last=last
+                listed, pipeline, number, place, begin_q40, job=self.job + begun, last=last
             )
             yield made
-            header = made.chunk.header
-            program = made.chunk.program
+            header, program = made.chunk.header, made.chunk.program
+            end = end_point_q40(program)
+            end_q40 = self._all_axes(pipeline, end)
             arc_q40 = header.job_start_q40 + program.length_q40
-            place = JobPlace(Rest(), header.sequence + 1, arc_q40, end_point_q40(program))
+            place = None if last else JobPlace(Rest(), header.sequence + 1, arc_q40, end)
+            begin_q40 = 0
 
     def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
-        length_mm = Pipeline(listed.file, self.machine).curve.length_mm
+        length_mm = pipeline_of(listed.file, self.machine).curve.length_mm
         return begin_q40 * 2.0**-40 > length_mm - LEAST_REST_MM
 
     def _chunk(
@@ -131,39 +150,50 @@ class PathsJob:
             rest=None if place is None else (rest if self.stops else Rest(listed.dwell_ms)),
             joined=not last,
         )
-        if place is not None:
-            self._require_meeting(number, program, place)
         chunk = Chunk(header, pipeline.image)
         if chunk.size > self.most_bytes:
             raise PlanError(
                 f"{self.file}: path {number + 1} takes {chunk.size} bytes with its header, and the controller takes "
                 f"{self.most_bytes} at once (object 0x2060): divide the path"
             )
-        return PathChunk(chunk, _commands(rest, number + 1), program.duration_q32_s * 2.0**-32)
+        duration_s = program.duration_q32_s * 2.0**-32
+        return PathChunk(chunk, _commands(rest, number + 1), duration_s, pipeline.standing_mm)
 
-    def _events(self, listed: ListedPath) -> Events:
+    def _events(self, pipeline: Pipeline) -> Events:
         """Of the whole path; a path without any is not computed for them."""
-        return Pipeline(listed.file, self.machine).events if listed.file.outputs else no_events()
+        return pipeline.events if pipeline.file.outputs else no_events()
 
-    def _begun(self, listed: ListedPath, begin_q40: int, switched: SwitchedOutputs) -> Pipeline:
-        """Of the first path, from an arc length on; at its start the outputs become what all events before made."""
-        begin_mm, limits = begin_q40 * 2.0**-40, listed.file.limits
-        events = self._events(listed)
+    def _begun(self, whole: Pipeline, begin_q40: int, switched: SwitchedOutputs) -> Pipeline:
+        """Of the path that a job begins with, from an arc length on; at its start the outputs become what all events
+        before made.
+        """
+        begin_mm, limits = begin_q40 * 2.0**-40, whole.file.limits
+        events = self._events(whole)
         if begin_q40:
             passed, events = events_behind(events, begin_q40)
             switched.act(passed)
             limits = replace(limits, zones=zones_behind(limits.zones, begin_mm))
-        file = replace(listed.file, limits=limits)
         begun = np.concatenate((switched.begin(), events))
-        return _BegunPipeline(file, self.machine, begin_mm, begun)
+        switched.act(events)
+        file = replace(whole.file, limits=limits)
+        return _BegunPipeline(file, whole.machine, begin_mm, begun, whole.standing_mm)
 
-    def _require_meeting(self, number: int, program: Program, place: JobPlace) -> None:
-        off = np.abs(program.point_q40[:, 0] - place.point_q40)
-        if off.max() > _MEETS_Q40:
-            raise InputError(
-                f"{self.file}: path {number + 1} begins {off.max() * 2.0**-40:.6g} mm from the end of path {number}: "
-                "let it begin there; moves between paths are paths of their own"
-            )
+    def _all_axes(self, pipeline: Pipeline, point_q40: Int) -> Int:
+        """A place of a path, in machine coordinates of all axes of the machine's path."""
+        stands = zip(pipeline.standing_mm, self.machine.offset_mm, strict=False)
+        standing_q40 = [round((at + offset) * 2**40) for at, offset in stands]
+        return np.concatenate((np.array(standing_q40, dtype=np.int64), point_q40))
+
+    def _require_meeting(self, number: int, pipeline: Pipeline, end_q40: Int) -> None:
+        begin_q40 = self._all_axes(pipeline, pipeline.program.point_q40[:, 0])
+        off = np.abs(begin_q40 - end_q40)
+        if off.max() <= _MEETS_Q40:
+            return
+        axis = self.machine.path_axes[int(np.argmax(off))]
+        raise InputError(
+            f"{self.file}: path {number + 1} begins {off.max() * 2.0**-40:.6g} {axis.unit} of {axis.name} from the end "
+            f"of path {number}: let it begin there; moves between paths are paths of their own"
+        )
 
 
 def _commands(rest: Rest, number: int) -> tuple[Command, ...]:

@@ -387,8 +387,15 @@ class JobPlan:
             before, start_q40 = made.before, header.job_start_q40
             if header.rest is None:
                 before, start_q40 = () if header.job_start_q40 else (*carried, *before), 0
+                carried = ()
             section = PlannedSection(
-                number + header.line - 1, file, header.line, before, start_q40, header.rest
+                number + header.line - 1,
+                file,
+                header.line,
+                before,
+                start_q40,
+                header.rest,
+                made.standing_mm,
             )
             yield section, made.chunk, made.duration_s
 

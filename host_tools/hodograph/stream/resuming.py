@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..config import load_paths
 from ..errors import InputError
 from ..names import is_toolpath
-from ..pipeline import Pipeline
+from ..pipeline import pipeline_of
 from .geometry import Block, Curve
 from .journal import Entry
 from .plan import JobFiles, Place
@@ -100,10 +100,11 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float
                 number += 1
         else:
             for line, listed in enumerate(load_paths(file), 1):
-                curve = Pipeline(listed.file, job.machine).curve
+                pipeline = pipeline_of(listed.file, job.machine)
+                curve = pipeline.curve
                 count = curve.segment_count
                 block = Block(curve, np.full(count, np.inf), np.full(count, line))
-                yield number, iter([block]), ()
+                yield number, iter([block]), pipeline.standing_mm
                 number += 1
 
 

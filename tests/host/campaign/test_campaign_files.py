@@ -42,7 +42,30 @@ BAD = [
     (DRAWN + "[vary.k_vf]\nvalues = [1, 1]", r"values holds a number twice"),
     (DRAWN + "[vary.k_vf]\nvalues = []", r"values must be a list of numbers"),
     (DRAWN + '[vary.k_vf]\nvalues = [1]\naxis = "each"', r'axis cannot be "each" for a grid'),
-    (DRAWN + '[vary.k_vf]\nvalues = [1]\naxis = "z"', r'axis cannot be "z"'),
+    (
+        DRAWN + '[vary.k_vf]\nvalues = [1]\naxis = "z"',
+        r'axis cannot be "z"; use one of: x, y, all, each',
+    ),
+    (
+        DRAWN + '[vary.k_vf]\nvalues = [1]\naxis = "both"',
+        r'axis cannot be "both"; use one of: x, y, all, each',
+    ),
+    (
+        'paths = ["path.toml", "{examples}/helix.toml"]',
+        r"\[paths\] run on machines with the path axes x, y and x, y, z: make a campaign of each",
+    ),
+    (
+        'paths = ["{examples}/helix.toml"]\n[[gains]]\nname = "a"\nk_vf = [1, 1]',
+        r"\[gains 1\] k_vf must be three numbers",
+    ),
+    (
+        PATHS + '[[gains]]\nname = "a"\nmachine = "{examples}/machines/mill.toml"',
+        r"\[gains 1\] machine names .*mill.toml with 3 path axes, the machines of the paths have 2",
+    ),
+    (
+        'paths = ["{examples}/index.toml"]',
+        r"turns axes alone: a campaign takes paths of x, y and z",
+    ),
     (PATHS + "[[gains]]\nk_vf = 1", r"\[gains 1\] name is missing"),
     (
         PATHS + '[[gains]]\nname = "a"\n[[gains]]\nname = "a"',

@@ -9,9 +9,10 @@ import pytest
 from hodograph.campaign.variation import Variation, unit
 
 SAMPLES = 4000
+NAMES = ("x", "y", "z")
 
 
-def draws(variation: Variation, axis: int = 0, seed: int = 0) -> np.ndarray:
+def draws(variation: Variation, axis: str = "x", seed: int = 0) -> np.ndarray:
     return np.array([variation.number(axis, seed, k, 0) for k in range(SAMPLES)])
 
 
@@ -34,15 +35,16 @@ def test_uniform_and_normal() -> None:
 
 def test_axes_seeds_and_figures_are_independent() -> None:
     each = Variation("gain_rad_s_v", "uniform", (0.0, 1.0), "each")
-    both = Variation("gain_rad_s_v", "uniform", (0.0, 1.0), "both")
+    both = Variation("gain_rad_s_v", "uniform", (0.0, 1.0), "all")
     other = Variation("k_vf", "uniform", (0.0, 1.0), "each")
     x = draws(each)
-    for unlike in (draws(each, axis=1), draws(each, seed=1), draws(other), draws(both)):
+    for unlike in (draws(each, axis="y"), draws(each, seed=1), draws(other), draws(both)):
         assert abs(np.corrcoef(x, unlike)[0, 1]) < 5 / np.sqrt(SAMPLES)
-    assert np.array_equal(draws(both), draws(both, axis=1))
+    assert np.array_equal(draws(both), draws(both, axis="y"))
 
 
 def test_axes_that_vary() -> None:
-    assert Variation("k_vf", "values", (1.0,), "x").axes == (0,)
-    assert Variation("k_vf", "values", (1.0,), "y").axes == (1,)
-    assert Variation("k_vf", "values", (1.0,), "both").axes == (0, 1)
+    assert Variation("k_vf", "values", (1.0,), "x").axes(NAMES) == ("x",)
+    assert Variation("k_vf", "values", (1.0,), "y").axes(NAMES) == ("y",)
+    assert Variation("k_vf", "values", (1.0,), "each").axes(NAMES) == NAMES
+    assert Variation("k_vf", "values", (1.0,), "all").axes(NAMES) == NAMES

@@ -133,6 +133,35 @@ MACHINE: Document = {
 }
 CHANNELS = ("outputs", "channel")
 
+FEED: Document = {
+    "profile": "exponential",
+    "nominal_mm_s": 50,
+    "ramp_time_s": 0.1,
+    "n_c": 4,
+    "degree": 5,
+}
+LIMITS: Document = {
+    "feed_mm_s": 100,
+    "acceleration_mm_s2": 1000,
+    "jerk_mm_s3": 10_000,
+    "centripetal_mm_s2": 500,
+    "volts": 5,
+    "policy": "report",
+    "reserve": 0.1,
+    "axis": {
+        "velocity_mm_s": 90,
+        "acceleration_mm_s2": [900, 800],
+        "jerk_mm_s3": 9000,
+    },
+    "cap": [ZONE],
+}
+TURN_FEED: Document = {"profile": "exponential", "nominal_deg_s": 50, "ramp_time_s": 0.1}
+TURN_LIMITS: Document = {
+    "feed_deg_s": 100,
+    "acceleration_deg_s2": 1000,
+    "jerk_deg_s3": 10_000,
+}
+TURN: Document = {"closed": False, "through": [[1, 2, 3, 0, 0], [1, 2, 3, 30, 40]]}
 COMPLETE: dict[str, list[Document]] = {
     "path": [
         {
@@ -143,6 +172,8 @@ COMPLETE: dict[str, list[Document]] = {
                     "knots": "uniform",
                     "start_tangent": [1, 1],
                     "end_tangent": [1, -1],
+                    "feed": FEED,
+                    "limits": LIMITS,
                 },
                 {
                     "closed": True,
@@ -167,35 +198,26 @@ COMPLETE: dict[str, list[Document]] = {
                 "start_tangent": [1, 0],
                 "end_tangent": [0, 1],
             },
-            "feed": {
-                "profile": "exponential",
-                "nominal_mm_s": 50,
-                "ramp_time_s": 0.1,
-                "n_c": 4,
-                "degree": 5,
-            },
-            "limits": {
-                "feed_mm_s": 100,
-                "acceleration_mm_s2": 1000,
-                "jerk_mm_s3": 10_000,
-                "centripetal_mm_s2": 500,
-                "volts": 5,
-                "policy": "report",
-                "reserve": 0.1,
-                "axis": {
-                    "velocity_mm_s": 90,
-                    "acceleration_mm_s2": [900, 800],
-                    "jerk_mm_s3": 9000,
-                },
-                "cap": [ZONE],
-            },
+            "feed": FEED,
+            "limits": LIMITS,
             "machine": {"file": str(EXAMPLES / "machines/paper_alpha.toml")},
             "output": SWITCHED,
         },
         {
-            "path": {"closed": False, "through": [[1, 2, 3, 0, 0], [1, 2, 3, 30, 40]]},
-            "feed": {"profile": "exponential", "nominal_deg_s": 50, "ramp_time_s": 0.1},
-            "limits": {"feed_deg_s": 100, "acceleration_deg_s2": 1000, "jerk_deg_s3": 10_000},
+            "path": TURN,
+            "feed": TURN_FEED,
+            "limits": TURN_LIMITS,
+        },
+        {
+            "path": [
+                {
+                    "closed": False,
+                    "through": [[0, 2, 3, 0, 0], [1, 2, 3, 0, 0]],
+                    "feed": FEED,
+                    "limits": LIMITS | {"axis": {"acceleration_mm_s2": 900}},
+                },
+                TURN | {"feed": TURN_FEED, "limits": TURN_LIMITS},
+            ],
         },
         {
             "path": {"closed": True, "control_points": [[0, 0], [9, 0], [9, 9], [0, 9]]},
@@ -289,7 +311,7 @@ COMPLETE: dict[str, list[Document]] = {
             ],
             "vary": {
                 "gain_rad_s_v": {"factor_uniform": [0.9, 1.1], "axis": "each"},
-                "friction_volts": {"values": [0, 0.2], "axis": "both"},
+                "friction_volts": {"values": [0, 0.2], "axis": "all"},
             },
         }
     ],
@@ -532,7 +554,9 @@ def changes(kind: str) -> Iterator[Change]:
 
 
 BEYOND_SCHEMAS = (
-    "does not apply to a path that",
+    r"does not apply to (a path that|path \d+, which)",
+    r"give all of one kind",
+    r"vary\.\w+\] axis cannot be",
     r"u32 in counts",
     r"which is not there",
     r"must be (above|below) \w+ = ",

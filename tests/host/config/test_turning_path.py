@@ -111,13 +111,61 @@ def test_other_mistakes_have_one_line(tmp_path: Path) -> None:
     beyond = path_file(tmp_path, "[[1, 2, 3, 0, 0], [1, 2, 3, 130, 0]]")
     with pytest.raises(PlanError, match="travel"):
         _ = load_pipeline(beyond, allow_space=True).image
-    listed = tmp_path / "list.toml"
-    listed.write_text(
-        f"[feed]\nprofile = 'optimal'\n[[path]]\nclosed = false\nthrough = {MOVE}\n"
-        f"[[path]]\nclosed = false\nthrough = {TURN}\n[machine]\nfile = '{FIVE}'\n"
+
+
+def listed(folder: Path, own: str = "", *, feed: str = "nominal_mm_s = 20") -> Path:
+    """A list of a move and a turn, which has these tables of its own."""
+    file = folder / "list.toml"
+    file.write_text(
+        f"[feed]\nprofile = 'optimal'\n{feed}\n[[path]]\nclosed = false\nthrough = {MOVE}\n"
+        f"[[path]]\nclosed = false\nthrough = {TURN}\n{own}\n[machine]\nfile = '{FIVE}'\n"
     )
-    with pytest.raises(InputError, match=r"number 2 turns axes alone.* a file of its own"):
-        load_paths(listed)
+    return file
+
+
+def test_a_path_of_a_list_has_feed_and_limits_of_its_own(tmp_path: Path) -> None:
+    own = "[path.feed]\nprofile = 'optimal'\nnominal_deg_s = 7\n[path.limits]\nfeed_deg_s = 6\nreserve = 0.25"
+    move, turn = load_paths(listed(tmp_path, own))
+    assert move.file.feed is not None
+    assert turn.file.feed is not None
+    assert (move.file.feed.nominal_mm_s, turn.file.feed.nominal_mm_s) == (20.0, 7.0)
+    assert (move.file.limits.feed_mm_s, turn.file.limits.feed_mm_s) == (None, 6.0)
+    assert (move.file.turns_alone, turn.file.turns_alone) == (False, True)
+    assert turn.file.limits.reserve == 0.25
+    both = load_paths(listed(tmp_path, feed=""))
+    assert both[0].file.feed == both[1].file.feed, "without a unit, [feed] is for all"
+
+
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        (
+            "",
+            r"\[feed\] nominal_mm_s .* path 2, which turns axes alone: give nominal_deg_s in \[path.feed\]",
+        ),
+        (
+            "[path.feed]\nprofile = 'optimal'\nnominal_mm_s = 3",
+            r"\[path 2.feed\] nominal_mm_s .* nominal_deg_s$",
+        ),
+        (
+            "[path.feed]\nprofile = 'optimal'\n[path.limits]\ncentripetal_mm_s2 = 3",
+            r"\[path 2.limits\] centripetal_mm_s2 .* remove it$",
+        ),
+        ("[path.feed]\nspeed = 3", r"\[path 2.feed\] speed: unknown key"),
+    ],
+)
+def test_tables_of_a_path_that_are_wrong(tmp_path: Path, own: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        load_paths(listed(tmp_path, own))
+
+
+def test_limits_of_the_file_that_a_turning_path_cannot_have(tmp_path: Path) -> None:
+    file = listed(tmp_path, feed="")
+    file.write_text(file.read_text() + "[limits]\ncentripetal_mm_s2 = 3\n")
+    with pytest.raises(
+        InputError, match=r"path 2, .*: give other limits in \[path.limits\] behind"
+    ):
+        load_paths(file)
 
 
 def test_points_at_rest_are_the_same_exactly(tmp_path: Path) -> None:
