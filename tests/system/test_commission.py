@@ -282,7 +282,7 @@ def test_the_file_for_them_can_be_read(
     file = tmp_path / "machine.toml"
     assert main(["scan", "-o", str(file)]) == 0
     text = file.read_text(encoding="utf-8")
-    assert "# Node 2: ACME Servo 400, rev. C, 2.17" in text
+    assert "# Node 2: ACME Servo 400, hardware rev. C, software 2.17" in text
     assert "Hodograph cannot use this drive" in text
     machine = load_machine(file)
     assert machine.nodes == (2, 9)

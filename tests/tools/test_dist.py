@@ -42,6 +42,12 @@ def python(environment: dict[str, str], folder: Path, *words: str) -> str:
     return done.stdout
 
 
+@pytest.fixture(autouse=True)
+def bytecode(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python writes bytecode beside the sources that a build imports, as on the computer of a user."""
+    monkeypatch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
+
+
 def test_the_wheel_alone_runs_the_demo(tmp_path: Path) -> None:
     """Built once for all that is to be seen in it: a build takes long."""
     source, wheel = make_release(tmp_path / "dist", None)
@@ -112,6 +118,7 @@ def check_source(source: Path) -> None:
     assert len({m.mtime for m in members}) == 1
     names = {m.name.partition("/")[2] for m in members}
     assert {"firmware/core/program.c", "sim/hub/main.c", "LICENSE", "CHANGELOG.md"} <= names
+    assert not [name for name in names if name.endswith(".pyc")]
 
 
 @pytest.fixture

@@ -129,11 +129,11 @@ def _write(options: Namespace, address: BusAddress, drives: list[DriveProperties
 
 
 def _lines(properties: DriveProperties) -> Iterator[str]:
-    names = [text for text in (properties.name, properties.hardware, properties.software) if text]
     kind = (
         "drive" if properties.is_drive else f"no drive (device type 0x{properties.device_type:08X})"
     )
-    yield f"node {properties.node}: {kind}{', ' if names else ''}{', '.join(names)}"
+    described = properties.described
+    yield f"node {properties.node}: {kind}{', ' if described else ''}{described}"
     numbers = (properties.vendor, properties.product, properties.revision, properties.serial)
     identity = ["-" if number is None else f"0x{number:08X}" for number in numbers]
     yield "  vendor {}, product {}, revision {}, serial {}".format(*identity)
@@ -142,14 +142,14 @@ def _lines(properties: DriveProperties) -> Iterator[str]:
     modes = [MODES.get(mode, str(mode)) for mode in properties.modes]
     yield f"  modes: {', '.join(modes) or 'not reported'}"
     for text, value in (
-        ("encoder increments a turn", properties.encoder_increments),
-        ("gear", properties.gear_ratio),
-        ("counts a turn of the shaft", properties.feed_counts),
-        ("position counts", properties.position_counts),
-        ("least position counts", properties.limit_min_counts),
-        ("greatest position counts", properties.limit_max_counts),
-        ("following error window counts", properties.window_counts),
-        ("quick stop counts/s^2", properties.quick_stop_counts_s2),
+        ("encoder increments in one turn of the motor", properties.encoder_increments),
+        ("motor turns for one shaft turn", properties.gear_ratio),
+        ("counts in one turn of the shaft", properties.feed_counts),
+        ("position, counts", properties.position_counts),
+        ("least position, counts", properties.limit_min_counts),
+        ("greatest position, counts", properties.limit_max_counts),
+        ("following error window, counts", properties.window_counts),
+        ("quick stop deceleration, counts/s^2", properties.quick_stop_counts_s2),
     ):
         if value is not None:
             yield f"  {text}: {value:.15g}"

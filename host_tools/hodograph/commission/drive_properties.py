@@ -69,6 +69,16 @@ class DriveProperties:
         """Whether it names the profile of drives."""
         return self.device_type & 0xFFFF == PROFILE
 
+    @property
+    def described(self) -> str:
+        """Its name and the versions of its hardware and software; empty if it reports none of them."""
+        texts = (
+            self.name,
+            f"hardware {self.hardware}" if self.hardware else None,
+            f"software {self.software}" if self.software else None,
+        )
+        return ", ".join(text for text in texts if text)
+
     def json(self) -> dict[str, Any]:
         """By name, ready for JSON."""
         return asdict(self) | {"modes": list(self.modes), "is_drive": self.is_drive}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine file for the drives that were found, with comments: what they said, and what remains to be set."""
+"""A machine file for the drives that were found, with comments: what they report, and what remains to be set."""
 
 from __future__ import annotations
 
@@ -36,19 +36,18 @@ def machine_text(drives: Sequence[DriveProperties], bitrate: int, where: str) ->
 
 
 def _axis(drive: DriveProperties, name: str) -> str:
-    return "\n".join([*_said(drive), "[[axis]]", *_keys(drive, name), "", *_identity(drive), ""])
+    return "\n".join([*_reported(drive), "[[axis]]", *_keys(drive, name), "", *_identity(drive), ""])
 
 
-def _said(drive: DriveProperties) -> Iterator[str]:
-    names = [text for text in (drive.name, drive.hardware, drive.software) if text]
-    yield f"# Node {drive.node}: {', '.join(names) or 'no name'}"
+def _reported(drive: DriveProperties) -> Iterator[str]:
+    yield f"# Node {drive.node}: {drive.described or 'no name'}"
     if CSP not in drive.modes:
         yield "# has no mode cyclic synchronous position: Hodograph cannot use this drive"
     yield f"# modes {', '.join(map(str, drive.modes)) or 'not reported'} of CiA 402"
     for text, value in (
-        ("encoder increments for a turn of the motor (0x608F)", drive.encoder_increments),
-        ("turns of the motor for one of the shaft (0x6091)", drive.gear_ratio),
-        ("counts for a turn of the shaft (0x6092)", drive.feed_counts),
+        ("encoder increments in one turn of the motor (0x608F)", drive.encoder_increments),
+        ("motor turns for one shaft turn (0x6091)", drive.gear_ratio),
+        ("counts in one turn of the shaft (0x6092)", drive.feed_counts),
         ("greatest profile velocity (0x607F), counts/s", drive.velocity_counts_s),
         ("greatest acceleration (0x60C5), counts/s^2", drive.acceleration_counts_s2),
         ("quick stop deceleration (0x6085), counts/s^2", drive.quick_stop_counts_s2),
@@ -63,10 +62,9 @@ def _keys(drive: DriveProperties, name: str) -> Iterator[str]:
     yield f"node = {drive.node}"
     yield f"counts_per_mm = {COUNTS_PER_MM}         # SET, the same for all axes{_screw(drive)}"
     low, high = _travel(drive)
-    reported = (
-        "the drive's software limits" if _has_limits(drive) else "the drive reports no limits"
-    )
-    yield f"travel_mm = [{low:.10g}, {high:.10g}]          # SET; {reported}"
+    origin = "the drive's software limits" if _has_limits(drive) else "the drive reports no limits"
+    travel = f"travel_mm = [{low:.10g}, {high:.10g}]"
+    yield f"{travel:31} # SET; {origin}"
     yield f"velocity_mm_s = {_FEED}              # SET; low to begin with"
     yield f"acceleration_mm_s2 = {_ACCELERATION}        # SET"
     yield f"jerk_mm_s3 = {_JERK}               # SET"
@@ -76,8 +74,8 @@ def _keys(drive: DriveProperties, name: str) -> Iterator[str]:
 
 def _screw(drive: DriveProperties) -> str:
     if drive.feed_counts is None:
-        return ": counts for a turn of the shaft over its way in mm"
-    return f": {drive.feed_counts:.15g} over the way in mm of a turn"
+        return ": counts in one turn of the shaft, divided by the lead of the screw in mm"
+    return f": {drive.feed_counts:.15g} divided by the lead of the screw in mm"
 
 
 def _has_limits(drive: DriveProperties) -> bool:

@@ -206,7 +206,7 @@ def test_files_say_what_is_missing() -> None:
     text = machine_text([replace(SERVO, modes=(1,))], 1_000_000, "a bus")
     assert "cannot use this drive" in text
     assert "method" not in text
-    assert "10000 over the way in mm of a turn" in text
+    assert "10000 divided by the lead of the screw in mm" in text
     assert tomllib.loads(text)
 
 
