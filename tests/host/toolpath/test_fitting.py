@@ -243,6 +243,38 @@ def test_noise_of_a_micrometre_hardly_changes_the_time(name: str, feed_mm_s: flo
         assert noisy == pytest.approx(plain, rel=share), seed
 
 
+@pytest.mark.parametrize(("chord_mm", "noise_mm"), [(0.005, 0.003), (0.01, 0.003), (0.002, 0.002)])
+def test_noise_larger_than_the_chords_hardly_changes_the_time(
+    chord_mm: float, noise_mm: float
+) -> None:
+    turn = np.linspace(0.0, np.pi, round(3.0 * np.pi / chord_mm) + 1)
+    points = 3.0 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
+    noise = np.random.default_rng(4).uniform(-noise_mm, noise_mm, size=points.shape)
+    found = fitted(points + noise)
+    assert sampled_distance(found) <= found.deviation_mm <= TOLERANCE_MM
+    assert least_time_s(found) == pytest.approx(least_time_s(fitted(points)), rel=0.05)
+
+
+def test_hooks_within_the_tolerance_take_no_time() -> None:
+    """The path goes back by 3 um every half a mm."""
+    places = np.arange(0.5, 10.0, 0.5)
+    way = np.append(np.stack((places, places - 0.003), axis=1).ravel(), 10.0)
+    found = fitted(np.stack((np.append(0.0, way), np.zeros(way.size + 1)), axis=1))
+    assert found.curve.segment_count == 1
+    assert 0.0015 <= found.deviation_mm <= TOLERANCE_MM
+
+
+def test_a_dense_zigzag_beside_a_straight_line_is_passed_like_one() -> None:
+    """Its chords are longer than the leg that replaces them: places of both do not count alike."""
+    steps = np.arange(1200)
+    first = np.stack((0.001 * steps, 0.001 * (steps % 2)), axis=1)
+    last = first[-1] + [[0.0, 2.0], [3.0, 2.0]]
+    points = np.vstack((first, last))
+    found = fitted(points)
+    assert found.curve.segment_count < 20
+    assert sampled_distance(found) <= found.deviation_mm <= TOLERANCE_MM
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("name", ["3D_Chips.ngc", "spiral.ngc"])

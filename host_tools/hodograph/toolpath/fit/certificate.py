@@ -22,8 +22,9 @@ Index = NDArray[np.intp]
 _CHORD_SHARE = 0.005
 _MOST_PIECES = 4096
 _HALVINGS = 16
-_BESIDE = (2, 6)
-"""Neighbours that are looked at on either side, at first and after a halving."""
+_BESIDE = (2, 6, 6, 24, 96)
+"""Neighbours that are looked at on either side, at first and after each halving: places of noisy chords belong to each
+other roughly only."""
 
 _SURE = 4
 """Halvings after which the chords around a chord surely are those nearest to it."""
@@ -127,7 +128,7 @@ def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
     owner = np.arange(found.size)
     start, end, low, high = of.start, of.end, of.place_mm[:-1], of.place_mm[1:]
     for halving in range(_HALVINGS + 1):
-        beside = _BESIDE[min(halving, 1)]
+        beside = _BESIDE[min(halving, len(_BESIDE) - 1)]
         bound, least = _nearest(start, end, 0.5 * (low + high), to, beside)
         bound, least = bound + of.error_mm[owner], least + of.error_mm[owner]
         # Where an end itself is too far from all chords around, halving proves nothing more.

@@ -76,11 +76,18 @@ def with_lines(given: Segments, first: Real, last: Real, length_mm: float) -> Se
 
 
 def corner_segments(
-    vertex: Real, before: Real, after: Real, place: Real, shape: int, size_mm: Real
+    vertex: Real,
+    before: Real,
+    after: Real,
+    place: Real,
+    rate: tuple[Real, Real],
+    shape: int,
+    size_mm: Real,
 ) -> Segments:
     """Corner curves of tolerance `size_mm` (n,) at vertices (n, 3) between legs with unit vectors (n, 3).
 
-    `place` (n,) of the vertices; places along the legs are taken to count in mm.
+    place  (n,) of the vertices
+    rate   (n,) each: how much the place changes with a mm of the leg before and of the leg after
     """
     across = after - np.sum(before * after, axis=1)[:, None] * before
     sine = np.linalg.norm(across, axis=1)
@@ -103,7 +110,8 @@ def corner_segments(
     count = SHAPES[shape].segments
     at = np.abs(joint) / np.abs(joint[:, :1]) * reach
     at[:, count // 2] = 0.0
-    at[:, : count // 2] *= -1.0
+    at[:, : count // 2] *= -rate[0][:, None]
+    at[:, count // 2 + 1 :] *= rate[1][:, None]
     places = place[:, None] + at
     return Segments(
         points[:, :-1].reshape(-1, 3),

@@ -255,11 +255,13 @@ class _Plan:
         own = self.shape == shape
         at = self.corner[own]
         direction, path = self.path.direction, self.path
+        rate = np.diff(path.place_mm) / path.leg_mm
         return corner_segments(
             path.point[at],
             direction[at - 1],
             direction[at],
             path.place_mm[at],
+            (rate[at - 1], rate[at]),
             shape,
             self.size[own],
         )

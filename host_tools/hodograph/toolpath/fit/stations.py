@@ -24,6 +24,9 @@ _THIN_SHARE = 0.06
 _LINE_SHARE = 0.25
 """The same for points on a leg that is left alone: noise on a straight line does not keep corners from their room."""
 
+_ROUGH_SHARE, _ROUGH_LEG = 0.7, 8.0
+"""The same for points of noise, which have a leg of at most so many tolerances."""
+
 _NEAREST = 11.0
 """In tolerances: how near vertices of smoothed stretches may be that are not needed to keep `_LINE_SHARE`."""
 
@@ -106,6 +109,9 @@ def outline(
     every = np.arange(reference.count + 1)
     fine = _thinned(reference, every, _THIN_SHARE * tolerance_mm, tied)
     coarse = _thinned(reference, fine, _LINE_SHARE * tolerance_mm, tied)
+    coarse = _thinned(
+        reference, coarse, _ROUGH_SHARE * tolerance_mm, tied, _ROUGH_LEG * tolerance_mm
+    )
     room = _reach(reference.point[coarse], tolerance_mm)
     long = _is_long(reference.point[coarse], room)
     kept = _between(reference, fine, coarse, long, _NEAREST * tolerance_mm)
@@ -149,12 +155,23 @@ def _is_long(point: Real, reach: Real) -> Flags:
     return np.asarray(leg >= _LONG * (reach[1:] + reach[:-1]))
 
 
-def _thinned(reference: Reference, kept: Index, off_mm: float, tied: tuple[bool, bool]) -> Index:
-    """Those of the kept points (n,) without which no point of the reference is farther than this from its leg."""
+def _thinned(
+    reference: Reference,
+    kept: Index,
+    off_mm: float,
+    tied: tuple[bool, bool],
+    rough_mm: float | None = None,
+) -> Index:
+    """Those of the kept points (n,) without which no point of the reference is farther than this from its leg.
+
+    rough_mm  leave out only points of noise, with a leg of at most this length
+    """
     for _ in range(_THIN_ROUNDS):
         point = reference.point[kept]
         drop = np.zeros(kept.size, dtype=np.bool_)
         drop[1:-1] = distance_to_chord(point[1:-1], point[:-2], point[2:]) <= off_mm
+        if rough_mm is not None:
+            drop[1:-1] &= _is_rough(point, rough_mm)
         drop[1] &= not tied[0]
         drop[-2] &= not tied[1]
         # No two neighbours in one round: of each run every second one.
@@ -167,6 +184,19 @@ def _thinned(reference: Reference, kept: Index, off_mm: float, tied: tuple[bool,
             break
         kept = kept[~drop]
     return kept
+
+
+def _is_rough(point: Real, longest_mm: float) -> Flags:
+    """Inner points (n - 2,) of a chain (n, 3) with a leg of at most this length where the chain turns back, or turns to
+    another side than at a neighbour: noise, not a curve.
+    """
+    leg = np.diff(point, axis=0)
+    length = np.linalg.norm(leg, axis=1)
+    side = np.cross(leg[:-1], leg[1:])
+    other = np.sum(side[:-1] * side[1:], axis=1) < 0.0
+    wavers = np.append(False, other) | np.append(other, False)
+    near = np.minimum(length[:-1], length[1:]) <= longest_mm
+    return np.asarray(near & (wavers | (turns(point)[1:-1] > SHARPEST_RAD)))
 
 
 def _off(reference: Reference, kept: Index) -> Real:
