@@ -105,7 +105,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "names": {"errors"},
     "events": set(),
     "data": set(),
-    "spline": {"errors"},
+    "spline": {"errors", "native"},
     "feed": {"errors", "names", "spline", "native"},
     "config": {"errors", "names", "events", "feed", "spline"},
     "toolpath": {"errors", "names", "spline", "native"},
