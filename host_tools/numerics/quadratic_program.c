@@ -24,7 +24,8 @@
 
 enum { WIDTH = 4, BAND = 3, LOWER = 10, MOST_ITERATIONS = 100, MOST_STALLED = 6 };
 static const double NEAR = 1e-3;
-static const double LEAST_TARGET = 0.01; /* of the gap, in tolerances: far below it, only rounding is left */
+static const double LEAST_TARGET =
+    0.01; /* of the gap, in tolerances: far below it, only rounding is left */
 static const double STEP_SHARE = 0.995;  /* of the way to the nearest boundary */
 static const double LEAST_PIVOT = 1e-15; /* as a share of the diagonal */
 static const double FARTHEST = 1e8;      /* unknowns add up to less */

@@ -27,6 +27,7 @@ HEADERS = (
     "core/chunk.h",
     "core/path_outputs.h",
     "core/feed_override.h",
+    "numerics/ph_chain.h",
     "numerics/quadratic_program.h",
     "plant/drive.h",
     "offline/contour.h",

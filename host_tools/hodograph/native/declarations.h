@@ -321,6 +321,16 @@ size_t quadratic_work(uint32_t intervals, uint32_t rows);
 int quadratic_solve(const struct quadratic_program *program, double *unknown, double *work,
                     struct quadratic_report *report);
 
+/* numerics/ph_chain.h */
+struct ph_chain {
+    uint32_t segments, planar, extra;
+    const double *start, *arc, *speed, *preimage, *extra_axes;
+};
+void ph_locate(const struct ph_chain *chain, uint32_t count, const double *arc_mm, double tolerance,
+               int64_t *segment, double *xi);
+void ph_frames(const struct ph_chain *chain, uint32_t count, const int64_t *segment,
+               const double *xi, double *r1, double *r2, double *r3, double *curvature);
+
 /* offline/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;

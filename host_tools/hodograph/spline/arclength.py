@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Arc length of a chain of PH segments, and its inverse by safeguarded Newton; docs/theory/numerics.md 4.1, 4.3."""
+"""Arc length of a chain of PH segments, and its inverse; docs/theory/numerics.md 4.1, 4.3."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -12,13 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from ..native.ph_chain import PhChain
 from .bernstein import Real, basis
 
 Index = NDArray[np.intp]
-SpeedAt = Callable[[Index, Real], Real]
-
-_MOST_STEPS = 200
-
 
 EXACT = 2.0**-52
 
@@ -38,6 +34,11 @@ class ArcLengthChain(ABC):
     @abstractmethod
     def speed(self, segment: ArrayLike, xi: ArrayLike) -> Real:
         """sigma, mm per unit of xi."""
+
+    @property
+    @abstractmethod
+    def chain(self) -> PhChain:
+        """Its coefficients, as the native module takes them."""
 
     @cached_property
     def _arc_coefficients(self) -> Real:
@@ -73,12 +74,8 @@ class ArcLengthChain(ABC):
         if not np.all((s >= -slack) & (s <= length + slack)):
             worst = s[~((s >= -slack) & (s <= length + slack))].flat[0]
             raise InputError(f"arc length {worst:g} mm is outside the path, 0 … {length:g} mm")
-        s = np.clip(s, 0.0, length)
-        starts = self.segment_starts_mm
-        segment = np.searchsorted(starts[1:-1], s, side="right")
-        own = (s - starts[segment]).ravel()
-        xi = invert(self._arc_coefficients, self.speed, segment.ravel(), own, tolerance)
-        return segment, xi.reshape(s.shape)
+        segment, xi = self.chain.locate(np.clip(s, 0.0, length).ravel(), tolerance)
+        return segment.reshape(s.shape), xi.reshape(s.shape)
 
 
 def evaluate(coefficients: Any, segment: ArrayLike, xi: ArrayLike) -> Any:
@@ -89,36 +86,3 @@ def evaluate(coefficients: Any, segment: ArrayLike, xi: ArrayLike) -> Any:
     if coefficients.ndim == 3:
         values = values[..., None, :]
     return np.asarray(np.sum(coefficients[i] * values, axis=-1))
-
-
-def invert(
-    arc: Real, speed_at: SpeedAt, segment: Index, s_mm: Real, tolerance: float = EXACT
-) -> Real:
-    """xi (n,) in [0, 1] with arc length `s_mm` (n,) from the start of `segment` (n,).
-
-    `arc` (N, 6) are the Bernstein coefficients of the arc length of each segment, `speed_at` is its derivative. The
-    error in arc length is about 1e-15 of the segment's length, or `tolerance`. The bracket shrinks every step, so this
-    ends also where the speed all but vanishes.
-    """
-    length = arc[segment, 5]
-    xi = np.clip(s_mm / length, 0.0, 1.0)
-    active = np.flatnonzero((xi > 0.0) & (xi < 1.0))
-    low, high = np.zeros(xi.size), np.ones(xi.size)
-    for _ in range(_MOST_STEPS):
-        if active.size == 0:
-            break
-        i, x = segment[active], xi[active]
-        excess = np.sum(arc[i] * basis(5, x), axis=-1) - s_mm[active]
-        high[active] = np.where(excess > 0.0, x, high[active])
-        low[active] = np.where(excess < 0.0, x, low[active])
-        speed = speed_at(i, x)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            step = excess / speed
-        lo, hi = low[active], high[active]
-        newton = x - step
-        inside = (newton > lo) & (newton < hi)
-        moved = np.where(inside, newton, (lo + hi) / 2.0)
-        done = np.abs(excess) <= tolerance * length[active]
-        xi[active] = np.where(done, x, moved)
-        active = active[~done & (np.abs(moved - x) > 2.0**-53)]
-    return np.asarray(xi)

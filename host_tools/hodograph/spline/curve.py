@@ -9,10 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..native.ph_chain import PhChain
 from .arclength import ArcLengthChain, Index, evaluate
 from .bernstein import Complex, Real, basis, square, square_modulus
 from .extremum import greatest_curvature
-from .frames import Frames
+from .frames import Frames, frames_of
 from .splitting import split_segments
 
 
@@ -97,22 +98,14 @@ class PHSpline(ArcLengthChain):
 
     def frames_at(self, segment: Index, xi: Real) -> Frames:
         """Derivatives by arc length of segments `segment` at `xi`."""
-        w0, w1, w2 = np.moveaxis(self.w[segment], -1, 0)
-        w = w0 * (1.0 - xi) ** 2 + 2.0 * w1 * xi * (1.0 - xi) + w2 * xi * xi
-        first = 2.0 * ((w1 - w0) * (1.0 - xi) + (w2 - w1) * xi)
-        second = 2.0 * (w2 - 2.0 * w1 + w0)
-        sigma = w.real * w.real + w.imag * w.imag
-        turn = (np.conj(w) * first).imag
-        growth = 2.0 * (np.conj(w) * first).real
-        curvature = 2.0 * turn / sigma**2
-        slope = (
-            2.0 * (np.conj(w) * second).imag / sigma**2 - 4.0 * turn * growth / sigma**3
-        ) / sigma
-        tangent = w * w / sigma
-        normal = 1j * tangent
-        vectors = tangent, curvature * normal, slope * normal - curvature**2 * tangent
-        r1, r2, r3 = (np.stack((vector.real, vector.imag)) for vector in vectors)
-        return Frames(r1, r2, r3, curvature)
+        return frames_of(self.chain, segment, xi)
+
+    @property
+    def chain(self) -> PhChain:
+        """Its coefficients, as the native module takes them."""
+        return PhChain(
+            self.segment_starts_mm, self._arc_coefficients, self.speed_coefficients, self.w
+        )
 
     def _w(self, segment: ArrayLike, xi: ArrayLike) -> Complex:
         return np.asarray(evaluate(self.w, segment, xi))

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..native.ph_chain import PhChain
 from .arclength import Index
 from .bernstein import Real
 
@@ -61,6 +62,13 @@ class Curve(Protocol):
 
     def frames_at(self, segment: Index, xi: Real) -> Frames:
         """The frames of segments at xi, both of any one shape."""
+
+
+def frames_of(chain: PhChain, segment: Index, xi: Real) -> Frames:
+    """The frames of segments of a chain at xi, both of any one shape."""
+    *vectors, curvature = chain.frames(np.ravel(segment), np.ravel(xi))
+    r1, r2, r3 = (one.reshape(-1, *np.shape(xi)) for one in vectors)
+    return Frames(r1, r2, r3, curvature.reshape(np.shape(xi)))
 
 
 def frames(curve: Curve, s_mm: Real, side: NDArray[np.int8] | None = None) -> Frames:

@@ -36,26 +36,3 @@ def _behind(extra: Real, xi: Real) -> Real:
 def _before(extra: Real, xi: Real) -> Real:
     """Quintics (…, 6) on [0, xi]; xi (…,)."""
     return _behind(extra[..., ::-1], 1.0 - xi)[..., ::-1]
-
-
-def extra_frames(extra: Real, xi: Real, speed: tuple[Real, Real, Real]) -> tuple[Real, Real, Real]:
-    """First three derivatives (E, …) by arc length of quintics (…, E, 6) at xi (…,).
-
-    speed  sigma, its first and its second derivative there
-    """
-    sigma, growth, bend = speed
-    rows, orders = np.moveaxis(extra, -1, 0), []
-    for degree in (5, 4, 3):
-        rows = degree * np.diff(rows, axis=0)
-        orders.append(np.moveaxis(_casteljau(rows, xi[..., None]), -1, 0))
-    e1 = orders[0] / sigma
-    e2 = (orders[1] - growth * e1) / sigma**2
-    e3 = (orders[2] - bend * e1) / sigma**3 - (3.0 * growth / sigma**2) * e2
-    return e1, e2, e3
-
-
-def _casteljau(rows: Real, xi: Real) -> Real:
-    """Bernstein coefficients (k, …) at xi."""
-    while len(rows) > 1:
-        rows = rows[:-1] * (1.0 - xi) + rows[1:] * xi
-    return np.asarray(rows[0])

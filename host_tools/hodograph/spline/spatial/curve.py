@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...native.ph_chain import PhChain
 from ..arclength import ArcLengthChain, Index, evaluate
 from ..bernstein import Real
 from ..curve import PHSpline
 from ..extremum import greatest_curvature
-from ..frames import Frames
-from ..quintics import extra_frames
+from ..frames import Frames, frames_of
 from ..splitting import Image, split_segments
-from .quaternion import polar, polar_of
+from .quaternion import polar
 
 _GREATEST_COMPONENT = 8.0 - 2.0**-40
 """Of A in a program: it has 48 bits for one, 44 of them after the point (docs/reference/protocol.md 1.2)."""
@@ -131,23 +131,18 @@ class SpatialPHSpline(ArcLengthChain):
 
     def frames_at(self, segment: Index, xi: Real) -> Frames:
         """Derivatives by arc length of segments `segment` at `xi`; the curvature is a magnitude."""
-        a0, a1, a2 = np.moveaxis(self.preimage[segment], (-1, -2), (0, 1))
-        rest = 1.0 - xi
-        a = a0 * (rest * rest) + (2.0 * xi * rest) * a1 + (xi * xi) * a2
-        first = 2.0 * ((a1 - a0) * rest + (a2 - a1) * xi)
-        second = 2.0 * (a2 - 2.0 * a1 + a0)
-        sigma, growth = _inner(a, a), 2.0 * _inner(a, first)
-        bend = 2.0 * (_inner(first, first) + _inner(a, second))
-        r1 = _image(a, a) / sigma
-        # sigma r_ss and sigma^2 r_sss follow from r' = sigma r_s by differentiation.
-        r2 = (2.0 * _image(a, first) - growth * r1) / sigma**2
-        r3 = 2.0 * (_image(first, first) + _image(a, second)) - bend * r1
-        r3 = r3 / sigma**3 - (3.0 * growth / sigma**2) * r2
-        curvature = np.sqrt(_inner(r2, r2))
-        if self.extra_axes:
-            own = extra_frames(self.extra[segment], xi, (sigma, growth, bend))
-            r1, r2, r3 = (np.concatenate(pair) for pair in zip((r1, r2, r3), own, strict=True))
-        return Frames(r1, r2, r3, curvature)
+        return frames_of(self.chain, segment, xi)
+
+    @property
+    def chain(self) -> PhChain:
+        """Its coefficients, as the native module takes them."""
+        return PhChain(
+            self.segment_starts_mm,
+            self._arc_coefficients,
+            self.speed_coefficients,
+            self.preimage,
+            self.extra,
+        )
 
     def _is_straight(self, segment: ArrayLike, xi: ArrayLike) -> NDArray[np.bool_]:
         length = self.segment_lengths_mm[np.asarray(segment, dtype=np.intp)]
@@ -203,16 +198,6 @@ class SpatialPHSpline(ArcLengthChain):
         return SpatialPHSpline(
             origin, preimage, self.closed, self.extra if extra is None else extra
         )
-
-
-def _inner(a: Real, b: Real) -> Real:
-    """Scalar product (…,) of vectors (A, …)."""
-    return np.asarray(np.sum(a * b, axis=0))
-
-
-def _image(a: Real, b: Real) -> Real:
-    """(a i b* + b i a*) / 2 (3, …) of quaternions (4, …), as `polar`."""
-    return np.stack(polar_of(a, b))
 
 
 def hodograph_of(preimage: Real) -> Real:
