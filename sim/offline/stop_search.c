@@ -224,6 +224,14 @@ static void known_choice(const struct stop_setting *setting, const struct stop_p
     out->first_s = times.first_s;
 }
 
+/* Codes that keep the limits but for brakes out of another stop; 0: they do not keep them out of these. */
+static int kept_choice(const struct stop_setting *setting, struct stop_piece *piece,
+                       const struct stop_found *found, double after_s, struct choice *best)
+{
+    known_choice(setting, piece, found, after_s, best);
+    return found->kept != 0u && stop_out_of_brakes_keeps(setting, piece, best->codes);
+}
+
 /* The numbers of a piece, or none where waiting for the next is about as good. */
 static void choose(const struct stop_setting *setting, struct stop_piece *piece, const int warm[3],
                    double after_s, struct choice *best)
@@ -238,6 +246,17 @@ static void choose(const struct stop_setting *setting, struct stop_piece *piece,
     if (none.mean_s < WAIT_BETTER * best->mean_s ||
         (none.mean_s < WAIT_AS_GOOD * best->mean_s && best->longest_s > 2.0 * none.worst_s)) {
         *best = none;
+    }
+}
+
+/* The same for a piece whose codes may be given, or where to start. */
+static void search_or_keep(const struct stop_setting *setting, struct stop_piece *piece,
+                           const struct stop_found *found, const int warm[3], double after_s,
+                           struct choice *best)
+{
+    const int start[3] = {found->start[0], found->start[1], found->start[2]};
+    if (!kept_choice(setting, piece, found, after_s, best)) {
+        choose(setting, piece, start[1] > 0 ? start : warm, after_s, best);
     }
 }
 
@@ -276,7 +295,7 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
             }
             piece.close = &close;
             suspect_as_behind(&piece, behind);
-            choose(&setting, &piece, warm, after_s, &best);
+            search_or_keep(&setting, &piece, &found[i - 1u], warm, after_s, &best);
             behind[0] = piece.suspect_override;
             behind[1] = piece.suspect_before;
         }

@@ -278,8 +278,8 @@ static int out_of_rate_keeps(const struct stop_setting *setting, struct stop_pie
 }
 
 /* At all overrides; the state that broke a limit last is looked at first. */
-static int brakes_keep(const struct stop_setting *setting, struct stop_piece *piece,
-                       const int codes[3])
+int stop_out_of_brakes_keeps(const struct stop_setting *setting, struct stop_piece *piece,
+                             const int codes[3])
 {
     struct path_brake_numbers numbers;
     struct path_brake_numbers before;
@@ -329,5 +329,6 @@ int stop_strictly(const struct stop_setting *setting, struct stop_piece *piece, 
     const struct keeping keeping = {inverse, stop_extent_keeps(&setting->road, inverse, &extent)};
     const int surely = stop_extent_keeps(&setting->road, &setting->inverse, &extent);
     return close_keep(setting, piece->close, &numbers, surely) &&
-           overrides_keep(setting, piece, &keeping, &numbers) && brakes_keep(setting, piece, codes);
+           overrides_keep(setting, piece, &keeping, &numbers) &&
+           stop_out_of_brakes_keeps(setting, piece, codes);
 }

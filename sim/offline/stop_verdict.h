@@ -44,6 +44,10 @@ int stop_all_keep(const struct stop_setting *setting, struct stop_piece *piece,
 int stop_suspect_keeps(const struct stop_setting *setting, const struct stop_piece *piece,
                        const struct path_brake_numbers *numbers);
 
+/* Whether brakes out of another stop, piece->before, keep the limits: a part of the strict look. */
+int stop_out_of_brakes_keeps(const struct stop_setting *setting, struct stop_piece *piece,
+                             const int codes[3]);
+
 /* The strict look: at all rates, from more instants, out of the brake of another stop; piece->close is filled. */
 int stop_strictly(const struct stop_setting *setting, struct stop_piece *piece, const int codes[3]);
 

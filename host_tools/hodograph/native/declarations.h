@@ -264,7 +264,9 @@ struct stop_limits {
 };
 struct stop_found {
     uint8_t known;
+    uint8_t kept;
     uint8_t before[3];
+    uint8_t start[3];
     uint8_t codes[3];
     double worst_s, mean_s;
 };

@@ -62,6 +62,23 @@ _RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_je
 _MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
 
 
+@dataclass(frozen=True, eq=False)
+class More:
+    """What else a search of codes is told of each piece.
+
+    before  codes (M, 3) of a brake out of which another may begin, 0: none
+    kept    pieces (M,) whose codes keep the limits but for that; they stay if they keep them out of it too
+    start   codes (M, 3) that a search of few trials tries first, 0: those of the next piece
+    """
+
+    before: NDArray[np.uint8] | None = None
+    kept: NDArray[np.bool_] | None = None
+    start: NDArray[np.uint8] | None = None
+
+
+NOTHING_MORE = More()
+
+
 class StopSearch:
     """A program whose stops are looked for; it has passed `program_open`, its stop table is not read."""
 
@@ -90,17 +107,15 @@ class StopSearch:
         limits: StopLimits,
         given: NDArray[np.uint8],
         known: NDArray[np.bool_],
-        before: NDArray[np.uint8] | None = None,
+        more: More = NOTHING_MORE,
     ) -> NDArray[np.uint8]:
-        """Codes (M, 3): `given` where they are `known` (M,), found elsewhere; good also for a brake that begins out of
-        one with the codes `before` (M, 3).
-        """
-        found = self._found(limits, given, known, before)
+        """Codes (M, 3): `given` where they are `known` (M,), found elsewhere."""
+        found = self._found(limits, given, known, more)
         return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
 
     def mean_s(self, limits: StopLimits, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Mean time to rest (M,) of stops from the instants of each piece at the rate 1, with these codes (M, 3)."""
-        found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), None)
+        found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), NOTHING_MORE)
         return np.array([one.mean_s for one in found])
 
     def _found(
@@ -108,7 +123,7 @@ class StopSearch:
         limits: StopLimits,
         given: NDArray[np.uint8],
         known: NDArray[np.bool_],
-        before: NDArray[np.uint8] | None,
+        more: More,
     ) -> Any:
         """struct stop_found of each piece."""
         ffi, lib = library()
@@ -116,9 +131,15 @@ class StopSearch:
         found = ffi.new("struct stop_found[]", self._count)
         for one, codes, is_known in zip(found, given.tolist(), known.tolist(), strict=True):
             one.known, one.codes = is_known, codes
-        if before is not None:
-            for one, codes in zip(found, before.tolist(), strict=True):
+        if more.before is not None:
+            for one, codes in zip(found, more.before.tolist(), strict=True):
                 one.before = codes
+        if more.start is not None:
+            for one, codes in zip(found, more.start.tolist(), strict=True):
+                one.start = codes
+        if more.kept is not None:
+            for one, is_kept in zip(found, more.kept.tolist(), strict=True):
+                one.kept = is_kept
         path = self._path(own)
         lib.stop_search(self._program.pointer, own[0], path[0], found)
         return found

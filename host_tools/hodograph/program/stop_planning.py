@@ -20,7 +20,7 @@ from ..feed.limits import PerAxis
 from ..feed.pieces import halved
 from ..native.program import NativeProgram
 from ..native.stop_bounds import stop_bounds
-from ..native.stop_search import StopLimits, StopSearch
+from ..native.stop_search import More, StopLimits, StopSearch
 from .check_stops import END_TICKS, own_bounds
 from .image import Program, encode
 from .stops import DECELERATION, FAULT, HOLD, Stops, no_stops
@@ -84,9 +84,10 @@ def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     tree = _Halves(program)
-    codes = _searched(tree, limits)
-    if not terms.quick:
-        codes = _refined(tree, limits, codes)
+    if terms.quick:
+        codes = _searched_quickly(tree, limits, terms)
+    else:
+        codes = _refined(tree, limits, _searched(tree, limits, _Found(program.piece_count)).codes)
     for kind in (HOLD, FAULT):
         codes[_better_without(_with_codes(tree.program, codes), kind, tree.groups), kind] = 0
     if not terms.quick:
@@ -104,7 +105,11 @@ def stop_codes(
         for own in (hold_limits(plan, terms), fault_limits(plan, terms))
     ]
     codes = np.zeros((program.piece_count, 2, 3), dtype=np.uint8)
-    _search_round(program, limits, codes, np.repeat(~wanted[:, None], 2, axis=1))
+    known = np.repeat(~wanted[:, None], 2, axis=1)
+    if terms.quick:
+        _search_round(program, limits, codes, known | _all_but(FAULT))
+        known[:, FAULT] = True
+    _search_round(program, limits, codes, known)
     return codes
 
 
@@ -120,26 +125,55 @@ def without_long_stops(program: Program) -> Program:
     return with_bounds(_with_codes(program, codes))
 
 
-def _searched(tree: _Halves, limits: Sequence[StopLimits]) -> NDArray[np.uint8]:
-    """Codes (M, 2, 3) of a program whose pieces without numbers of a kind are halved until all have them, or are too
-    short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps them, so
-    nothing is searched twice.
+def _searched_quickly(
+    tree: _Halves, limits: Sequence[StopLimits], terms: StopTerms
+) -> NDArray[np.uint8]:
+    """Codes (M, 2, 3) of a search of few trials. Fault stops come first: where they take too long, nothing else is
+    searched. Raises LongStopError.
     """
-    count = tree.program.piece_count
-    codes = np.zeros((count, 2, 3), dtype=np.uint8)
-    known = np.zeros((count, 2), dtype=np.bool_)
-    misses: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+    found = _searched(tree, limits, _Found(tree.program.piece_count), (FAULT,))
+    codes = found.codes.copy()
+    codes[_better_without(_with_codes(tree.program, codes), FAULT, tree.groups), FAULT] = 0
+    _checked(with_bounds(_with_codes(tree.program, codes)), terms)
+    return _searched(tree, limits, found, (HOLD,)).codes
+
+
+class _Found:
+    """What a search has found so far: codes (M, 2, 3), which of them are known (M, 2), and misses (M,)."""
+
+    def __init__(self, count: int) -> None:
+        self.codes: NDArray[np.uint8] = np.zeros((count, 2, 3), dtype=np.uint8)
+        self.known: NDArray[np.bool_] = np.zeros((count, 2), dtype=np.bool_)
+        self.misses: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+
+
+def _searched(
+    tree: _Halves, limits: Sequence[StopLimits], out: _Found, kinds: Sequence[int] = (HOLD, FAULT)
+) -> _Found:
+    """Codes of some kinds of a program whose pieces without numbers of such a kind are halved until all have them, or
+    are too short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps
+    them, so nothing is searched twice.
+    """
+    others = _all_but(*kinds)
     while True:
-        _search_round(tree.program, limits, codes, known)
-        found = codes[:, :, DECELERATION] != 0
-        tree.count_misses(misses, (found & ~known).any(axis=1))
-        lacking = ~found.all(axis=1) & ~known.all(axis=1)
-        chosen = lacking & tree.long_enough() & (misses < MOST_MISSES)
+        _search_round(tree.program, limits, out.codes, out.known | others)
+        found = out.codes[:, :, DECELERATION] != 0
+        tree.count_misses(out.misses, (found & ~out.known).any(axis=1))
+        lacking = ~(found | others).all(axis=1) & ~(out.known | others).all(axis=1)
+        chosen = lacking & tree.long_enough() & (out.misses < MOST_MISSES)
         if not chosen.any():
-            return codes
-        known = np.repeat(found | ~chosen[:, None], 1 + chosen, axis=0)
-        codes, misses = np.repeat(codes, 1 + chosen, axis=0), np.repeat(misses, 1 + chosen)
+            out.known |= ~others
+            return out
+        known = np.where(others, out.known, found | ~chosen[:, None])
+        out.known = np.repeat(known, 1 + chosen, axis=0)
+        out.codes = np.repeat(out.codes, 1 + chosen, axis=0)
+        out.misses = np.repeat(out.misses, 1 + chosen)
         tree.halve(chosen)
+
+
+def _all_but(*kinds: int) -> NDArray[np.bool_]:
+    """The kinds of stops (2,) that are none of these."""
+    return np.array([kind not in kinds for kind in (HOLD, FAULT)])
 
 
 def _refined(
@@ -254,13 +288,19 @@ def _search_round(
     codes: NDArray[np.uint8],
     known: NDArray[np.bool_],
 ) -> None:
-    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: numbers
-    for it are known only where those of the hold are.
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where that
+    of the hold is found now, numbers for it are known but for such stops. A search of few trials keeps them if it can;
+    it tries them for the hold first.
     """
-    search = StopSearch(NativeProgram(encode(program)))
-    codes[:, HOLD] = search.codes(limits[HOLD], codes[:, HOLD], known[:, HOLD])
-    given = known[:, FAULT] & (known[:, HOLD] | (codes[:, HOLD, DECELERATION] == 0))
-    codes[:, FAULT] = search.codes(limits[FAULT], codes[:, FAULT], given, codes[:, HOLD])
+    search, quick = StopSearch(NativeProgram(encode(program))), limits[FAULT].quick
+    hold, fault = codes[:, HOLD], codes[:, FAULT]
+    if not known[:, HOLD].all():
+        start = fault if quick else None
+        hold[:] = search.codes(limits[HOLD], hold, known[:, HOLD], More(start=start))
+    given = known[:, FAULT] & (known[:, HOLD] | (hold[:, DECELERATION] == 0))
+    if not given.all():
+        kept = known[:, FAULT] & ~given & (fault[:, DECELERATION] != 0) if quick else None
+        fault[:] = search.codes(limits[FAULT], fault, given, More(before=hold, kept=kept))
 
 
 def _better_without(program: Program, kind: int, groups: Sequence[object]) -> NDArray[np.bool_]:
