@@ -23,6 +23,7 @@ from hodograph.feed import (
 from hodograph.feed.optimal import plan_optimal, replan_optimal
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
+from quick_stops import QUICK_STOPS
 
 OPTIMAL = FeedRequest("optimal")
 FAST = Limits(feed_mm_s=100.0, acceleration_mm_s2=1000.0, jerk_mm_s3=20000.0)
@@ -98,7 +99,7 @@ def test_the_message_names_the_limit_and_its_value_works(name: str) -> None:
     assert text.startswith(f"{name} = ")
     assert "at arc length" in text
     found = make(least)
-    assert check(compile_path(bend(), found, replan=replan_optimal).program) is None
+    assert check(compile_path(bend(), found, QUICK_STOPS, replan_optimal).program) is None
     # It is the least: what is a tenth below it is refused too.
     friction = 0.3 if name.endswith("volts of x") else 0.0
     refused(make, friction + 0.9 * (least - friction))

@@ -29,6 +29,7 @@ from hodograph.native.quadratic_program import QuadraticProgram, QuadraticSoluti
 from hodograph.program import check, compile_path
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify import verify_program
+from quick_stops import QUICK_STOPS
 
 OPTIMAL = FeedRequest("optimal")
 AXES = Limits(axis=AxisLimits(None, (2000.0, 2000.0), (50000.0, 50000.0)))
@@ -92,7 +93,7 @@ def test_random_paths_and_limits_are_kept_and_make_programs(seed: int) -> None:
     )
     assert keeps(plan)
     assert track(plan).stretch < 1.01
-    assert check(compile_path(spline, plan, replan=replan_optimal).program) is None
+    assert check(compile_path(spline, plan, QUICK_STOPS, replan_optimal).program) is None
 
 
 @pytest.mark.parametrize("seed", range(16))
@@ -104,7 +105,7 @@ def test_the_verifier_finds_no_limit_passed(seed: int) -> None:
     acceleration = feed / random.uniform(0.02, 0.3)
     limits = Limits(feed, acceleration, acceleration / random.uniform(0.01, 0.1))
     plan = plan_optimal(spline, OPTIMAL, limits, None, None, period_us=1000)
-    found = verify_program(compile_path(spline, plan, replan=replan_optimal).program, limits)
+    found = verify_program(compile_path(spline, plan, QUICK_STOPS, replan_optimal).program, limits)
     assert found.kept, found.exceeded
 
 
@@ -191,7 +192,7 @@ def test_each_period_has_pieces_that_the_controller_takes() -> None:
         plan = plan_optimal(spline, OPTIMAL, AXES, CONTROLLER, period_us=period_us)
         seconds = track(plan).seconds[1:-1]
         assert (seconds[1:] + seconds[:-1]).min() > 2e-6 * period_us
-        assert check(compile_path(spline, plan, replan=replan_optimal).program) is None
+        assert check(compile_path(spline, plan, QUICK_STOPS, replan_optimal).program) is None
 
 
 def test_without_a_limit_of_jerk_one_is_taken_and_told() -> None:

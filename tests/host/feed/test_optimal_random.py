@@ -17,6 +17,7 @@ from hodograph.feed.optimal.track import Track
 from hodograph.program import compile_path
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify import verify_program
+from quick_stops import QUICK_STOPS
 
 DRIVE = Path(__file__).parents[3] / "examples/drives/alpha_x.toml"
 OPTIMAL = FeedRequest("optimal")
@@ -101,7 +102,7 @@ def test_nothing_is_above_a_limit(seed: int) -> None:
     plan = plan_optimal(
         case.spline, OPTIMAL, case.limits, case.controller, case.plants, period_us=case.period_us
     )
-    program = compile_path(case.spline, plan, replan=replan_optimal).program
+    program = compile_path(case.spline, plan, QUICK_STOPS, replan_optimal).program
     found = verify_program(program, case.limits, [drive(one) for one in case.plants or ()])
     assert found.kept, found.exceeded
     assert isinstance(plan.curve, Track)
@@ -137,4 +138,6 @@ def test_a_program_that_is_not_solved_to_the_last_digit_is_taken(
     monkeypatch.setattr(window, "solve", lambda problem, penalty, _: solve(problem, penalty))
     plan = plan_optimal(bow(4.0), OPTIMAL, limits)
     assert plan.duration_s == pytest.approx(whole.duration_s, rel=2e-3)
-    assert verify_program(compile_path(bow(4.0), plan, replan=replan_optimal).program, limits).kept
+    assert verify_program(
+        compile_path(bow(4.0), plan, QUICK_STOPS, replan_optimal).program, limits
+    ).kept

@@ -27,10 +27,11 @@ from hodograph.feed.optimal import plan_optimal
 from hodograph.feed.override_levels import FULL
 from hodograph.native.feed_override import FeedOverride, State
 from hodograph.native.program import NativeProgram
-from hodograph.program import Program, ProgramOptions, StopTerms, compile_program, encode
+from hodograph.program import Program, compile_program, encode
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.verify.cells import cut
 from hodograph.verify.instants import motion_at
+from quick_stops import QUICK_STOPS
 
 PLANTS = (Plant(132.0, 0.19936, 2.5), Plant(80.3, 0.15641, 3.5, 0.2))
 COUNT_S, MOST_TICKS = 5, 4000
@@ -94,7 +95,7 @@ def random_case(seed: int) -> Case:
         limits = replace(limits, centripetal_mm_s2=1000.0)
     make = plan_optimal if request.optimal else plan_path
     plan = make(spline, request, limits, None, plants)
-    program = compile_program(spline, plan, ProgramOptions(stops=StopTerms(quick=True)))
+    program = compile_program(spline, plan, QUICK_STOPS)
     return Case(program, limits, plants)
 
 

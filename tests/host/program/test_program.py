@@ -215,7 +215,9 @@ def test_truncated_images_are_refused(size) -> None:
 
 @pytest.mark.serial
 def test_compile_and_check_take_linear_time() -> None:
-    """10^5 segments within seconds; the cost of one the same at 10^4 (within the noise of a busy machine)."""
+    """A segment costs as much of 10^5 as of 10^4, within the noise of a busy machine. Processor time only, and no limit
+    in seconds: a slow computer has the same verdict.
+    """
 
     def seconds(count: int) -> float:
         # Slow circles that stay within the 4096 mm of the format.
@@ -239,5 +241,4 @@ def test_compile_and_check_take_linear_time() -> None:
 
     small = min(seconds(5_000) for _ in range(2))
     large = seconds(50_000)
-    assert large < 30.0
     assert large / small < 25.0
