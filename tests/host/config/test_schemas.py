@@ -214,7 +214,6 @@ COMPLETE: dict[str, list[Document]] = {
                     "closed": False,
                     "through": [[0, 2, 3, 0, 0], [1, 2, 3, 0, 0]],
                     "feed": FEED,
-                    "limits": LIMITS | {"axis": {"acceleration_mm_s2": 900}},
                 },
                 TURN | {"feed": TURN_FEED, "limits": TURN_LIMITS},
             ],

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Axes behind x, y, z: each over arc length, as the program has it, where the setpoints went, where the axis went.
 
-import { digitsOf, prepare, text } from "./scale.js";
+import { digitsOf, prepare, roundUp, text } from "./scale.js";
 import { Ring } from "./store.js";
 
 const POINTS = 12288;
+const STEPS = 4; // at most, between the lines of a scale
 const LEFT = 62, RIGHT = 8, TOP = 6, BOTTOM = 16;
 
 export class AxisCurves {
@@ -94,9 +95,9 @@ export class AxisCurves {
     context.strokeStyle = colours.grid;
     context.textAlign = "right";
     context.textBaseline = "middle";
-    const digits = digitsOf((high - low) / 10);
-    for (const share of [0.1, 0.5, 0.9]) {
-      const value = low + share * (high - low), y = Math.round(py(value)) + 0.5;
+    const step = roundUp((high - low) / STEPS), digits = digitsOf(step);
+    for (let k = Math.ceil(low / step); k * step <= high; k += 1) {
+      const value = k * step, y = Math.round(py(value)) + 0.5;
       polyline(context, colours.grid, 1, 2, (i) => [i ? width - RIGHT : LEFT, y]);
       context.fillText(value.toFixed(digits), LEFT - 6, y);
     }

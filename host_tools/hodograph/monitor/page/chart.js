@@ -5,6 +5,7 @@
 import { digitsOf, prepare, roundUp, text } from "./scale.js";
 
 const LEFT = 62, TOP = 4, BOTTOM = 4;
+const NAME_ROW = 11;
 const LONGEST_BRIDGE_S = 1; // over more time without any word nothing is drawn
 
 export class Chart {
@@ -46,7 +47,7 @@ export class Chart {
       stroke(context, reduced[i], at, colours[line.colour]);
     });
     const shown = marks.filter(([t]) => t <= end && t >= end - seconds);
-    for (const [t, words] of shown) mark(context, place(t), words, height, colours);
+    drawMarks(context, shown.map(([t, words]) => [place(t), words.split("\n")]), width, height, colours);
     this.canvas.dataset.marks = shown.map(([, words]) => words).join("; ");
     if (hover !== null) {
       context.fillStyle = colours.soft;
@@ -154,14 +155,25 @@ function stroke(context, { low, high, missing, gap }, at, colour) {
   context.lineWidth = 1;
 }
 
-/** When an output switched: a line, and its name from the bottom up. */
-function mark(context, x, words, height, colours) {
+/**
+ * When outputs switched, `marks` from left to right: a line each, and names beside it, from the bottom up. A name goes to
+ * the left of its line at the right edge, above names that it would cover, and is left out where there is no room.
+ */
+function drawMarks(context, marks, width, height, colours) {
   context.fillStyle = colours.second;
-  context.fillRect(x, 0, 1, height);
   context.font = "10px system-ui, sans-serif";
-  context.textAlign = "left";
   context.textBaseline = "bottom";
-  words.split("\n").forEach((line, k, lines) => context.fillText(line, x + 3, height - 3 - 11 * (lines.length - 1 - k)));
+  const rows = Math.floor((height - 6) / NAME_ROW), used = new Array(Math.max(rows, 0)).fill(LEFT);
+  for (const [x, names] of marks) {
+    context.fillRect(x, 0, 1, height);
+    const wide = Math.max(...names.map((name) => context.measureText(name).width)) + 6;
+    const left = x + wide > width ? x - wide : x;
+    const row = used.findIndex((_, k) => k + names.length <= rows && used.slice(k, k + names.length).every((end) => end <= left));
+    if (row < 0) continue;
+    context.textAlign = left < x ? "right" : "left";
+    names.forEach((name, k) => context.fillText(name, left < x ? x - 3 : x + 3, height - 3 - NAME_ROW * (row + names.length - 1 - k)));
+    used.fill(left + wide, row, row + names.length);
+  }
 }
 
 function line(context, x0, y0, x1, y1) {
