@@ -8,7 +8,8 @@
 
 enum { SMOOTHING_ORDER = 3, SMOOTHING_STEPS = 60, SMOOTHING_TRIALS = 40 };
 static const double SMOOTHING_CLOSE = 1e-3;  /* a step that gains less, in barriers, is the last */
-static const double SMOOTHING_SHRINK = 0.2;  /* of the barrier, from one minimum to the next */
+static const double SMOOTHING_FIRST = 1e-3;  /* barrier of the first minimum */
+static const double SMOOTHING_SHRINK = 0.1;  /* of the barrier, from one minimum to the next */
 static const double SMOOTHING_INSIDE = 0.95; /* of the way to the nearest bound */
 static const double SMOOTHING_GAIN = 0.1;    /* of the gain that the gradient promises */
 
@@ -314,7 +315,7 @@ void smoothing_solve(const struct smoothing *s, double barrier, double *shift, d
     m.tried = smoothing_state(s, &work);
     memcpy(m.at.shift, shift, sizeof(double) * m.size);
     smoothing_hessian(&m);
-    double level = fmax(barrier, 1.0);
+    double level = fmax(barrier, SMOOTHING_FIRST);
     smoothing_minimum(&m, level);
     while (level > barrier) {
         level = fmax(barrier, SMOOTHING_SHRINK * level);

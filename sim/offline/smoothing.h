@@ -26,7 +26,7 @@ struct smoothing {
 size_t smoothing_work(uint32_t count, uint32_t ways);
 
 /* Shifts (count rows of [ways], mm) of least sum of squares plus `barrier` (above 0) times the barrier of the bounds.
- * At the call `shift` has shifts strictly inside the bounds (0 where a bound is 0). Linear: about 40 us for each
+ * At the call `shift` has shifts strictly inside the bounds (0 where a bound is 0). Linear: about 20 us for each
  * hundred points that move in one direction and each halving of the barrier. */
 void smoothing_solve(const struct smoothing *s, double barrier, double *shift, double *work);
 

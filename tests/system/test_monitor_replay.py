@@ -172,3 +172,23 @@ def test_wrong_input_is_one_line_and_status_2(files: Path, words: list[str], sai
     assert done.returncode == 2
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_toolpath_is_drawn_with_its_source_lines(browser: Browser, tmp_path: Path) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("F1200\nG1 X20\nY10 (the side)\nM2\n")
+    mill = str(ROOT / "examples" / "machines" / "mill.toml")
+    nowhere = f"local:{tmp_path / 'bus'}"
+    with monitor("--machine", mill, "--program", str(part), "--bus", nowhere) as url:
+        page = browser.open(url)
+        page.wait("!document.querySelector('#place').hidden")
+        assert page.text("#speeds-most") == "20.0 mm/s"
+        assert page.js("document.querySelector('#side').value") == "xy"
+        left, top = page.js(
+            "(r => [r.x + r.width / 2 + 0.42 * r.width, r.y + r.height / 2])"
+            "(document.querySelector('#plane-canvas').getBoundingClientRect())"
+        )
+        page.call("Input.dispatchMouseEvent", type="mouseMoved", x=left, y=top)
+        page.wait("document.querySelector('#place').textContent !== ''")
+        assert page.text("#place").startswith("line 3: Y10 (the side)")
+        assert page.complaints == []

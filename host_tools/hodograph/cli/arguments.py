@@ -643,8 +643,9 @@ def _monitor(command: Command) -> None:
         "--program",
         type=Path,
         metavar="FILE",
-        help="path file or program image to draw (default: the one in the controller)",
+        help="path file, program image or toolpath to draw (default: the program in the controller)",
     )
+    options.toolpath(parser)
     options.bus_name(parser)
     parser.add_argument(
         "--host",

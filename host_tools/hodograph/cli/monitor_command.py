@@ -12,16 +12,19 @@ from ..bus.capture.setpoint_check import step_limits
 from ..bus.own_bus import bus_address
 from ..config import PLANE_AXES, SPACE_AXES, Machine, load_machine
 from ..errors import InputError
+from ..job_view import curve_view
 from ..monitor.decoder import nodes_in
 from ..monitor.derived import ProgramPath
 from ..monitor.pump import Layout
 from ..monitor.security import make_token
 from ..monitor.session import Live, LivePage, PageAddress, Replay
+from ..names import is_toolpath
 from ..native import NativeProgram
 from ..pipeline import load_pipeline
 from ..program.image import read_image
 from .output import note
 from .targets import DEFAULT_BITRATE
+from .toolpath_commands import refuse_toolpath_options, toolpath_job
 
 _USUAL_PERIOD_US = 1000
 _USUAL_COUNTS_PER_MM = 1_000_000
@@ -29,7 +32,13 @@ _USUAL_COUNTS_PER_MM = 1_000_000
 
 def monitor(options: Namespace) -> None:
     """hodograph monitor."""
-    image, machine = _image_and_machine(options)
+    toolpath = None
+    if options.program is not None and is_toolpath(options.program):
+        job = toolpath_job(options, options.program)
+        image, machine, toolpath = None, job.machine, curve_view(job)
+    else:
+        refuse_toolpath_options(options, options.program or Path("monitor"))
+        image, machine = _image_and_machine(options)
     place = PageAddress(options.host, options.port, make_token(_token(options)))
     if options.replay is not None:
         what, layout = _replay(options, machine, image)
@@ -37,7 +46,7 @@ def monitor(options: Namespace) -> None:
         what, layout = Live(bus_address(options.bus), machine.node), machine_layout(machine)
     else:
         raise InputError("monitor: needs --machine FILE, or a path file as --program")
-    asyncio.run(LivePage(what, layout, place, image, note).serve())
+    asyncio.run(LivePage(what, layout, place, image, note, toolpath).serve())
 
 
 def _replay(

@@ -82,8 +82,9 @@ class PageAddress:
 class LivePage:
     """Serves the page until SIGINT or SIGTERM.
 
-    image  the program on the command line; None: none was given
-    note   prints a line on the terminal
+    image     the program on the command line; None: none was given
+    note      prints a line on the terminal
+    toolpath  what is drawn of a toolpath (job_view.curve_view); None: none was given
     """
 
     def __init__(
@@ -93,9 +94,10 @@ class LivePage:
         place: PageAddress,
         image: bytes | None,
         note: Callable[[str], None],
+        toolpath: dict[str, object] | None = None,
     ) -> None:
         self._what, self._layout, self._place = what, layout, place
-        self._image, self._note = image, note
+        self._image, self._note, self._toolpath = image, note, toolpath
 
     async def serve(self) -> None:
         """Raises InputError when the address is in use, HodographError when a thread has broken down."""
@@ -119,6 +121,8 @@ class LivePage:
             await self._listen(runner)
             if self._image is not None:
                 pump.show(self._image)
+            if self._toolpath is not None:
+                broadcaster.publish({"type": "toolpath", **self._toolpath})
             pump.start()
             self._note(f"monitor: {self._place.url}")
             if link is not None:

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..job import Job, JobMotion
+from ..job import JobMotion
+from ..job_view import programmed_view, source_lines
 from ..pipeline import proved_limits
-from ..toolpath.files import is_gcode
 from .page import Figure, render, write_page
 from .style import styled
 from .toolpath_figures import (
@@ -23,9 +23,6 @@ from .toolpath_figures import (
 
 MOST_POINTS = 20_000
 """Points of the view; of a longer job every n-th tick is drawn."""
-
-_LONGEST_LINE = 100
-"""Characters of a source line that the view shows."""
 
 
 def write_toolpath_report(run: JobMotion, directory: Path) -> Path:
@@ -98,7 +95,9 @@ def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
 
 
 def view_data(run: JobMotion) -> dict[str, object]:
-    """What the view draws: columns of ticks in the program's own coordinates, and the source lines that they name."""
+    """What the view draws: columns of ticks in the program's own coordinates, the source lines that they name, and the
+    programmed path with its tolerance (0: sections have several).
+    """
     step = max(1, -(-run.ticks // MOST_POINTS))
     columns: dict[str, list[object]] = {name: [] for name in ("x", "y", "z", "f", "l", "r")}
     for section, motion in zip(run.job.sections, run.motions, strict=True):
@@ -113,16 +112,10 @@ def view_data(run: JobMotion) -> dict[str, object]:
         ):
             columns[name] += np.round(values, 4).tolist()
         columns["r"] += section.is_rapid_at(s_mm).astype(int).tolist()
-    return {**columns, "text": _source(run.job, {int(str(line)) for line in columns["l"]})}
-
-
-def _source(job: Job, wanted: set[int]) -> dict[str, str]:
-    """Source lines by number; none where the file is no text of lines, or came from standard input."""
-    if not is_gcode(job.file) or not job.file.is_file():
-        return {}
-    found = {}
-    with job.file.open(encoding="utf-8", errors="replace") as file:
-        for number, line in enumerate(file, 1):
-            if number in wanted:
-                found[str(number)] = line.strip()[:_LONGEST_LINE]
-    return found
+    tolerances = {section.tolerance_mm for section in run.job.sections}
+    return {
+        **columns,
+        "text": source_lines(run.job, columns["l"]),
+        "programmed": programmed_view(run.job, np.zeros(3)),
+        "tolerance": tolerances.pop() if len(tolerances) == 1 else 0.0,
+    }

@@ -12,6 +12,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from ..errors import InputError, ToolpathError
 from .contours import ARC, LINE, Affine, Contours, Point, Step, as_spline
 from .moves import (
@@ -41,6 +43,9 @@ from .ordering import (
 
 ORDERS = ("short", "inside-first", "file")
 """Orders of contours: short rapid moves; what lies inside before what is around it, then short; as in the file."""
+
+_SAME_DIGITS = 6
+"""Decimals of mm in which contours are compared."""
 
 MOST_COPIES = 1_000_000
 """Most steps that copies (DXF blocks, SVG `use`) may add to a drawing."""
@@ -122,6 +127,7 @@ class Drawing:
         self._layers: dict[str, None] = {}
         self._ids: set[str] = set()
         self._notes: dict[str, tuple[int, int]] = {}
+        self._assumed_line = 0
 
     def error(self, line: int, text: str, column: int = 1) -> ToolpathError:
         """An error at a place of the file."""
@@ -159,6 +165,10 @@ class Drawing:
         count, first = self._notes.get(what, (0, line))
         self._notes[what] = (count + 1, first)
 
+    def assume_unit(self, line: int) -> None:
+        """Note that the page at this line has no size; `options.unit_mm` says it."""
+        self._assumed_line = line if self.options.unit_mm is None else 0
+
     def count_copies(self, steps: int, line: int, column: int = 1) -> None:
         """Bound what copies add. Raises ToolpathError: too much."""
         self._copied += steps + 1
@@ -174,9 +184,16 @@ class Drawing:
         feeds = self._feeds()
         for what, (count, first) in self._notes.items():
             yield Message(first, f"left out: {what}, {count} times, first in line {first}")
+        if self._assumed_line:
+            text = "the page has no size: a unit counts 1/96 inch, or as --unit says"
+            yield Message(self._assumed_line, text)
         self._check_names()
         if not len(self.contours):
             raise self._empty()
+        if repeats := repeated(self.contours):
+            first = min(self.contours.line_of(index) for index in repeats)
+            text = f"drawn again: {len(repeats)} contours, first in line {first}: each is followed as often as it is drawn"
+            yield Message(first, text)
         visits, message = self._sequence()
         yield Message(0, message)
         x, y, z = self.options.start[:3]
@@ -284,6 +301,54 @@ class Drawing:
                 here = point
         if over:
             yield StraightMove(step.line, _position(step.start, others), feed)
+
+
+def repeated(contours: Contours) -> list[int]:
+    """Contours that an earlier one of the same group has drawn already, in the same or the other direction."""
+    found = []
+    for alike in _with_same_ends(contours):
+        known: set[tuple[object, ...]] = set()
+        for index in alike:
+            shape = _shape(contours, index, backwards=False)
+            if shape in known:
+                found.append(index)
+            known |= {shape, _shape(contours, index, backwards=True)}
+    return found
+
+
+def _with_same_ends(contours: Contours) -> Iterator[list[int]]:
+    """Contours of a group that have as many steps and the same ends as others, in the order of the file."""
+    ends = np.round(contours.ends(), _SAME_DIGITS).reshape(-1, 6) + 0.0
+    start, end = ends[:, :3], ends[:, 3:]
+    # Of both directions the one whose first coordinate that differs rises.
+    differs = start != end
+    first = np.argmax(differs, axis=1)[:, None]
+    falls = np.take_along_axis(start, first, 1) > np.take_along_axis(end, first, 1)
+    ends = np.where(falls, np.hstack((end, start)), ends)
+    count = len(contours)
+    order = np.lexsort(ends.T)
+    same = np.append((ends[order[1:]] == ends[order[:-1]]).all(axis=1), False)
+    for run in np.split(order, np.flatnonzero(~same)[: count - 1] + 1):
+        if run.size < 2:
+            continue
+        alike: dict[tuple[int, int], list[int]] = {}
+        for index in sorted(run.tolist()):
+            key = contours.group_of(index), contours.length_of(index)
+            alike.setdefault(key, []).append(index)
+        yield from (one for one in alike.values() if len(one) > 1)
+
+
+def _shape(contours: Contours, index: int, *, backwards: bool) -> tuple[object, ...]:
+    """What the steps of a contour draw, for comparison."""
+
+    def rounded(points: Iterable[Point]) -> tuple[object, ...]:
+        return tuple(round(value, _SAME_DIGITS) + 0.0 for point in points for value in point)
+
+    shape: list[object] = []
+    for step in contours.steps(index, backwards=backwards):
+        spline = () if step.spline is None else rounded(step.spline.points.tolist())
+        shape.append((step.kind, rounded((step.start, *step.controls, step.end)), spline))
+    return tuple(shape)
 
 
 def _moves_at_all(contours: Contours, chain: Chain) -> bool:

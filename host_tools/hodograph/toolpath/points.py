@@ -14,7 +14,7 @@ import math
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, repeat
 
 import numpy as np
@@ -48,10 +48,18 @@ _Row = tuple[int, Position, float | None]
 _BATCH = 4096
 _MOST_LINE = 4096
 _BLANKS = " \t\r\n\N{ZERO WIDTH NO-BREAK SPACE}"
+_UTF_16 = ("\udcff\udcfe", "\udcfe\udcff")
+"""Byte order marks, as surrogateescape has them."""
+
+_SEPARATOR = re.compile(r"sep=(\S)", re.IGNORECASE)
+"""A first line that spreadsheets write."""
+
+_QUOTED = re.compile(r'\s*"([^"]*)"\s*')
+
 _NUMERIC = re.compile(r"\s*[-+]?(?:[0-9.]|nan\b|inf)", re.IGNORECASE)
 _COMMENTS = ("#", ";", "%", "//")
 _AXES = {name: axis for axis, name in enumerate(COLUMNS[:6])}
-_HEADER = re.compile(r'"?\s*([A-Za-z]+)\s*(?:[_ ]|\[|\()?\s*([A-Za-z/_]*)\s*[\])]?\s*"?')
+_HEADER = re.compile(r'\s*([A-Za-z]+)\s*(?:[_ ]|\[|\()?\s*([A-Za-z/_]*)\s*[\])]?\s*')
 _UNITS = {
     **dict.fromkeys(("", "mm", "deg", "mm/min", "mm_min"), 1.0),
     **dict.fromkeys(("in", "inch", "in/min", "in_min"), 25.4),
@@ -209,7 +217,11 @@ class _Reader:
             if entry is None:
                 return
             number, text = entry[0], self._text(*entry)
-            if text:
+            if number == 1 and text.startswith(_UTF_16):
+                raise self._error(1, "text in UTF-16: save it as UTF-8")
+            if named := _SEPARATOR.fullmatch(text):
+                self._options = replace(self._options, separator=named[1])
+            elif text:
                 layout, is_header = self._layout(number, text)
                 if not is_header:
                     yield self._row(*entry, layout)
@@ -258,7 +270,7 @@ class _Reader:
 
     def _row(self, number: int, line: str, layout: _Layout) -> _Row:
         """The point of a line."""
-        fields = self._text(number, line).split(layout.separator)
+        fields = _fields(self._text(number, line), layout.separator)
         if len(fields) != layout.count:
             raise self._error(
                 number, f"{len(fields)} columns, where the first line has {layout.count}"
@@ -294,7 +306,7 @@ class _Reader:
         """How lines are read, by the first one, and whether it is a header."""
         separator = self._separator(text)
         has_commas = separator != ","
-        fields = text.split(separator)
+        fields = _fields(text, separator)
         is_header = not any(_NUMERIC.match(each) for each in fields)
         names, units = list(self._options.columns), [""] * len(self._options.columns)
         try:
@@ -325,6 +337,12 @@ class _Reader:
         if given != "auto":
             return given
         return next((each for each in ("\t", ";", ",") if each in text), None)
+
+
+def _fields(text: str, separator: str | None) -> list[str]:
+    """The fields of a line, without quotes around them."""
+    fields = text.split(separator)
+    return [_QUOTED.sub(r"\1", each) for each in fields] if '"' in text else fields
 
 
 def _places(line: str, fields: Sequence[str]) -> list[int]:

@@ -265,6 +265,8 @@ class _Reader:
             text = given.get(name, "")
             sizes.append(whole if is_relative(text) else length_px(text, 0.0))
         width, height = sizes
+        if all(is_relative(given.get(name, "")) for name in ("width", "height")):
+            self._drawing.assume_unit(element.line)
         if box is not None and (self._options.unit_mm is not None):
             width, height = box[2], box[3]
         if width < 0 or height < 0 or (box is not None and not (width and height)):

@@ -13,6 +13,7 @@ import pytest
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.job import JobMotion, load_job, simulate_job
+from hodograph.job_view import curve_view
 from hodograph.report.toolpath_figures import widest_corners
 from hodograph.report.toolpath_report import view_data, write_toolpath_report
 
@@ -96,3 +97,22 @@ def test_verify_goes_through_all_sections(
             assert 0 < stops["pieces"] == stops["proved"] + len(stops["not_proved_at_mm"])
     assert main(["verify", str(file), "--machine", str(MILL), "--program", "x.hdgp"]) == 2
     assert "--program" in capsys.readouterr().err
+
+
+def test_the_view_of_the_live_page_is_the_planned_path_in_machine_coordinates(
+    run: JobMotion, tmp_path: Path
+) -> None:
+    view = curve_view(run.job)
+    columns = {name: np.array(view[name]) for name in "xyzflr"}
+    at = np.column_stack([columns[name] for name in "xyz"])
+    assert at[[0, -1]].tolist() == [[0.0, 0.0, 0.0], [3.0, 3.0, 1.0]]
+    assert view["text"]["3"] == "G1 X6 (</script>)"  # type: ignore[index]
+    assert view["tolerance"] == 0.01
+    assert columns["f"][columns["r"] == 0].max() == pytest.approx(20.0, rel=1e-3)
+    programmed = np.column_stack([view["programmed"][name] for name in "xyz"])  # type: ignore[index]
+    assert [6.0, 0.0, 0.0] in programmed.tolist()
+    text = MILL.read_text(encoding="utf-8").replace("[0, 0, 0]", "[5, 0, -2]")
+    (tmp_path / "moved.toml").write_text(text.replace("../drives", str(MILL.parent.parent / "drives")))
+    moved = curve_view(load_job(run.job.file, load_machine(tmp_path / "moved.toml")))
+    there = np.column_stack([moved[name] for name in "xyz"])
+    assert (there[[0, -1]] - at[[0, -1]]).tolist() == [[5.0, 0.0, -2.0]] * 2

@@ -9,6 +9,7 @@ import { Plane } from "./plane.js";
 import { text } from "./scale.js";
 import { Store } from "./store.js";
 import { Theme } from "./theme.js";
+import { Toolpath } from "./toolpath.js";
 
 const $ = (id) => document.getElementById(id);
 const OVERRIDE_MS = 100;
@@ -39,6 +40,7 @@ function draw() {
   wanted = false;
   const end = frozenAt ?? store.newest;
   plane.draw(store.points, theme.colours);
+  $("place").textContent = plane.place;
   axisCurves.draw(theme.colours);
   for (const chart of charts) chart.draw(store.groups, end, seconds, theme.colours, hover, store.marks);
   if (arrivedMs !== null && ageMs !== null) {
@@ -111,6 +113,13 @@ const handlers = {
     panel.name = message.name;
     panel.lengthMm = message.length_mm;
     $("path-note").textContent = message.note;
+  },
+  toolpath(message) {
+    plane.setToolpath(new Toolpath(message));
+    $("place").hidden = $("speeds").hidden = false;
+    $("speeds-most").textContent = `${text(plane.toolpath.most, 1)} mm/s`;
+    if (plane.toolpath.flat) $("side").value = "xy";
+    plane.look($("side-label").hidden ? "xy" : $("side").value);
   },
   bus: ({ there, note }) => panel.reason("bus", there ? "" : note, true),
   status: (message) => panel.status(message),

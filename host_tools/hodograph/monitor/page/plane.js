@@ -23,6 +23,8 @@ export class Plane {
     this.redraw = redraw;
     this.path = { x: [], y: [], z: [] };
     this.marks = []; // {x, y, z, text}: where outputs switch
+    this.toolpath = null; // Toolpath: drawn in place of the path
+    this.pointer = null; // [left, top] in pixels
     this.names = ["x", "y", "z"];
     this.azimuth = -Math.PI / 4;
     this.side = "xy";
@@ -32,6 +34,8 @@ export class Plane {
     canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     canvas.addEventListener("pointerdown", (event) => this.drag(event));
     canvas.addEventListener("dblclick", () => this.fit());
+    canvas.addEventListener("pointermove", (event) => this.point([event.offsetX, event.offsetY]));
+    canvas.addEventListener("pointerleave", () => this.point(null));
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
@@ -41,6 +45,27 @@ export class Plane {
     this.marks = marks ?? [];
     this.canvas.dataset.marks = this.marks.map((mark) => mark.text).join("; ");
     this.redraw();
+  }
+
+  /** A toolpath is drawn in place of the path of the program, which is a part of it. */
+  setToolpath(toolpath) {
+    this.toolpath = toolpath;
+    this.redraw();
+  }
+
+  point(place) {
+    this.pointer = place;
+    if (this.toolpath) this.redraw();
+  }
+
+  /** Point of the toolpath under the pointer, else where the tool is; -1: neither is on the path. */
+  placed(points, px, py) {
+    if (this.pointer) {
+      const found = this.toolpath.under(...this.pointer, this.directions, px, py);
+      if (found >= 0) return found;
+    }
+    if (points.end === 0) return -1;
+    return this.toolpath.at(...["cx", "cy", "cz"].map((name) => points.get(name, points.end - 1)));
   }
 
   /** "xy", "xz", "yz", or "isometric", which `turn` turns. */
@@ -79,11 +104,14 @@ export class Plane {
     if (this.side in FLAT) grid(context, view, width, height, px, py, colours);
     else triad(context, this.directions, this.names, height, colours);
     context.lineJoin = context.lineCap = "round";
-    this.curve(context, px, py, colours);
+    if (this.toolpath) this.toolpath.draw(context, this.directions, px, py, view.scale, colours);
+    else this.curve(context, px, py, colours);
     this.trail(context, points, "c", 1, px, py, colours.cmd, 1);
     this.trail(context, points, "a", this.magnify, px, py, colours.act, 1.8);
     this.outputs(context, px, py, colours);
     this.tool(context, points, px, py, colours);
+    const found = this.toolpath ? this.placed(points, px, py) : -1;
+    this.place = found < 0 ? "" : this.toolpath.describe(found);
     this.canvas.dataset.points = String(points.end);
   }
 
@@ -120,6 +148,7 @@ export class Plane {
   }
 
   curvePoints(take) {
+    if (this.toolpath) return this.toolpath.points(this.toolpath, this.directions, take);
     const { x, y, z } = this.path, [right, up] = this.directions;
     x.forEach((value, i) => take(along(right, value, y[i], z[i]), along(up, value, y[i], z[i])));
   }

@@ -22,9 +22,9 @@ Index = NDArray[np.intp]
 _CHORD_SHARE = 0.005
 _MOST_PIECES = 4096
 _HALVINGS = 16
-_BESIDE = (2, 6, 6, 24, 96)
-"""Neighbours that are looked at on either side, at first and after each halving: places of noisy chords belong to each
-other roughly only."""
+_BESIDE = (2, 6, 6, 24)
+"""Neighbours that are looked at on either side, at first and after the first halvings: places of noisy chords belong to
+each other roughly only. After the last of these numbers 6 again, around the nearest one found."""
 
 _SURE = 4
 """Halvings after which the chords around a chord surely are those nearest to it."""
@@ -126,10 +126,12 @@ def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
     """Bound (n,) of the distance from every point of each chord of `of` to `to`; halved where above the tolerance."""
     found = np.zeros(of.start.shape[0])
     owner = np.arange(found.size)
-    start, end, low, high = of.start, of.end, of.place_mm[:-1], of.place_mm[1:]
+    start, end = of.start, of.end
+    middle_mm = 0.5 * (of.place_mm[:-1] + of.place_mm[1:])
+    at = np.searchsorted(to.place_mm, middle_mm, side="right") - 1
     for halving in range(_HALVINGS + 1):
-        beside = _BESIDE[min(halving, len(_BESIDE) - 1)]
-        bound, least = _nearest(start, end, 0.5 * (low + high), to, beside)
+        beside = _BESIDE[halving] if halving < len(_BESIDE) else _BESIDE[1]
+        bound, least, at = _nearest(start, end, at, to, beside)
         bound, least = bound + of.error_mm[owner], least + of.error_mm[owner]
         # Where an end itself is too far from all chords around, halving proves nothing more.
         far = (bound > tolerance_mm) & ((least <= tolerance_mm) | (halving < _SURE))
@@ -137,27 +139,29 @@ def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
             np.maximum.at(found, owner, bound)
             break
         np.maximum.at(found, owner[~far], bound[~far])
-        start, end, low, high = (part[far] for part in (start, end, low, high))
-        owner = owner[far]
-        middle, place = 0.5 * (start + end), 0.5 * (low + high)
+        start, end, at, owner = start[far], end[far], at[far], owner[far]
+        middle = 0.5 * (start + end)
         start, end = np.concatenate((start, middle)), np.concatenate((middle, end))
-        low, high = np.concatenate((low, place)), np.concatenate((place, high))
-        owner = np.concatenate((owner, owner))
+        at, owner = np.concatenate((at, at)), np.concatenate((owner, owner))
     return found
 
 
-def _nearest(start: Real, end: Real, place: Real, to: Chords, beside: int) -> tuple[Real, Real]:
-    """Distance (n,) of chords to the nearest of the chords around the same place, that one's error added; and what
-    the farther one of their ends alone has.
+def _nearest(
+    start: Real, end: Real, at: Index, to: Chords, beside: int
+) -> tuple[Real, Real, Index]:
+    """Distance (n,) of chords to the nearest one of `beside` chords on either side of chords `at` (n,), that one's
+    error added; what the farther one of their ends alone has; and which is the nearest one.
     """
     count = to.start.shape[0]
-    at = np.searchsorted(to.place_mm, place, side="right") - 1
-    best, first, last = (np.full(place.size, np.inf) for _ in range(3))
+    best, first, last = (np.full(at.size, np.inf) for _ in range(3))
+    nearest = at
     for offset in range(-beside, beside + 1):
         other = np.clip(at + offset, 0, count - 1)
         a, b = to.start[other], to.end[other]
         from_start = distance_to_chord(start, a, b) + to.error_mm[other]
         from_end = distance_to_chord(end, a, b) + to.error_mm[other]
-        best = np.minimum(best, np.maximum(from_start, from_end))
+        farther = np.maximum(from_start, from_end)
+        nearest = np.where(farther < best, other, nearest)
+        best = np.minimum(best, farther)
         first, last = np.minimum(first, from_start), np.minimum(last, from_end)
-    return best, np.maximum(first, last)
+    return best, np.maximum(first, last), nearest

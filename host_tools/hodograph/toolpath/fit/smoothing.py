@@ -8,6 +8,7 @@ search stays inside them and no decision has to be made which of them bind. The 
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,9 +54,20 @@ def smoothed(
     width = (place[_ORDER:] - place[:-_ORDER]) / _ORDER
     middle = 0.5 * (weight[1:-2] + weight[2:-1])
     coefficient = coefficient * np.sqrt(width * middle)[:, None]
-    coefficient[group[_ORDER:] != group[:-_ORDER]] = 0.0
-    own = stations
-    return least_squares_in_bounds(own.point, own.normal, own.bound, coefficient, barrier, start)
+    shift = np.empty_like(start)
+    # Each curve by itself: the steps of one are not shortened by the bounds of another.
+    edges = [0, *(np.flatnonzero(np.diff(group)) + 1).tolist(), group.size]
+    for first, end in itertools.pairwise(edges):
+        own, rows = slice(first, end), slice(first, max(first, end - _ORDER))
+        shift[own] = least_squares_in_bounds(
+            stations.point[own],
+            stations.normal[own],
+            stations.bound[own],
+            coefficient[rows],
+            barrier,
+            start[own],
+        )
+    return shift
 
 
 def third_differences(place: Real) -> Real:
