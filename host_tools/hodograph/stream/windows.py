@@ -165,6 +165,10 @@ class SectionFeed:
         self.begin_q40 = begin_q40
         self._blocks = blocks
         self._joint = joint
+        self._effort = replace(
+            _EFFORT,
+            fewest=int(np.clip(joint.bytes // PIECE_BYTES, _TAIL_EFFORT.fewest, _EFFORT.fewest)),
+        )
         self._exceeded = exceeded
         self._period_s = 1e-6 * machine.period_us
         self._estimated: tuple[tuple[int, int], _Estimate] | None = None
@@ -425,7 +429,7 @@ class SectionFeed:
                     held,
                     known_to,
                     before_s=self._before_s,
-                    effort=_EFFORT if self._rest_mm is None else _TAIL_EFFORT,
+                    effort=self._effort if self._rest_mm is None else _TAIL_EFFORT,
                 )
                 if found is not None:
                     return measured(curve, found)
