@@ -6,6 +6,7 @@ Paths of the examples are too short to fill a ring: those here repeat their shap
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,7 +34,11 @@ _ALPHA = [(0, 0), (12, 18), (24, 27), (36, 9), (24, -9), (12, 0), (0, 18)]
 _HEART = [(-20, -50), (0, 5), (0, -5), (-20, 50), (40, 50), (75, -5), (75, 5), (40, -50)]
 _PAPER_ACCELERATION_MM_S2, _PAPER_JERK_MM_S3 = 2000.0, 50_000.0
 _ALPHA_PITCH_MM, _STOP_TIME_MS = 30, 2000
-_HELIX_TURNS, _STEP_S = 10, 0.005
+_ALPHAS, _HEARTS, _HELIX_TURNS = 18, 10, 20
+_TRAVEL_MM = 1000.0
+_STEP_S = 0.005
+_HEAD, _ALIGNMENT = 376, 8
+"""Bytes that a block of the ring has before its chunk (struct stream_chunk of firmware/app/stream.c), and its unit."""
 PARTS = (
     "header",
     "shared pieces",
@@ -72,8 +77,8 @@ def jobs(wave: Path) -> Iterator[Streamed]:
 
 def example_jobs(most_bytes: int) -> Iterator[Streamed]:
     """Jobs of the density of the optimal examples, in chunks of at most so many bytes."""
-    alpha = [(x, y + _ALPHA_PITCH_MM * k) for k in range(-4, 4) for x, y in _ALPHA]
-    heart = [(x + k, y) for k in range(6) for x, y in _HEART]
+    alpha = [(x, y + _ALPHA_PITCH_MM * k) for k in range(_ALPHAS) for x, y in _ALPHA]
+    heart = [(x + k, y) for k in range(_HEARTS) for x, y in _HEART]
     for name, polygon in (("alpha", alpha), ("heart", heart)):
         curve = from_control_polygon(np.array(polygon, dtype=np.float64), closed=False).spline
         yield streamed(f"{name}_optimal, repeated", _paper(name), curve, most_bytes)
@@ -84,13 +89,15 @@ def example_jobs(most_bytes: int) -> Iterator[Streamed]:
 
 
 def _paper(name: str) -> Machine:
-    """The machine of a paper's example, with the limits of the example for its axes. They have no more for a fault
-    stop, which may take longer then.
+    """The machine of a paper's example, with the limits of the example for its axes, and travel for all of it.
+    They have no more for a fault stop, which may take longer then.
     """
     machine = load_machine(MACHINES / f"paper_{name}.toml")
     axes = (
         replace(
             axis,
+            travel_min_mm=-_TRAVEL_MM,
+            travel_max_mm=_TRAVEL_MM,
             acceleration_mm_s2=_PAPER_ACCELERATION_MM_S2,
             jerk_mm_s3=_PAPER_JERK_MM_S3,
         )
@@ -141,26 +148,47 @@ def ahead(job: Streamed, ring: int, bytes_per_s: float) -> tuple[float, float]:
     """Motion ahead up to the newest joint in the ring, on the mean and at the least, from when the ring is full for
     the first time until the last chunk is there; s.
 
-    A chunk frees its bytes when its successor is taken over, at its joint. It is sent then, at `bytes_per_s`.
+    A chunk frees its bytes when its successor is taken over, at its joint. Another one is sent as soon as it has room, at
+    `bytes_per_s`.
     """
     joint = np.concatenate(([0.0], np.cumsum(job.new_s)))
-    size = [chunk.size for chunk in job.chunks]
-    there, sent, oldest, used = [], 0.0, 0, 0
-    for bytes_ in size:
-        while used + bytes_ > ring:
-            used -= size[oldest]
-            oldest += 1
-        used += bytes_
-        if oldest == 0:
-            there.append(0.0)
-            continue
-        sent = max(sent, float(joint[oldest])) + bytes_ / bytes_per_s
-        there.append(sent)
+    blocks: deque[_Block] = deque()
+    there: list[float] = []
+    now, full = 0.0, False
+    for number, chunk in enumerate(job.chunks):
+        size = -(-(chunk.size + _HEAD) // _ALIGNMENT) * _ALIGNMENT
+        while (at := _room(blocks, ring, size)) is None:
+            full = True
+            now = max(now, float(joint[blocks.popleft().number + 1]))
+        blocks.append(_Block(number, at, at + size))
+        now = now + chunk.size / bytes_per_s if full else 0.0
+        there.append(now)
     if there[-1] < _STEP_S:
         return float(joint[-1]), float(joint[-1])
     t = np.arange(0.0, there[-1], _STEP_S)
     known = joint[np.searchsorted(np.array(there), t, side="right")]
     return float(np.mean(known - t)), float(np.min(known - t))
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A chunk in the ring, from a byte to one."""
+
+    number: int
+    begin: int
+    end: int
+
+
+def _room(blocks: deque[_Block], ring: int, size: int) -> int | None:
+    """Where a block of this size begins, as firmware/app/chunk_ring.c has it; None: nowhere."""
+    if not blocks:
+        return 0
+    oldest, write = blocks[0].begin, blocks[-1].end
+    if blocks[-1].begin < oldest:
+        return write if oldest - write >= size else None
+    if ring - write >= size:
+        return write
+    return 0 if oldest >= size else None
 
 
 def worst_hold_s(job: Streamed) -> float:

@@ -19,6 +19,8 @@ struct stream_chunk {
 
 #define HEAD_SIZE ((uint32_t)sizeof(struct stream_chunk))
 
+/* Hosts make chunks so small that three with such heads fit the ring (docs/reference/protocol.md 3.7). */
+typedef char stream_assert_head[sizeof(struct stream_chunk) <= 384u ? 1 : -1];
 typedef char
     stream_assert_aligned[sizeof(struct stream_chunk) % CHUNK_RING_ALIGNMENT == 0u ? 1 : -1];
 

@@ -59,7 +59,7 @@ int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s)
         return 1;
     }
     return override_ramp_moves(&plan->ramp) && plan->task == OVERRIDE_DECIDES &&
-           plan->now.override_q57 <= plan->guaranteed_q57 && plan->ahead.end_q32_s <= time_q32_s;
+           plan->now.override_q57 <= plan->guaranteed_q57 && plan->ends_q32_s <= time_q32_s;
 }
 
 void override_plan_carry(struct override_plan *plan, const struct program_override *least,
@@ -69,8 +69,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->guaranteed_q57 = override_of_factor(least->factor_q14);
     plan->ahead.bounds =
         &plan->guaranteed; /* of a window of the program before: not looked at again */
-    plan->ahead.end_q32_s -=
-        plan->ahead.end_q32_s < shift_q32_s ? plan->ahead.end_q32_s : shift_q32_s;
+    plan->ends_q32_s -= plan->ends_q32_s < shift_q32_s ? plan->ends_q32_s : shift_q32_s;
     plan->searched = NOWHERE;
 }
 
@@ -157,6 +156,7 @@ static void begin_search(struct override_plan *plan, enum override_kind kind, in
 {
     plan->task = OVERRIDE_SEARCHES;
     plan->kind = kind;
+    plan->ends_q32_s = UINT64_MAX; /* until one is found that ends where the override may stay */
     plan->target_q57 = target_q57;
     plan->step = OVERRIDE_LOOKS;
     plan->window = 0;
@@ -167,6 +167,7 @@ static void go_back(struct override_plan *plan)
 {
     plan->ticks = plan->back;
     plan->kind = OVERRIDE_RETURN;
+    plan->ends_q32_s = UINT64_MAX;
     plan->stage.end_q57 = plan->guaranteed_q57 - OVERRIDE_SPARE;
     plan->task = OVERRIDE_BEGINS;
 }
@@ -278,13 +279,13 @@ static void measure(struct override_plan *plan, const struct program_clock *cloc
     override_ticks_of(&plan->ticks, &limits, change_q57(plan, from_q57));
 }
 
-/* A ramp to the end of the stage ends, where the override may stay, inside the window. */
-static int fits(const struct override_plan *plan, const struct program_clock *clock)
+/* A ramp to the end of the stage ends, where the override may stay, inside the window. Notes by when. */
+static int fits(struct override_plan *plan, const struct program_clock *clock)
 {
     const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
     const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
-    return qmath_q32_of_q42(clock->time_q42_s) + span + margin_q32(plan, clock) <=
-               plan->ahead.end_q32_s &&
+    plan->ends_q32_s = qmath_q32_of_q42(clock->time_q42_s) + span + margin_q32(plan, clock);
+    return plan->ends_q32_s <= plan->ahead.end_q32_s &&
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
@@ -362,6 +363,7 @@ static void decide_below(struct override_plan *plan, int64_t wanted_q57)
     } else if (qmath_magnitude(change_q57) <= SMALL) {
         plan->ticks = SHORTEST;
         plan->kind = OVERRIDE_SETTLE;
+        plan->ends_q32_s = 0; /* all pieces allow it */
         plan->stage.end_q57 = wanted_q57;
         begin_ramp(plan, qmath_magnitude(change_q57) / 2);
     } else {

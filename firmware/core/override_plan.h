@@ -72,6 +72,7 @@ struct override_plan {
     struct ramp_stage stage;      /* where the next ramp on the way there ends, */
     struct ramp_ticks ticks;      /* and its ticks */
     int64_t high_q57;             /* greatest override on it */
+    uint64_t ends_q32_s;    /* program time by which the ramp looked for last ends; UINT64_MAX: not known */
     uint64_t return_q32_s;  /* above guaranteed_q57: a ramp back is known, if it begins by then, */
     struct ramp_ticks back; /* and its ticks */
 };
@@ -86,8 +87,8 @@ void override_plan_begin_next(struct override_plan *plan, const struct program_o
 /* The most that counts of the commanded override. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 
-/* 1 when nothing on its way depends on pieces that begin at this program time or later: the override is steady, or on a
- * ramp decided with pieces before, and no search is under way. */
+/* 1 when nothing on its way reaches pieces that begin at this program time or later: the override is steady, or on a ramp
+ * that ends before, and no search is under way. */
 int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s);
 
 /* The program of the next chunk takes over: it has these least bounds, and its program time is less by `shift`. Only at

@@ -132,6 +132,24 @@ def test_an_interrupt_rests_on_the_path(
     assert _at_the_end(bench)
 
 
+@pytest.mark.parametrize("gap_s", [0.0, 0.05, 0.4])
+def test_an_impatient_operator(
+    bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path, gap_s: float
+) -> None:
+    """Ctrl-C again and again: the axes rest on the path all the same, and the job goes on from there."""
+    for _ in range(4):
+        under_way.signal(signal.SIGINT)
+        clock.sleep(gap_s + 1e-3)
+    assert under_way.wait(WAIT_S) == 128 + signal.SIGINT
+    clock.sleep(2.0)
+    x, y, z = bench.controller.targets(3)
+    assert (x, z) == (12 * COUNTS_PER_MM, 0)
+    assert 4 * COUNTS_PER_MM <= y < 15 * COUNTS_PER_MM
+    assert stream_status(bench.controller).state == STOPPED
+    _continued(clock, tmp_path)
+    assert _at_the_end(bench)
+
+
 def test_the_page_has_the_contour_error_of_a_job(
     hub: LocalHub, clock: VirtualClock, tmp_path: Path
 ) -> None:

@@ -33,6 +33,7 @@ from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
 from ..pipeline import Pipeline, program_limits
 from ..program.inspection import RING_BYTES
+from ..stream.chunk import largest_chunk
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import JOURNAL_ELSEWHERE, Entry, Journal, journal_lock, load, mark
 from ..stream.output_check import require_outputs
@@ -53,9 +54,6 @@ from .output import (
     size_text,
 )
 from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
-
-_RING_SHARE = 3
-"""A chunk of a third of the ring always finds room in the end (docs/reference/protocol.md 3.7)."""
 
 _EVERY_S = 5.0
 _FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
@@ -225,8 +223,7 @@ def _run(
             )
         journal = None if entry is None else Journal(journal_file(options), entry)
         close_stream(at.controller)
-        room = at.controller.read(STREAM, 7) // _RING_SHARE
-        most = min(room, CHUNK_BYTES)
+        most = min(largest_chunk(at.controller.read(STREAM, 7)), CHUNK_BYTES)
         if plan is None:
             plan = stack.enter_context(planned(begin))
         plan.allow(most)
@@ -373,7 +370,7 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     found: list[StreamedMotion] = []
     begin_s = time.perf_counter()
     with (
-        JobPlan(job, RING_BYTES // _RING_SHARE, 1, Place(), processes=_processes(options)) as plan,
+        JobPlan(job, largest_chunk(RING_BYTES), 1, Place(), processes=_processes(options)) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():

@@ -46,11 +46,18 @@ CHUNK_S = 1.0
 CHUNK_BYTES = 24 * 1024 - 64
 """The largest chunk, where a third of the ring is more."""
 
-_NEW_SHARE = 0.5
-"""Of these bytes, for what is new: the rest is for the repeated part and the tail."""
+_NEW_SHARE = 0.35
+"""Of these bytes, for what is new. The rest is for the repeated part and the tail, and a ring that is full has room sooner
+for a smaller chunk.
+"""
 
 LATENESS_S, SHARED_S = 0.02, 0.1
 """A takeover may be so late without effect on any change of the override, and on a motion at 100 %."""
+
+RAMP_S = 0.2
+"""Fewer pieces than LEAST_SHARED_PIECES are shared where they last so long: a change of the override whose ramp takes
+longer delays the takeover.
+"""
 
 FEWEST_SHARED_PIECES = 4
 """Shared where LEAST_SHARED_PIECES take more bytes than a chunk may have: pieces that are long, with many segments. A
@@ -151,8 +158,9 @@ class _Kept:
             return self, 0, 0
         count = len(self.codes)
         times = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(self.pieces.duration_q32_s)))
-        looked = max(count - least, 0)
-        late = min(times[looked] - round(LATENESS_S * 2**32), times[-1] - round(SHARED_S * 2**32))
+        looked, fewest = (times[max(count - n, 0)] for n in (least, FEWEST_SHARED_PIECES))
+        looked = min(max(looked, times[-1] - round(RAMP_S * 2**32)), fewest)
+        late = min(looked - round(LATENESS_S * 2**32), times[-1] - round(SHARED_S * 2**32))
         shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
         kept = _Kept(taken(self.pieces, slice(shift, None)), self.codes[shift:])
         return kept, shift, int(times[shift])

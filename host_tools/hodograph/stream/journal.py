@@ -155,7 +155,7 @@ def load(file: Path) -> Entry:
         ) from None
     except OSError as error:
         raise InputError(f"{file}: the journal cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
     if entry.done:
         raise InputError(f"{file}: the last job came to its end: nothing to continue")
@@ -171,6 +171,8 @@ def _check(entry: Entry) -> None:
     """Raises KeyError and TypeError: something is missing, or is not what it should be."""
     whole = (entry.job0, entry.section, entry.arc_q40, entry.committed_q40, entry.first)
     if not all(isinstance(one, int) for one in whole) or not isinstance(entry.machine, str):
+        raise TypeError
+    if any(not isinstance(one.path, str) or "\0" in one.path for one in entry.files):
         raise TypeError
     if not isinstance(entry.options["tolerance_mm"], int | float):
         raise TypeError

@@ -81,9 +81,10 @@ def simulate_chunks(
         axes = axes or chunk.program.axis_count
         sections += chunk.header.rest is not None
         while stream.sequence != chunk.header.sequence:
-            if stream.waits and chunk.header.rest is None:
-                raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
+            waited = stream.waits and chunk.header.rest is None
             ticks += run(until_rest=True)
+            if waited and stream.sequence != chunk.header.sequence:
+                raise RunError(f"chunk {chunk.header.sequence} is not taken over: report a bug")
     while stream.state is not State.ENDED:
         ticks += run()
     return StreamedMotion(

@@ -30,6 +30,7 @@ from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli.stream_command import _free_rate, journal_file
 from hodograph.config import load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError
+from hodograph.stream.chunk import largest_chunk
 from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
 from hodograph.stream.plan import PlannedSection
 from hodograph.stream.sender import Sender
@@ -216,8 +217,38 @@ def test_half_a_journal_is_refused(tmp_path: Path) -> None:
     part.write_text("G1 X1 F100\n")
     journal = Journal(tmp_path / "stream.json", _entry(part))
     text = journal.file.read_text()
-    for end in range(0, len(text) - 2, 7):
+    for end in range(len(text) - 2):
         journal.file.write_text(text[:end])
+        with pytest.raises(InputError, match=r"stream\.json: is no journal"):
+            load(journal.file)
+
+
+def test_three_of_the_largest_chunk_fit_any_ring() -> None:
+    """With the heads that the controller puts before them, in whole units: one of them at any place leaves room for
+    another one.
+    """
+    for head in (8, 376, 384):
+        for ring in range(1024, 49 * 1024, 8):
+            block = -(-(largest_chunk(ring - head) + head) // 8) * 8
+            assert block <= head or 3 * block <= ring
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a":' * 100_000, "null", "\0", "[]", '"a"'])
+def test_other_json_is_no_journal(tmp_path: Path, text: str) -> None:
+    file = tmp_path / "stream.json"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"stream\.json: is no journal"):
+        load(file)
+
+
+def test_a_journal_with_an_impossible_name(tmp_path: Path) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("G1 X1 F100\n")
+    journal = Journal(tmp_path / "stream.json", _entry(part))
+    text = json.loads(journal.file.read_text())
+    for name in ("part\0.ngc", 7):
+        text["files"][0]["path"] = name
+        journal.file.write_text(json.dumps(text))
         with pytest.raises(InputError, match=r"stream\.json: is no journal"):
             load(journal.file)
 

@@ -23,7 +23,7 @@ from hodograph.program.check import check_image
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream import reading
 from hodograph.stream.chunk import Chunk, shared_fault
-from hodograph.stream.chunks import SectionChunks
+from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
 from hodograph.stream.geometry import Block, blocks_from, curve_behind, with_joints
 from hodograph.stream.journal import Entry
 from hodograph.stream.output_check import require_outputs
@@ -126,7 +126,7 @@ def test_setpoints_are_those_of_one_program(
     (chunks,) = _sections(file, machine)
     assert len(chunks) > 2
     assert {chunk.program.axis_count for chunk in chunks} == {5}
-    _verify(chunks, machine)
+    _verify(chunks, machine, shared=FEWEST_SHARED_PIECES)
 
 
 @pytest.mark.long

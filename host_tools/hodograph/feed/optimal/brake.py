@@ -17,7 +17,7 @@ from ..pieces import LONGEST_PIECE_MM
 from .track import Ends
 from .window import State
 
-_PIECE_S = 0.02
+_PIECE_S = 0.05
 """About how long a piece lasts."""
 _FEWEST, _MOST = 3, 12
 _LEAST_PERIODS = 3.0

@@ -17,6 +17,9 @@ Real = NDArray[np.float64]
 _SHARE = 0.6
 """Of acceleration limits, which the jerk does not let a feed use all the time."""
 
+FEWEST_INTERVALS = 12
+"""Of a plan that takes long enough."""
+
 _SAMPLES = 16
 _END_SAMPLES = 24
 _PER_SEGMENT = 4
@@ -195,15 +198,24 @@ def _distance(t: Real, places: Real) -> Real:
 
 
 def choose_knots(
-    spline: Curve, limits: PlanLimits, s: Real, t: Real, step_s: Real, period_s: float
+    spline: Curve,
+    limits: PlanLimits,
+    s: Real,
+    t: Real,
+    step_s: Real,
+    period_s: float,
+    fewest: int = FEWEST_INTERVALS,
 ) -> Real:
-    """Knots in arc length: at joints and ends of zones where these are far enough apart in time, evenly between."""
+    """Knots in arc length: at joints and ends of zones where these are far enough apart in time, evenly between.
+
+    `fewest`: intervals at least, where the time is enough for them.
+    """
     low, high = float(s[0]), float(s[-1])
     density = 1.0 / step_s
     count = np.concatenate(
         (np.zeros(1), np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(t)))
     )
-    least = min(12.0, max(3.0, t[-1] / (1.7 * period_s)))
+    least = min(float(fewest), max(3.0, t[-1] / (1.7 * period_s)))
     if count[-1] < least:
         count *= least / count[-1]
     joints = spline.segment_starts_mm

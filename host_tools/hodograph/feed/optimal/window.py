@@ -14,7 +14,7 @@ from ...spline.frames import Curve
 from ..limits import FeedZone, ReserveZone
 from .constraints import GridKinematics, make_points
 from .grid import GAUSS_W, GAUSS_X, Grid, corners, make_grid, squared_feed
-from .knots import FirstEstimate, choose_knots, first_estimate, refined
+from .knots import FEWEST_INTERVALS, FirstEstimate, choose_knots, first_estimate, refined
 from .plan_limits import PlanLimits
 from .rows import JERK_ROW, About, Rows, Selection, make_rows
 from .solver import TOLERANCE, Problem, solve
@@ -56,11 +56,15 @@ class Effort:
     gain       share of the time that a further round has to gain
     patience   rounds before all points have rows, which takes some ten times as long
     tolerance  of the quadratic programs. A solution ends short of its limits by about as much.
+    spacing    how much longer intervals are than in a plan that is made once
+    fewest     intervals at least, where the time is enough for them
     """
 
     gain: float = 1e-4
     patience: int = 6
     tolerance: float = TOLERANCE
+    spacing: float = 1.0
+    fewest: int = FEWEST_INTERVALS
 
 
 _WHOLE = Effort()
@@ -142,13 +146,16 @@ def plan_window(
               whole program
     """
     guess = first_estimate(spline, limits, low, high, None if start is None else start.q, period_s)
+    guess = replace(
+        guess, step_s=guess.step_s * effort.spacing, fine_s=guess.fine_s * effort.spacing
+    )
     s, t, step = guess.s, guess.t, guess.step_s
     best: Solution | None = None
     about: Feed = guess.squared_feed
     if known is not None:
         about = _blend(known, known_to, guess)
     for trial in range(_MOST_TRIALS):
-        knots = choose_knots(spline, limits, s, t, step, period_s)
+        knots = choose_knots(spline, limits, s, t, step, period_s, effort.fewest)
         if known is not None:
             knots = _same_knots(knots, known, known_to)
         last = hurried or trial == _MOST_TRIALS - 1
