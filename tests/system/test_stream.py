@@ -186,16 +186,17 @@ def test_hold_and_resume_while_chunks_come(stream: Stream) -> None:
     stream.expect_end(0)
 
 
-@pytest.mark.parametrize("after_s", [long(0.4), long(1.1), 1.7, long(2.6)])
-def test_a_stop_is_final(stream: Stream, after_s: float) -> None:
-    stream.send(stream.parts[0])
+@pytest.mark.parametrize(
+    ("after_s", "chunks_sent"), [long(0.4, 1), long(1.1, 2), (1.7, 1), (1.7, 2), long(2.6, 1)]
+)
+def test_a_stop_is_final(stream: Stream, after_s: float, chunks_sent: int) -> None:
+    """Whether or not the next chunk is there already; what comes later is refused."""
+    for part in stream.parts[:chunks_sent]:
+        stream.send(part)
     stream.start()
     stream.bench.clock.sleep(after_s)
     stream.command(STOP)
-    try:
-        stream.send(stream.parts[1])  # a takeover is pending, or it comes too late
-    except SdoAbortedError:
-        assert stream.read(REFUSED) == -89
+    assert stream.refused(stream.parts[chunks_sent]) == -89
     assert settled(stream.bench) == (READY, 0, 0)
     stream.until(lambda: stream.read(STATE_SUB) == STOPPED, 1.0)
     rests_mm = stream.read(ARC) / 2**40

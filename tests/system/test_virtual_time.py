@@ -100,18 +100,47 @@ def test_the_same_bytes_with_any_process_stopped(scenario: str) -> None:
     assert len(stopped) >= 3  # hub, injector, drives, controller: those that lived for long enough
 
 
+@contextlib.contextmanager
+def one_core_only() -> Iterator[None]:
+    """This process and all that it starts."""
+    cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, cores)
+
+
 def test_the_same_bytes_at_any_load() -> None:
     """Beside four busy processes, and all on one core."""
     scenario = "drive-fault"
     plain = bus_log(scenario)
     with busy_processes(4):
         assert bus_log(scenario) == plain
-    cores = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(cores)})
-    try:
+    with one_core_only():
         assert bus_log(scenario) == plain
-    finally:
-        os.sched_setaffinity(0, cores)
+
+
+@pytest.mark.long
+def test_the_same_bytes_of_ten_runs_at_different_loads() -> None:
+    """Alone, beside one to eight busy processes, all on one core, and with each process stopped for a second."""
+    busy = [(busy_processes(count),) for count in (0, 1, 2, 4, 8)]
+    conditions: list[tuple[contextlib.AbstractContextManager[object], ...]] = [
+        *busy,
+        (one_core_only(),),
+        (one_core_only(), busy_processes(4)),
+        (stopping_processes(),),
+        (stopping_processes(), busy_processes(4)),
+        (one_core_only(), stopping_processes(), busy_processes(2)),
+    ]
+    logs = []
+    for condition in conditions:
+        with contextlib.ExitStack() as stack:
+            for part in condition:
+                stack.enter_context(part)
+            logs.append(bus_log("drive-fault"))
+    assert logs[0].count(b"\n") > 5000
+    assert [log == logs[0] for log in logs] == [True] * 10
 
 
 def test_time_stands_still_for_who_computes(make_bench: MakeBench) -> None:

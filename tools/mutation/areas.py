@@ -48,6 +48,17 @@ AREAS = (
     _python("spline"),
     _python("feed"),
     _python("program"),
+    # Not what has a process of its own, and not files of minutes.
+    _python(
+        "stream",
+        "tests/host/stream/test_chunks.py",
+        "tests/host/stream/test_outputs.py",
+        "tests/host/stream/test_paths.py",
+        "tests/host/stream/test_reading.py",
+        "tests/host/stream/test_resuming.py",
+        "tests/host/stream/test_sending.py",
+        "tests/host/stream/test_store.py",
+    ),
     _python("verify", "tests/host/verify", "tests/host/cli/test_cli_verify.py"),
     # What needs no bus: the rest is driven by tests/system.
     Area(
