@@ -19,8 +19,8 @@ EXTRA_TURNING_RAD = 1.25 * np.pi
 _TIGHT = 1e3
 _TIGHTER_THAN_GUIDE = 1e2
 _CUSP = 1e6
-_STRAIGHT = 1e-9
-"""Bending energy times length of a curve without a bend, also of one that reverses on a straight line: its bends lie
+_STRAIGHT = 1e-6
+"""Bending energy times length of an arc of 1e-3 rad. A guide that reverses on a straight line has less: its bends lie
 between the samples.
 """
 
@@ -31,7 +31,7 @@ class Verdict:
 
     extra_turning_rad   greatest excess of total turning over the guide's, in windows of three spans
                         that bend more than the guide does
-    bending_ratio       bending energy of the whole beside the guide's; 1 where that has no bend
+    bending_ratio       bending energy of the whole beside the guide's; 1 where that bends by less than 1e-3 rad
     loops, cusps        middle spans of windows with a loop of their own, spans that turn on the
                         spot; the worst first
     """
