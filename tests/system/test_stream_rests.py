@@ -11,12 +11,14 @@ from bench import EXAMPLES
 from commands import result
 from hodograph.bus.capture.decode import RPDO1, SYNC_ID
 from hodograph.bus.capture.recordings import read_recording
+from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import connect
 from hodograph.bus.sdo.objects import HELD, RESUME
 from hodograph.bus.sdo.stream_channel import PROGRAM_STOP, stream_status
 from hodograph.cli import stream_command
 from hodograph.cli.main import main
+from hodograph.config import load_machine
 from hodograph.job_run import BusCheck
 
 MILL = EXAMPLES / "machines" / "mill.toml"
@@ -104,3 +106,20 @@ def test_axes_that_turn_alone_are_jobs_between_the_others(
         own = frames["data"][frames["id"] == RPDO1 + node][:, 2:6].copy().view("<i4")[:, 0]
         ends.append(int(own[-1]))
     assert ends == [6_000_000, 0, 0, 300_000, 2_300_000]
+
+
+def test_a_list_of_paths_turns_axes_alone_between_the_others(
+    hub: LocalHub, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`run` streams it: each path begins where the one before ends, so that no axis is moved between them."""
+    facets, log = EXAMPLES / "facets.toml", tmp_path / "bus.log"
+    found = result(capsys, "run", str(facets), "--record", str(log), "--json")
+    assert (found["sections"], found["chunks"], found["underruns"]) == (3, 3, 0)
+    machine = load_machine(EXAMPLES / "machines" / "mill_five_axes.toml")
+    frames = read_recording(log, None)
+    assert not find_jumps(frames, machine.nodes, step_limits(machine))
+    ends = [
+        int(frames["data"][frames["id"] == RPDO1 + node][:, 2:6].copy().view("<i4")[-1, 0])
+        for node in machine.nodes
+    ]
+    assert ends == [-20_000_000, 30_000_000, 2_000_000, 1_200_000, 12_000_000]

@@ -27,6 +27,7 @@ pytestmark = pytest.mark.long
 MILL = EXAMPLES / "machines" / "mill.toml"
 WAIT_S = 120.0
 COUNTS_PER_MM = 1_000_000
+COUNTS_PER_DEG = 100_000
 JOB = "F6000\nG1 X12\nG4 P0.2\nF300\nG1 Y15\nG4 P0.1\nF6000\nG1 X0 Y0 Z-3\nM2\n"
 """Three sections: 12 mm along x, 15 mm along y at 5 mm/s, and back."""
 
@@ -148,6 +149,30 @@ def test_an_impatient_operator(
     assert stream_status(bench.controller).state == STOPPED
     _continued(clock, tmp_path)
     assert _at_the_end(bench)
+
+
+def test_a_list_of_paths_goes_on_where_axes_turn_alone(
+    make_bench: MakeBench, clock: VirtualClock, tmp_path: Path
+) -> None:
+    five = EXAMPLES / "machines" / "mill_five_axes.toml"
+    bench = make_bench(file=five)
+    journal = ("--journal", str(tmp_path / "stream.json"))
+    with running(
+        clock, "stream", str(EXAMPLES / "facets.toml"), *journal, name="stream"
+    ) as command:
+        end_s = clock.now_s() + WAIT_S
+        while bench.controller.targets(5)[4] < 30 * COUNTS_PER_DEG:
+            assert clock.now_s() < end_s
+            assert command.child.poll() is None, command.err
+            clock.sleep(0.02)
+        command.signal(signal.SIGINT)
+        assert command.wait(WAIT_S) == 128 + signal.SIGINT
+    *stands, _, c = bench.controller.targets(5)
+    assert stands == [22 * COUNTS_PER_MM, 32 * COUNTS_PER_MM, 10 * COUNTS_PER_MM]
+    assert 30 * COUNTS_PER_DEG <= c < 120 * COUNTS_PER_DEG
+    _continued(clock, tmp_path)
+    ends = [-20 * COUNTS_PER_MM, 30 * COUNTS_PER_MM, 2 * COUNTS_PER_MM]
+    assert bench.controller.targets(5) == [*ends, 12 * COUNTS_PER_DEG, 120 * COUNTS_PER_DEG]
 
 
 def test_the_page_has_the_contour_error_of_a_job(

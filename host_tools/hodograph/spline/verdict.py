@@ -19,6 +19,10 @@ EXTRA_TURNING_RAD = 1.25 * np.pi
 _TIGHT = 1e3
 _TIGHTER_THAN_GUIDE = 1e2
 _CUSP = 1e6
+_STRAIGHT = 1e-6
+"""Bending energy times length of an arc of 1e-3 rad. A guide that reverses on a straight line has less: its bends lie
+between the samples.
+"""
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class Verdict:
 
     extra_turning_rad   greatest excess of total turning over the guide's, in windows of three spans
                         that bend more than the guide does
-    bending_ratio       bending energy of the whole beside the guide's
+    bending_ratio       bending energy of the whole beside the guide's; 1 where that bends by less than 1e-3 rad
     loops, cusps        middle spans of windows with a loop of their own, spans that turn on the
                         spot; the worst first
     """
@@ -58,7 +62,8 @@ def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
 def compared(own: Real, guide: Real, extra: Real, length: Real, closed: bool) -> Verdict:
     """From bending energies (M,) of spline and guide, extra turning in windows and lengths of spans."""
     total = float(guide.sum())
-    ratio = float(own.sum()) / total if total > 0.0 else 1.0
+    bent = total * float(length.sum()) > _STRAIGHT
+    ratio = float(own.sum()) / total if bent else 1.0
     extra[windows(own, closed) < windows(guide, closed)] = 0.0
     return Verdict(
         max(float(extra.max()), 0.0),

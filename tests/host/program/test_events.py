@@ -237,6 +237,70 @@ def test_override_and_holds_keep_the_place(tmp_path: Path, percent: int, hold: i
     assert rows["digital"][-1] == 1
 
 
+@pytest.fixture(scope="module")
+def space(tmp_path_factory: pytest.TempPathFactory) -> Pipeline:
+    """Five axes, an event at the start, one at the end, and one exactly where a setpoint lies."""
+    folder = tmp_path_factory.mktemp("space")
+    outputs = MACHINE.read_text().partition("[outputs]")[2].partition("[[axis]]")[0]
+    text = (ROOT / "examples" / "machines" / "mill_five_axes.toml").read_text()
+    text = text.replace("../drives", f"{ROOT}/examples/drives")
+    machine = folder / "five.toml"
+    machine.write_text(text.replace("[[axis]]", f"[outputs]{outputs}[[axis]]", 1))
+    points = "[[0, 0, 0, 0, 0], [10, 3, 1, 5, 10], [20, 0, 0, 10, 0]]"
+    head = (
+        f"[path]\nclosed = false\nthrough = {points}\n[feed]\nprofile = 'optimal'\nnominal_mm_s = 50\n"
+        f"[limits]\nreserve = 0.3\naxis.velocity_mm_s = [100, 100, 100, 90, 90]\n[machine]\nfile = '{machine}'\n"
+    )
+    file = folder / "path.toml"
+    file.write_text(head)
+    plain = load_pipeline(file, allow_space=True)
+    ticks = simulate_on(plain.machine, plain.image).arc_length_mm
+    file.write_text(
+        head
+        + output(name="needle", at_mm=0.0, on=True)
+        + output(name="valve", at_mm=float(ticks[ticks.size // 3]), on=True)
+        + output(name="needle", at_fraction=1.0, on=False)
+    )
+    return load_pipeline(file, allow_space=True)
+
+
+NEEDLE, VALVE = 1 << 1, 1 << 0
+
+
+@pytest.mark.parametrize("ahead", [-1, 0, 1, 2, 3])
+@pytest.mark.parametrize("stop", ["hold", "override"])
+def test_holds_and_an_override_of_0_beside_an_event(space: Pipeline, stop: str, ahead: int) -> None:
+    """The command comes so many ticks before the setpoint that is exactly at the event."""
+    program = NativeProgram(space.image)
+    program.require()
+    events = space.program.events
+    place, end = (int(events["place"][k]) for k in (1, 2))
+    assert (int(events["place"][0]), end) == (0, space.program.length_q40)
+    machine = space.machine
+    models, counts = machine.models(machine.path_axes), machine.path_counts
+
+    def moved(orders: list[OfflineOrder]) -> np.ndarray:
+        simulation = OfflineSimulation(program, "fixed", models, counts, None, (), orders)
+        rows = np.zeros(3 * program.ticks + 2000, dtype=ROW)
+        simulation.run(rows)
+        return rows
+
+    straight = moved([])
+    at = int((straight["arc_length_q40_mm"] >= place).argmax())
+    assert straight["arc_length_q40_mm"][at] == place, "the event lies at a setpoint"
+    begin, goes_on = at - ahead, at - ahead + 1000
+    if stop == "hold":
+        orders = [OfflineOrder("hold", begin), OfflineOrder("resume", goes_on)]
+    else:
+        orders = [OfflineOrder("override", begin, 0), OfflineOrder("override", goes_on, 100)]
+    rows = moved(orders)
+    arc = rows["arc_length_q40_mm"]
+    assert arc[begin + 990] == arc[begin + 980] < end, "at rest"
+    assert np.array_equal((rows["digital"] & VALVE) != 0, arc >= place)
+    assert np.array_equal((rows["digital"] & NEEDLE) != 0, arc < end)
+    assert arc[-1] == end
+
+
 @pytest.mark.parametrize("kind", ["stop", "fault-stop"])
 def test_a_stop_switches_off(tmp_path: Path, kind: str) -> None:
     outputs = output(name="needle", at_mm=0, on=True) + output(name="valve", at_mm=21, on=True)

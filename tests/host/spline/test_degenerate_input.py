@@ -45,6 +45,11 @@ CURVED: dict[str, tuple[Points, bool]] = {
     "nearly straight up": ([[0, 0, 0], [1e-9, 0, 5], [0, 1e-9, 20]], False),
     "closed, three points": ([[0, 0, 0], [10, 0, 2], [5, 9, 4]], True),
     "closed, on a line": ([[0, 0, 0], [10, 0, 2], [20, 0, 4]], True),
+    "there and back, twice": ([[0, 0, 0], [10, 3, 2], [0, 0, 0], [10, 3, 2]], False),
+    "closed, nearly straight up": (
+        [[0, 0, 0], [1e-9, 0, 10], [0, 1e-9, 20], [1e-9, 1e-9, 30]],
+        True,
+    ),
     "closed, end repeated": ([*LOOP, [0, 0, 0]], True),
 }
 REFUSED: dict[str, tuple[str, Points, bool, str]] = {
@@ -114,9 +119,11 @@ def solved(
     file = folder / "path.toml"
     flag = str(closed).lower()
     file.write_text(f"[path]\nclosed = {flag}\n{key} = {[list(map(float, p)) for p in points]}\n")
-    found = load_path_file(file)
-    assert isinstance(found.given_path, SpacePathSpec)
-    curve = pipeline_of(found).found_spline.spline
+    given = load_path_file(file)
+    assert isinstance(given.given_path, SpacePathSpec)
+    found = pipeline_of(given).found_spline
+    assert found.bending_ratio < 2.0, "also where the guide reverses on a straight line"
+    curve = found.spline
     assert isinstance(curve, SpatialPHSpline)
     return curve
 
