@@ -141,13 +141,13 @@ static uint32_t check_entry(const struct pdo_map *map, uint32_t mapped)
     const uint16_t index = (uint16_t)(mapped >> 16);
     const uint8_t sub = (uint8_t)((mapped >> 8) & 0xFFu);
     const struct od_entry *entry = od_find(map->od, index, sub);
-    const unsigned way = map->index >= FIRST_SENT ? OD_READ : OD_WRITE;
+    const unsigned direction = map->index >= FIRST_SENT ? OD_READ : OD_WRITE;
 
     if (entry == NULL) {
         return od_missing(map->od, index, sub);
     }
-    if ((entry->access & OD_MAPPABLE) == 0 || (entry->access & way) == 0 || entry->size == 0 ||
-        (mapped & 0xFFu) != 8u * entry->size) {
+    if ((entry->access & OD_MAPPABLE) == 0 || (entry->access & direction) == 0 ||
+        entry->size == 0 || (mapped & 0xFFu) != 8u * entry->size) {
         return SDO_ABORT_NOT_MAPPABLE;
     }
     return SDO_OK;

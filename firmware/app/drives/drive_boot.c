@@ -80,7 +80,7 @@ static void judge_read(struct drive_boot *boot)
 {
     const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
     if (as_wanted(&boot->op, value)) {
-        drive_properties_read(boot->configuration.properties, boot->op.fact, value);
+        drive_properties_read(boot->configuration.properties, boot->op.property, value);
         advance(boot);
     } else if (boot->reading_back) {
         refused(boot, boot->refused_code, value);

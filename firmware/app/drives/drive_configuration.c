@@ -43,12 +43,12 @@ enum drive_row_kind {
     ROW_PRE_OPERATIONAL, /* NMT */
     ROW_EXPECT,          /* reads `size` bytes: must be the value */
     ROW_NEED_BITS,       /* reads: must contain the bits of the value */
-    ROW_LEARN,           /* reads enum drive_fact `argument`, if there is one */
+    ROW_READ,            /* reads enum drive_property `argument`, if there is one */
     ROW_MUST,            /* writes */
     ROW_MAY,             /* writes; a drive without the object is fine */
     ROW_TRY,             /* writes; a refusal is fine */
     ROW_PDO,             /* drive_pdos[argument] */
-    ROW_PDO_MAY,         /* the same; left off (and its fact unknown) when refused */
+    ROW_PDO_MAY,         /* the same; left off (and its property unknown) when refused */
     ROW_PDO_OFFSET,      /* the same; only when an object is missing or cannot be mapped */
     ROW_PDO_OUTPUTS,     /* RPDO1 of the I/O module */
 };
@@ -63,7 +63,7 @@ enum drive_source {
     FROM_SETPOINT_TIMEOUT,
     FROM_MODULE_VENDOR,
     FROM_MODULE_PRODUCT,
-    FROM_OWN_NODE, /* 0x1016: this controller, silent for `argument` ms */
+    FROM_OWN_NODE, /* 0x1016: this controller: no heartbeat for `argument` ms */
 };
 
 struct drive_row {
@@ -89,7 +89,7 @@ struct drive_pdo {
     uint8_t inhibit_ms;            /* TPDO; 0: the drive's own */
     bool event_timer;              /* RPDO: the drive watches for it (0x2004 sub 10) */
     uint32_t entries[PDO_ENTRIES]; /* index << 16 | sub << 8 | bits */
-    uint8_t fact;                  /* enum drive_fact: known of a drive that has taken all of it */
+    uint8_t property; /* enum drive_property: known of a drive that has taken all of it */
 };
 
 #define PROFILE_DRIVE 402u /* low half of 0x1000 */
@@ -119,7 +119,7 @@ enum pdo_number {
     TPDO1_OFF,
 };
 
-/* docs/reference/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, fact */
+/* docs/reference/protocol.md section 2: communication, cob, type, count, inhibit_ms, event_timer, entries, property */
 static const struct drive_pdo drive_pdos[] = {
     [RPDO1] = {0x1400,
                COB_RPDO1,
@@ -128,7 +128,7 @@ static const struct drive_pdo drive_pdos[] = {
                0,
                true,
                {0x60400010, 0x607A0020, 0, 0, 0},
-               DRIVE_NO_FACT},
+               DRIVE_NO_PROPERTY},
     [RPDO1_TORQUE] = {0x1400,
                       COB_RPDO1,
                       SYNCHRONOUS,
@@ -145,9 +145,9 @@ static const struct drive_pdo drive_pdos[] = {
                         false,
                         {0x60B10020, 0, 0, 0, 0},
                         DRIVE_VELOCITY_MAPPED},
-    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [RPDO2_OFF] = {0x1401, COB_RPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
+    [RPDO3_OFF] = {0x1402, COB_RPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
+    [RPDO4_OFF] = {0x1403, COB_RPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
     [TPDO1] = {0x1800,
                COB_TPDO1,
                SYNCHRONOUS,
@@ -155,11 +155,11 @@ static const struct drive_pdo drive_pdos[] = {
                0,
                false,
                {0x60410010, 0x60640020, 0, 0, 0},
-               DRIVE_NO_FACT},
+               DRIVE_NO_PROPERTY},
     [TPDO2_VOLTS] =
-        {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+        {0x1801, COB_TPDO2, SYNCHRONOUS, 1, 0, false, {0x21000010, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
+    [TPDO2_OFF] = {0x1801, COB_TPDO2, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
+    [TPDO3_OFF] = {0x1802, COB_TPDO3, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
     [TPDO3_INPUTS] = {0x1802,
                       COB_TPDO3,
                       ON_CHANGE,
@@ -168,8 +168,8 @@ static const struct drive_pdo drive_pdos[] = {
                       false,
                       {0x60FD0020, 0, 0, 0, 0},
                       DRIVE_INPUTS_MAPPED},
-    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
-    [TPDO1_OFF] = {0x1800, COB_TPDO1, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_FACT},
+    [TPDO4_OFF] = {0x1803, COB_TPDO4, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
+    [TPDO1_OFF] = {0x1800, COB_TPDO1, 0, 0, 0, false, {0, 0, 0, 0, 0}, DRIVE_NO_PROPERTY},
 };
 
 #define FIELD(name) offsetof(struct config_axis, name)
@@ -180,17 +180,17 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
     /* what is it? */
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_DRIVE},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 3, 4, FROM_ROW, DRIVE_REVISION},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 4, 4, FROM_ROW, DRIVE_SERIAL},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 3, 4, FROM_ROW, DRIVE_REVISION},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 4, 4, FROM_ROW, DRIVE_SERIAL},
     {WHEN_VENDOR, ROW_EXPECT, 0x1018, 1, 4, FROM_AXIS, FIELD(expected_vendor)},
     {WHEN_PRODUCT, ROW_EXPECT, 0x1018, 2, 4, FROM_AXIS, FIELD(expected_product)},
     {WHEN_REVISION, ROW_EXPECT, 0x1018, 3, 4, FROM_AXIS, FIELD(expected_revision)},
-    {WHEN_ALWAYS, ROW_LEARN, 0x6502, 0, 4, FROM_ROW, DRIVE_MODES},
+    {WHEN_ALWAYS, ROW_READ, 0x6502, 0, 4, FROM_ROW, DRIVE_MODES},
     {WHEN_ALWAYS, ROW_NEED_BITS, 0x6502, 0, 4, FROM_ROW, CIA402_SUPPORTS(CIA402_MODE_CSP)},
-    {WHEN_ALWAYS, ROW_LEARN, 0x60FD, 0, 4, FROM_ROW, DRIVE_INPUTS},
-    {WHEN_HOMING, ROW_LEARN, 0x6064, 0, 4, FROM_ROW, DRIVE_POSITION},
+    {WHEN_ALWAYS, ROW_READ, 0x60FD, 0, 4, FROM_ROW, DRIVE_INPUTS},
+    {WHEN_HOMING, ROW_READ, 0x6064, 0, 4, FROM_ROW, DRIVE_POSITION},
     /* a drive that was left enabled, and whose PDOs are not ours: it stops, and goes off */
     {WHEN_ALWAYS, ROW_TRY, 0x6040, 0, 2, FROM_ROW, CIA402_QUICK_STOP},
     /* SYNC; its counter may change only while the period is 0 (CiA 301, 0x1019) */
@@ -255,8 +255,8 @@ static const struct drive_row drive_rows[] = {
 static const struct drive_row module_rows[] = {
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_IO},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
-    {WHEN_ALWAYS, ROW_LEARN, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
+    {WHEN_ALWAYS, ROW_READ, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
     {WHEN_MODULE_VENDOR, ROW_EXPECT, 0x1018, 1, 4, FROM_MODULE_VENDOR, 0},
     {WHEN_MODULE_PRODUCT, ROW_EXPECT, 0x1018, 2, 4, FROM_MODULE_PRODUCT, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x1005, 0, 4, FROM_ROW, COB_SYNC},
@@ -309,7 +309,7 @@ static void write_number(struct drive_op *op, uint32_t index, uint32_t sub, uint
                             .index = (uint16_t)index,
                             .sub = (uint8_t)sub,
                             .size = size,
-                            .fact = DRIVE_NO_FACT,
+                            .property = DRIVE_NO_PROPERTY,
                             .value = value,
                             .mask = UINT32_MAX};
 }
@@ -531,7 +531,7 @@ static const enum drive_op_kind kinds[] = {
     [ROW_PRE_OPERATIONAL] = DRIVE_OP_NMT_PRE_OPERATIONAL,
     [ROW_EXPECT] = DRIVE_OP_READ,
     [ROW_NEED_BITS] = DRIVE_OP_READ,
-    [ROW_LEARN] = DRIVE_OP_READ,
+    [ROW_READ] = DRIVE_OP_READ,
     [ROW_MUST] = DRIVE_OP_WRITE,
     [ROW_MAY] = DRIVE_OP_WRITE,
     [ROW_TRY] = DRIVE_OP_PREPARE,
@@ -544,11 +544,11 @@ static void plain_op(const struct drive_configuration *configuration, const stru
                             .index = row->index,
                             .sub = row->sub,
                             .size = row->size,
-                            .optional = row->kind == ROW_MAY || row->kind == ROW_LEARN,
-                            .fact = DRIVE_NO_FACT};
+                            .optional = row->kind == ROW_MAY || row->kind == ROW_READ,
+                            .property = DRIVE_NO_PROPERTY};
     op->mask = low_bytes(row->size);
-    if (row->kind == ROW_LEARN) {
-        op->fact = (uint8_t)row->argument;
+    if (row->kind == ROW_READ) {
+        op->property = (uint8_t)row->argument;
         op->mask = 0;
         return;
     }
@@ -567,8 +567,10 @@ static bool is_pdo(const struct drive_row *row)
 /* RPDO1 of the I/O module: digital outputs by bytes, then the analogue ones. */
 static struct drive_pdo outputs_pdo(const struct config_outputs *outputs)
 {
-    struct drive_pdo pdo = {
-        .communication = 0x1400, .cob = COB_RPDO1, .type = SYNCHRONOUS, .fact = DRIVE_NO_FACT};
+    struct drive_pdo pdo = {.communication = 0x1400,
+                            .cob = COB_RPDO1,
+                            .type = SYNCHRONOUS,
+                            .property = DRIVE_NO_PROPERTY};
     for (uint32_t i = 0; i < outputs->digital_count / 8u; ++i) {
         pdo.entries[pdo.count++] = UINT32_C(0x62000008) + ((i + 1u) << 8);
     }
@@ -628,7 +630,7 @@ bool drive_configuration_op(struct drive_configuration *configuration, struct dr
             return true;
         }
         if (is_pdo(row) && row->kind != ROW_PDO_OUTPUTS && concerns(configuration, row->when)) {
-            drive_properties_read(configuration->properties, drive_pdos[row->argument].fact, 1);
+            drive_properties_read(configuration->properties, drive_pdos[row->argument].property, 1);
         }
         next_row(configuration);
     }

@@ -40,7 +40,7 @@ static inline uint8_t drive_configuration_node(const struct config *config, uint
 /* Kinds of operation on a drive's dictionary. */
 enum drive_op_kind {
     DRIVE_OP_NMT_PRE_OPERATIONAL, /* process data off while parameters change */
-    DRIVE_OP_READ,                /* `masked` bits must be those of `value`; learns `fact` */
+    DRIVE_OP_READ,                /* `masked` bits must be those of `value`; gives `property` */
     DRIVE_OP_WRITE,               /* refused: fine when it reads back so already */
     DRIVE_OP_PREPARE, /* a write that may be refused: a later one shows whether that matters */
 };
@@ -49,11 +49,11 @@ struct drive_op {
     enum drive_op_kind kind;
     uint16_t index;
     uint8_t sub;
-    uint8_t size;   /* bytes of a write */
-    bool optional;  /* a drive without the object is fine */
-    uint8_t fact;   /* enum drive_fact: what a read teaches */
-    uint32_t value; /* to write, to expect */
-    uint32_t mask;  /* what counts when it is read */
+    uint8_t size;     /* bytes of a write */
+    bool optional;    /* a drive without the object is fine */
+    uint8_t property; /* enum drive_property: which one a read gives */
+    uint32_t value;   /* to write, to expect */
+    uint32_t mask;    /* what counts when it is read */
 };
 
 struct drive_configuration {

@@ -9,7 +9,7 @@
 
 #include "canopen/cia402.h"
 
-enum drive_fact {
+enum drive_property {
     DRIVE_VENDOR, /* 0x1018 subs 1 ... 4 */
     DRIVE_PRODUCT,
     DRIVE_REVISION,
@@ -20,25 +20,25 @@ enum drive_fact {
     DRIVE_INPUTS_MAPPED,   /* and TPDO3 reports its changes */
     DRIVE_TORQUE_MAPPED,   /* RPDO1 takes 0x60B2 */
     DRIVE_VELOCITY_MAPPED, /* RPDO2 takes 0x60B1 */
-    DRIVE_NO_FACT,         /* of a step that learns nothing */
+    DRIVE_NO_PROPERTY,     /* of a step that reads none */
 };
 
-#define DRIVE_FACTS ((unsigned)DRIVE_NO_FACT)
+#define DRIVE_PROPERTY_COUNT ((unsigned)DRIVE_NO_PROPERTY)
 
 #define DRIVE_VENDOR_SIMULATED  0u /* no real vendor has it */
 #define DRIVE_PRODUCT_SIMULATED 2u /* sim/node/drive.eds */
 
 struct drive_properties {
-    uint32_t value[DRIVE_FACTS];
-    bool known[DRIVE_FACTS]; /* else the drive has no such object */
+    uint32_t value[DRIVE_PROPERTY_COUNT];
+    bool known[DRIVE_PROPERTY_COUNT]; /* else the drive has no such object */
 };
 
-static inline void drive_properties_read(struct drive_properties *properties, unsigned fact,
+static inline void drive_properties_read(struct drive_properties *properties, unsigned property,
                                          uint32_t value)
 {
-    if (fact < DRIVE_FACTS) {
-        properties->value[fact] = value;
-        properties->known[fact] = true;
+    if (property < DRIVE_PROPERTY_COUNT) {
+        properties->value[property] = value;
+        properties->known[property] = true;
     }
 }
 

@@ -103,8 +103,8 @@ struct config {
     uint32_t turn_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
-     * window and its time where they are set, else the way of CONFIG_WINDOW_MS at the feed limit, of an axis in degrees at
-     * its own velocity limit (without one: UINT32_MAX). */
+     * window and its time where they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, of an axis in degrees
+     * at its own velocity limit (without one: UINT32_MAX). */
     uint32_t deviation_counts[AXES_MAX];
     uint32_t deviation_syncs[AXES_MAX];
 };

@@ -143,7 +143,7 @@ def job_rows(job: Job) -> list[tuple[str, str]]:
     return [
         (
             "toolpath",
-            f"{job.lines} lines that move, {len(job.sections)} sections from rest to rest",
+            f"lines that move: {job.lines}, sections from rest to rest: {len(job.sections)}",
         ),
         ("curves", f"{job.segments} PH segments, {number(job.length_mm)} mm"),
         ("deviation", f"below {job.deviation_um:.3f} um, certified"),

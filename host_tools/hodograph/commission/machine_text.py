@@ -36,7 +36,9 @@ def machine_text(drives: Sequence[DriveProperties], bitrate: int, where: str) ->
 
 
 def _axis(drive: DriveProperties, name: str) -> str:
-    return "\n".join([*_reported(drive), "[[axis]]", *_keys(drive, name), "", *_identity(drive), ""])
+    return "\n".join(
+        [*_reported(drive), "[[axis]]", *_keys(drive, name), "", *_identity(drive), ""]
+    )
 
 
 def _reported(drive: DriveProperties) -> Iterator[str]:
