@@ -149,8 +149,8 @@ def ahead(job: Streamed, ring: int, bytes_per_s: float) -> tuple[float, float]:
     """Motion ahead up to the newest joint in the ring, on the mean and at the least, from when the ring is full for
     the first time until the last chunk is there; s.
 
-    A chunk frees its bytes when its successor is taken over, at its joint. Another one is sent as soon as it has room, at
-    `bytes_per_s`.
+    A chunk frees its bytes when its successor is taken over, at its joint. Another one is sent as soon as it has room,
+    at `bytes_per_s`.
     """
     joint = np.concatenate(([0.0], np.cumsum(job.new_s)))
     blocks: deque[_Block] = deque()
