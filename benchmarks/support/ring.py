@@ -18,7 +18,7 @@ from hodograph.program.image import segment_size
 from hodograph.program.stops import HOLD
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.spline.spatial import SpatialPHSpline, spatial_through_points
-from hodograph.stream.chunk import Chunk
+from hodograph.stream.chunk import Chunk, largest_chunk
 from hodograph.stream.chunks import SectionChunks
 from hodograph.stream.geometry import Block
 from hodograph.stream.reading import StreamReader
@@ -39,6 +39,7 @@ _TRAVEL_MM = 1000.0
 _STEP_S = 0.005
 _HEAD, _ALIGNMENT = 376, 8
 """Bytes that a block of the ring has before its chunk (struct stream_chunk of firmware/app/stream.c), and its unit."""
+MOST = largest_chunk(RING - _HEAD)
 PARTS = (
     "header",
     "shared pieces",
@@ -61,8 +62,8 @@ class Streamed:
 
 
 def jobs(wave: Path) -> Iterator[Streamed]:
-    """All jobs, in chunks of a third of RING; `wave`: a file of the surface of short lines."""
-    yield from example_jobs(RING // 3)
+    """All jobs, in chunks of MOST bytes; `wave`: a file of the surface of short lines."""
+    yield from example_jobs(MOST)
     toolpaths = EXAMPLES / "toolpaths"
     mill = load_machine(MACHINES / "mill.toml")
     for name, file in (
@@ -71,7 +72,7 @@ def jobs(wave: Path) -> Iterator[Streamed]:
         ("surface", toolpaths / "surface.ngc"),
     ):
         sections = StreamReader(file, mill, 0.01, ReadOptions()).sections()
-        made = (SectionChunks(mill, "job", one.blocks, 1, RING // 3) for one in sections)
+        made = (SectionChunks(mill, "job", one.blocks, 1, MOST) for one in sections)
         yield max((gathered(name, one) for one in made), key=lambda job: sum(job.new_s))
 
 
@@ -148,8 +149,8 @@ def ahead(job: Streamed, ring: int, bytes_per_s: float) -> tuple[float, float]:
     """Motion ahead up to the newest joint in the ring, on the mean and at the least, from when the ring is full for
     the first time until the last chunk is there; s.
 
-    A chunk frees its bytes when its successor is taken over, at its joint. Another one is sent as soon as it has room, at
-    `bytes_per_s`.
+    A chunk frees its bytes when its successor is taken over, at its joint. Another one is sent as soon as it has room,
+    at `bytes_per_s`.
     """
     joint = np.concatenate(([0.0], np.cumsum(job.new_s)))
     blocks: deque[_Block] = deque()

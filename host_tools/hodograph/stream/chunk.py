@@ -36,8 +36,8 @@ _CRC_FROM = 16
 
 
 def largest_chunk(free_bytes: int) -> int:
-    """Bytes of a chunk for which there is room as soon as its predecessor is the active one, in a ring with so many free
-    bytes (object 0x2060 sub 7) without a job: a third of it, heads included; docs/reference/protocol.md 3.7.
+    """Bytes of a chunk for which there is room as soon as its predecessor is the active one, in a ring with so many
+    free bytes (object 0x2060 sub 7) without a job: a third of it, heads included; docs/reference/protocol.md 3.7.
     """
     return max((free_bytes - 2 * _BLOCK_HEAD) // 3 - 8, 0)
 

@@ -47,8 +47,8 @@ CHUNK_BYTES = 24 * 1024 - 64
 """The largest chunk, where a third of the ring is more."""
 
 _NEW_SHARE = 0.35
-"""Of these bytes, for what is new. The rest is for the repeated part and the tail, and a ring that is full has room sooner
-for a smaller chunk.
+"""Of these bytes, for what is new. The rest is for the repeated part and the tail, and a ring that is full has room
+sooner for a smaller chunk.
 """
 
 LATENESS_S, SHARED_S = 0.02, 0.1
