@@ -186,7 +186,7 @@ static void extra_frame(const double *c, double xi, const struct ph_speed *speed
     }
     for (uint32_t order = 0; order < 3; order++) {
         const uint32_t degree = 5 - order;
-        double work[ARC_SIZE];
+        double work[ARC_SIZE] = {0.0};
         for (uint32_t k = 0; k < degree; k++) {
             rows[k] = degree * (rows[k + 1] - rows[k]);
             work[k] = rows[k];

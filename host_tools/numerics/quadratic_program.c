@@ -24,8 +24,7 @@
 
 enum { WIDTH = 4, BAND = 3, LOWER = 10, MOST_ITERATIONS = 100, MOST_STALLED = 6 };
 static const double NEAR = 1e-3;
-static const double LEAST_TARGET =
-    0.01; /* of the gap, in tolerances: far below it, only rounding is left */
+static const double LEAST_TARGET = 0.01; /* of the gap, in tolerances: below it is rounding */
 static const double STEP_SHARE = 0.995;  /* of the way to the nearest boundary */
 static const double LEAST_PIVOT = 1e-15; /* as a share of the diagonal */
 static const double FARTHEST = 1e8;      /* unknowns add up to less */
@@ -86,8 +85,8 @@ size_t quadratic_work(uint32_t intervals, uint32_t rows)
 {
     const size_t size = 2 * (size_t)intervals + 2;
     const size_t sides = 2 * (size_t)rows + 2 * size;
-    return size * (5 + 2 * (BAND + 1)) + numbers_of(sides * sizeof(struct side)) +
-           numbers_of(intervals * sizeof(struct link));
+    return BAND * (BAND + 2) + size * (5 + 2 * (BAND + 1)) +
+           numbers_of(sides * sizeof(struct side)) + numbers_of(intervals * sizeof(struct link));
 }
 
 static double *taken(double **work, size_t count)
@@ -95,6 +94,14 @@ static double *taken(double **work, size_t count)
     double *own = *work;
     *work += count;
     return own;
+}
+
+/* The same behind some zeros. */
+static double *zeros_taken(double **work, size_t zeros, size_t count)
+{
+    double *before = taken(work, zeros + count);
+    memset(before, 0, zeros * sizeof(double));
+    return before + zeros;
 }
 
 static double dot(const double *a, const double *b)
@@ -411,23 +418,23 @@ static void assemble(struct solving *s)
     }
 }
 
-/* Factors the matrix in place: row i of a unit triangle, and the inverse of its pivot. */
+/* Factors the matrix in place: row i of a unit triangle, and the inverse of its pivot. Before the first row are as many
+ * of zeros as it looks back. */
 static void matrix_factor(struct solving *s)
 {
     double *row = s->matrix;
-    double *pivot = s->pivot;
     for (uint32_t i = 0; i < s->size; i++, row += BAND + 1) {
-        const double *one = i >= 1 ? row - (BAND + 1) : NULL;
-        const double *two = i >= 2 ? one - (BAND + 1) : NULL;
-        const double u3 = i >= 3 ? row[0] : 0.0;
-        const double u2 = i >= 2 ? row[1] - u3 * two[2] : 0.0;
-        const double u1 = i >= 1 ? row[2] - u3 * one[1] - u2 * one[2] : 0.0;
-        row[0] = i >= 3 ? u3 * pivot[i - 3] : 0.0;
-        row[1] = i >= 2 ? u2 * pivot[i - 2] : 0.0;
-        row[2] = i >= 1 ? u1 * pivot[i - 1] : 0.0;
+        const double *one = row - (BAND + 1), *two = one - (BAND + 1);
+        double *pivot = s->pivot + i;
+        const double u3 = row[0];
+        const double u2 = row[1] - u3 * two[2];
+        const double u1 = row[2] - u3 * one[1] - u2 * one[2];
+        row[0] = u3 * pivot[-3];
+        row[1] = u2 * pivot[-2];
+        row[2] = u1 * pivot[-1];
         const double own = row[3] - u3 * row[0] - u2 * row[1] - u1 * row[2];
         /* A pivot that rounding has used up: the unknown stays as it is. */
-        pivot[i] = own > LEAST_PIVOT * row[3] && !known(s->given, i) ? 1.0 / own : 0.0;
+        pivot[0] = own > LEAST_PIVOT * row[3] && !known(s->given, i) ? 1.0 / own : 0.0;
     }
 }
 
@@ -616,9 +623,9 @@ static struct solving solving_begin(const struct quadratic_program *p, double *u
     s.step = taken(&work, s.size);
     s.gradient = taken(&work, s.size);
     s.residual = taken(&work, s.size);
-    s.pivot = taken(&work, s.size);
+    s.pivot = zeros_taken(&work, BAND, s.size);
     s.hessian = taken(&work, (size_t)(BAND + 1) * s.size);
-    s.matrix = taken(&work, (size_t)(BAND + 1) * s.size);
+    s.matrix = zeros_taken(&work, BAND * (BAND + 1), (size_t)(BAND + 1) * s.size);
     s.links = (struct link *)(void *)taken(&work, numbers_of(p->intervals * sizeof(struct link)));
     s.sides = (struct side *)(void *)work;
     memset(s.step, 0, sizeof(double) * s.size);

@@ -67,7 +67,7 @@ class Curve(Protocol):
 def frames_of(chain: PhChain, segment: Index, xi: Real) -> Frames:
     """The frames of segments of a chain at xi, both of any one shape."""
     *vectors, curvature = chain.frames(np.ravel(segment), np.ravel(xi))
-    r1, r2, r3 = (one.reshape(-1, *np.shape(xi)) for one in vectors)
+    r1, r2, r3 = (one.reshape(one.shape[0], *np.shape(xi)) for one in vectors)
     return Frames(r1, r2, r3, curvature.reshape(np.shape(xi)))
 
 
