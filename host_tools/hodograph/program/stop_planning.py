@@ -154,8 +154,12 @@ def _bounded(tree: _Halves, codes: NDArray[np.uint8]) -> Program:
 
 
 class _Found:
-    """What a search has found so far: codes (M, 2, 3), which of them are known (M, 2), misses (M,), and the codes (M, 3) of
-    fault stops that come out of no hold.
+    """What a search has found so far.
+
+    codes   (M, 2, 3)
+    known   which of them are final (M, 2)
+    misses  halvings (M,) without success, one after the other
+    alone   codes (M, 3) of fault stops that come out of no hold
     """
 
     def __init__(self, count: int) -> None:
@@ -185,9 +189,8 @@ def _searched(
         known = np.where(others, out.known, found | ~chosen[:, None])
         out.known = np.repeat(known, 1 + chosen, axis=0)
         out.codes = np.repeat(out.codes, 1 + chosen, axis=0)
-        out.misses, out.alone = (
-            np.repeat(of_part, 1 + chosen, axis=0) for of_part in (out.misses, out.alone)
-        )
+        out.misses = np.repeat(out.misses, 1 + chosen)
+        out.alone = np.repeat(out.alone, 1 + chosen, axis=0)
         tree.halve(chosen)
 
 
@@ -308,9 +311,9 @@ def _search_round(
     codes: NDArray[np.uint8],
     known: NDArray[np.bool_],
 ) -> None:
-    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where that
-    of the hold is found now, numbers for it are known but for such stops. A search of few trials keeps them if it can;
-    it tries them for the hold first.
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where
+    the codes of a hold are found now, those of the fault stop are known but for such stops. A search of few trials
+    tries them for the hold first, and keeps them if it can.
     """
     search, quick = StopSearch(NativeProgram(encode(program))), limits[FAULT].quick
     hold, fault = codes[:, HOLD], codes[:, FAULT]
