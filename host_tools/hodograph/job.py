@@ -8,6 +8,7 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -31,11 +32,7 @@ from .program.stop_planning import LongStopError, StopTerms
 from .program.stop_reserve import (
     EVERYWHERE,
     SPREADS,
-    STEPS,
-    ReserveStep,
     late_mostly,
-    reserve_zones,
-    useful_steps,
     zones_at_places,
 )
 from .program.stops import FAULT
@@ -96,12 +93,14 @@ _ROUNDING_MM = 1e-9
 class SectionPipeline(Pipeline):
     """A pipeline whose curve is that of a section.
 
-    thorough  whether stops are searched with all trials
+    thorough    whether stops are searched with all trials
+    only_fault  whether none are searched for holds: the program shows where fault stops may begin
     """
 
     fitted: FittedPath | None = None
     given_events: Events = field(default_factory=no_events)
     thorough: bool = False
+    only_fault: bool = False
 
     @property
     def events(self) -> Events:
@@ -120,7 +119,7 @@ class SectionPipeline(Pipeline):
     @property
     def stop_terms(self) -> StopTerms:
         """What the stops of the program keep."""
-        return replace(super().stop_terms, quick=not self.thorough)
+        return replace(super().stop_terms, quick=not self.thorough, only_fault=self.only_fault)
 
     def _planned(self, limits: Limits) -> FeedPlan:
         """The plan; with more reserve, then with a lower feed there, where a piece would have none left for the least
@@ -159,36 +158,29 @@ class SectionPipeline(Pipeline):
 
     def _compiled(self, plan: FeedPlan) -> Compilation:
         """The program; of a plan made again with more reserve where a stop would have to wait too long to begin."""
-        longest_s = self.machine.stop_time_ms * 1e-3
-        limits, zones = plan.limits, plan.limits.reserve_zones
-        steps: list[ReserveStep] = list(STEPS)
-        while True:
-            try:
-                return self._with_stops(plan)
-            except LongStopError as error:
-                steps = useful_steps(error.program, longest_s, steps)
-                if not steps:
-                    return self._with_places(limits, error)
-                zones += tuple(reserve_zones(error.program, longest_s, steps.pop(0)))
-            plan = self._planned(replace(limits, reserve_zones=zones))
+        try:
+            return self._with_stops(plan)
+        except LongStopError as error:
+            return self._with_places(plan.limits, error)
 
     def _with_places(self, limits: Limits, late: LongStopError) -> Compilation:
         """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
-        lower everywhere; the first of these plans that has no late stops, where zones are not enough. Raises `late`
-        where none is.
+        lower everywhere; one of these plans, where zones are not enough. Raises `late` where none has no late stops.
         """
         longest_s = self.machine.stop_time_ms * 1e-3
         program, zones = late.program, limits.reserve_zones
-        whole: Compilation | None = None
+        whole: list[FeedPlan] = []
         for share in EVERYWHERE:
-            if whole is not None and late_mostly(program, longest_s):
+            if whole and late_mostly(program, longest_s):
                 break
             lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
             try:
-                found = self._with_stops(lower)
-                whole, lowered = whole or found, found.program
+                lowered = replace(self, only_fault=True)._with_stops(lower).program
+                whole.append(lower)
             except LongStopError as error:
                 lowered = error.program
+                if late_mostly(lowered, longest_s):
+                    continue
             for spread in SPREADS:
                 more = zones_at_places(program, lowered, longest_s, share, spread)
                 if not more:
@@ -198,9 +190,14 @@ class SectionPipeline(Pipeline):
                     return self._with_stops(self._planned(replace(limits, reserve_zones=zones)))
                 except LongStopError as error:
                     program = error.program
-        if whole is None:
-            raise late
-        return whole
+        return self._first_in_time(whole, late)
+
+    def _first_in_time(self, plans: Sequence[FeedPlan], late: LongStopError) -> Compilation:
+        """The program of the first of some plans that has no late stops. Raises `late` where none is."""
+        for plan in plans:
+            with suppress(LongStopError):
+                return self._with_stops(plan)
+        raise late
 
     def _with_stops(self, plan: FeedPlan) -> Compilation:
         """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with

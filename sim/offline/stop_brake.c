@@ -48,7 +48,7 @@ double stop_brake_time(const struct stop_state *from, const struct path_brake_nu
     double up = (double)numbers->jerk_up_q56 * tick3;
     double most = (double)numbers->deceleration_q56 * tick3 * period_s;
     double square = from->a * from->a / down;
-    double depth = fmin(sqrt((2.0 * from->v + square) / (1.0 / down + 1.0 / up)), most);
+    double depth = stop_lesser(sqrt((2.0 * from->v + square) / (1.0 / down + 1.0 / up)), most);
     double change = from->a + depth > 0.0 ? down : -down;
     double speed = from->v + (from->a * from->a - depth * depth) / (2.0 * change);
     double even_s = stop_greater(speed / depth - depth / (2.0 * up), 0.0);

@@ -105,10 +105,16 @@ static double axis_share(const struct stop_inverse *inverse, uint32_t k, double 
                         (velocity + inverse->time_constant[k] * acceleration) * inverse->reach[k]);
 }
 
+/* Of small numbers: no overflow has to be guarded against. */
+static double length_of(double along, double across)
+{
+    return sqrt(along * along + across * across);
+}
+
 /* Greatest component along an axis, for an axis that the tangent has at most this component of. */
 static double component(double along, double across, double tangent)
 {
-    return fmin(hypot(along, across), along * tangent + across);
+    return stop_lesser(length_of(along, across), along * tangent + across);
 }
 
 /* Acceleration and jerk along the path and across it, at most. */
@@ -147,8 +153,8 @@ static double spatial_share(const struct stop_road *road, const struct stop_inve
                             const struct stop_extent *extent)
 {
     const struct parts parts = parts_of(extent);
-    const double acceleration = hypot(extent->acceleration, parts.normal);
-    const double jerk = hypot(parts.jerk_along, parts.jerk_across);
+    const double acceleration = length_of(extent->acceleration, parts.normal);
+    const double jerk = length_of(parts.jerk_along, parts.jerk_across);
     const double v = extent->speed;
     double most = 0.0;
     for (uint32_t k = 0; k < road->axis_count; k++) {
@@ -159,8 +165,8 @@ static double spatial_share(const struct stop_road *road, const struct stop_inve
         double own_jerk =
             extent->jerk * first + v * (3.0 * extent->acceleration * second + v * v * third);
         if (k < PROGRAM_SPACE) { /* a component is no more than the whole */
-            own = fmin(own, acceleration);
-            own_jerk = fmin(own_jerk, jerk);
+            own = stop_lesser(own, acceleration);
+            own_jerk = stop_lesser(own_jerk, jerk);
         }
         most = stop_greater(most, axis_share(inverse, k, v * first, own, own_jerk));
     }

@@ -78,7 +78,7 @@ static struct begun begun_at_any_rate(const struct stop_setting *setting,
     const double a = stop_greater(piece->extreme.a, close->extreme.a) * rate * rate;
     const double change = stop_greatest_slope(piece) * v;
     const double little = setting->rise_is_cut ? 0.25 * setting->deceleration : HUGE_VAL;
-    const struct begun out = {v * rate, a + fmin(change, little), a + change};
+    const struct begun out = {v * rate, a + stop_lesser(change, little), a + change};
     return out;
 }
 

@@ -63,6 +63,7 @@ class StopTerms:
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
     quick         few numbers are tried: for long programs
+    only_fault    no numbers for holds are searched: enough to see where fault stops may begin
     """
 
     plants: Plants | None = None
@@ -70,6 +71,7 @@ class StopTerms:
     axis: AxisLimits = field(default_factory=AxisLimits)
     stop_time_ms: int = 0
     quick: bool = False
+    only_fault: bool = False
 
 
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
@@ -132,19 +134,39 @@ def _searched_quickly(
     searched. Raises LongStopError.
     """
     found = _searched(tree, limits, _Found(tree.program.piece_count), (FAULT,))
-    codes = found.codes.copy()
-    codes[_better_without(_with_codes(tree.program, codes), FAULT, tree.groups), FAULT] = 0
-    _checked(with_bounds(_with_codes(tree.program, codes)), terms)
-    return _searched(tree, limits, found, (HOLD,)).codes
+    _checked(_bounded(tree, found.codes), terms)
+    if terms.only_fault:
+        return found.codes
+    found.alone = found.codes[:, FAULT].copy()
+    codes = _searched(tree, limits, found, (HOLD,)).codes
+    if _late(_bounded(tree, codes), terms):
+        # No hold may brake where no fault stop out of it would keep the limits as soon.
+        lost = (codes[:, FAULT] != found.alone).any(axis=1) & (found.alone[:, DECELERATION] != 0)
+        codes[lost, HOLD], codes[lost, FAULT] = 0, found.alone[lost]
+    return codes
+
+
+def _bounded(tree: _Halves, codes: NDArray[np.uint8]) -> Program:
+    """The program of a search with the bounds that its fault stops will have."""
+    kept = codes.copy()
+    kept[_better_without(_with_codes(tree.program, codes), FAULT, tree.groups), FAULT] = 0
+    return with_bounds(_with_codes(tree.program, kept))
 
 
 class _Found:
-    """What a search has found so far: codes (M, 2, 3), which of them are known (M, 2), and misses (M,)."""
+    """What a search has found so far.
+
+    codes   (M, 2, 3)
+    known   which of them are final (M, 2)
+    misses  halvings (M,) without success, one after the other
+    alone   codes (M, 3) of fault stops that come out of no hold
+    """
 
     def __init__(self, count: int) -> None:
         self.codes: NDArray[np.uint8] = np.zeros((count, 2, 3), dtype=np.uint8)
         self.known: NDArray[np.bool_] = np.zeros((count, 2), dtype=np.bool_)
         self.misses: NDArray[np.int64] = np.zeros(count, dtype=np.int64)
+        self.alone: NDArray[np.uint8] = np.zeros((count, 3), dtype=np.uint8)
 
 
 def _searched(
@@ -168,6 +190,7 @@ def _searched(
         out.known = np.repeat(known, 1 + chosen, axis=0)
         out.codes = np.repeat(out.codes, 1 + chosen, axis=0)
         out.misses = np.repeat(out.misses, 1 + chosen)
+        out.alone = np.repeat(out.alone, 1 + chosen, axis=0)
         tree.halve(chosen)
 
 
@@ -288,9 +311,9 @@ def _search_round(
     codes: NDArray[np.uint8],
     known: NDArray[np.bool_],
 ) -> None:
-    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where that
-    of the hold is found now, numbers for it are known but for such stops. A search of few trials keeps them if it can;
-    it tries them for the hold first.
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where
+    the codes of a hold are found now, those of the fault stop are known but for such stops. A search of few trials
+    tries them for the hold first, and keeps them if it can.
     """
     search, quick = StopSearch(NativeProgram(encode(program))), limits[FAULT].quick
     hold, fault = codes[:, HOLD], codes[:, FAULT]
@@ -407,9 +430,14 @@ def with_bounds(program: Program) -> Program:
     return replace(program, stops=stops)
 
 
+def _late(program: Program, terms: StopTerms) -> bool:
+    """Whether a fault stop may take longer than it may."""
+    return 0 < terms.stop_time_ms * 1e-3 < program.stops.worst(FAULT).time_s
+
+
 def _checked(program: Program, terms: StopTerms) -> Program:
     worst = program.stops.worst(FAULT)
-    if terms.stop_time_ms and worst.time_s > terms.stop_time_ms * 1e-3:
+    if _late(program, terms):
         place = float(program.pieces.start_q40[worst.piece]) * 2.0**-40
         raise LongStopError(
             program,

@@ -9,9 +9,7 @@ override may not use the reserve (feed/override.py).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,33 +20,6 @@ from .image import Program
 from .stops import DECELERATION, FAULT
 
 Real = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-_SPACING_SHARE = 0.5
-"""Of the longest stop: time between two zones."""
-
-_BEHIND_SHARE = 0.5
-"""Of the longest stop: how far a zone goes on behind a stretch, for the way of the brake."""
-
-_NEAR_SHARE = 0.3
-"""Of the time between two zones: how far one may be moved to where numbers are known already."""
-
-
-@dataclass(frozen=True)
-class ReserveStep:
-    """How zones are made: how long they last (inf: all of a stretch), and the share that they leave free."""
-
-    time_s: float
-    share: float
-
-
-STEPS = (
-    ReserveStep(0.03, 0.25),
-    ReserveStep(0.06, 0.4),
-    ReserveStep(inf, 0.2),
-    ReserveStep(inf, 0.4),
-)
-"""One round after the other, where stops are late in places."""
 
 EVERYWHERE = (0.16, 0.25, 0.4, 0.6)
 """Shares of all limits that are left free, one after the other: everywhere in a plan that shows where stops may begin
@@ -70,74 +41,14 @@ _HAIR_S = 1e-4
 """Places that are so close are the same one."""
 
 _MOST_LATE = 0.3
-
-_FEW_LATE = 0.05
-"""Share of the time: where less is late, the shortest zones are left out, since they save less than a round takes."""
-
-_TOO_LATE = 2.0
-"""Times the longest stop: short zones do not help where a stop may take longer."""
-
-
-def late_pieces(program: Program, stop_time_s: float) -> Flags:
-    """Pieces (M,) from which a fault stop may take longer than `stop_time_s`."""
-    return np.asarray(program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s)
-
-
-def late_share(program: Program, stop_time_s: float) -> float:
-    """The share of the time that they take."""
-    seconds = program.pieces.duration_q32_s.astype(np.float64)
-    return float(seconds[late_pieces(program, stop_time_s)].sum() / seconds.sum())
+"""Share of the time: where more is late in a plan, it shows too few places where stops may begin."""
 
 
 def late_mostly(program: Program, stop_time_s: float) -> bool:
-    """Whether it is so much that zones in all of it would be nearly everywhere."""
-    return late_share(program, stop_time_s) > _MOST_LATE
-
-
-def useful_steps(
-    program: Program, stop_time_s: float, steps: Sequence[ReserveStep]
-) -> list[ReserveStep]:
-    """Which of the remaining steps to try next, chosen by how late the stops are."""
-    if late_mostly(program, stop_time_s):
-        return []
-    if program.stops.worst(FAULT).time_s > _TOO_LATE * stop_time_s:
-        return [step for step in steps if step.time_s == inf]
-    if late_share(program, stop_time_s) < _FEW_LATE:
-        return [step for step in steps if step is not STEPS[0]]
-    return list(steps)
-
-
-def reserve_zones(program: Program, stop_time_s: float, step: ReserveStep) -> list[ReserveZone]:
-    """Zones in all stretches of a program from which a fault stop may take longer than `stop_time_s`."""
-    t, s = _piece_ends(program)
-    late = late_pieces(program, stop_time_s)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], late, [False])).astype(np.int8)))
-    begin, end = t[edges[0::2]], t[edges[1::2]]
-    if step.time_s < inf:
-        known = 0.5 * (t[1:] + t[:-1])[program.stops.codes[:, FAULT, DECELERATION] > 0]
-        spacing_s = _SPACING_SHARE * stop_time_s
-        rows = [
-            np.arange(last, first - 0.5 * spacing_s, -spacing_s)
-            for first, last in zip(begin.tolist(), end.tolist(), strict=True)
-        ]
-        centre = _moved(np.concatenate(rows), known, _NEAR_SHARE * spacing_s)
-        begin, end = centre - 0.5 * step.time_s, centre + 0.5 * step.time_s
-    else:
-        end = end + _BEHIND_SHARE * stop_time_s
-    low, high = np.interp(begin, t, s).tolist(), np.interp(end, t, s).tolist()
-    return [
-        ReserveZone(*zone, step.share) for zone in zip(low, high, strict=True) if zone[0] < zone[1]
-    ]
-
-
-def _moved(centre: Real, known: Real, most_s: float) -> Real:
-    """Times (n,), each replaced by the nearest of the known ones that is at most `most_s` away."""
-    if not known.size:
-        return centre
-    at = np.clip(np.searchsorted(known, centre), 1, max(known.size - 1, 1))
-    before, after = known[at - 1], known[np.minimum(at, known.size - 1)]
-    nearest = np.where(np.abs(before - centre) <= np.abs(after - centre), before, after)
-    return np.asarray(np.where(np.abs(nearest - centre) <= most_s, nearest, centre))
+    """Whether a fault stop may take longer than `stop_time_s` from so many pieces that few others are left."""
+    seconds = program.pieces.duration_s
+    late = program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s
+    return float(seconds[late].sum()) > _MOST_LATE * float(seconds.sum())
 
 
 @dataclass(frozen=True, eq=False)
