@@ -156,6 +156,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("pipeline", "job_outputs"),
         "toolpath",
     },
+    "job_view": {"job", "toolpath"},
     "job_run": {"errors", "config", "native", "program", "simulate", "bus", "job", "toolpath"},
     "stream": {
         *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
