@@ -205,8 +205,8 @@ class Drawing:
         """How many contours are drawn again."""
         if repeats := repeated(self.contours):
             first = min(self.contours.line_of(index) for index in repeats)
-            text = f"drawn again: {len(repeats)} contours, first in line {first}: each is followed as often as it is drawn"
-            yield Message(first, text)
+            text = f"drawn again: {len(repeats)} contours, first in line {first}"
+            yield Message(first, f"{text}: each is followed as often as it is drawn")
 
     def _empty(self) -> ToolpathError:
         return self.error(max(1, self.last_line), "the drawing has no line or curve to follow")
