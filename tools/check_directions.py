@@ -174,6 +174,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     },
     "report": {
         "errors",
+        "job_view",
         "data",
         "config",
         "spline",

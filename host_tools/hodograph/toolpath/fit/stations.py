@@ -24,11 +24,11 @@ _THIN_SHARE = 0.06
 _LINE_SHARE = 0.25
 """The same for points on a leg that is left alone: noise on a straight line does not keep corners from their room."""
 
-_ROUGH_SHARE, _ROUGH_LEG = 0.75, 12.0
+_ROUGH_SHARE, _ROUGH_LEG = 0.7, 8.0
 """The same for points of noise, which have a leg of at most so many tolerances."""
 
 _WINDOW = 7
-"""Of so many neighbouring points nearly half turn to another side than a neighbour, where it is noise."""
+"""Of so many neighbouring points most turn to another side than a neighbour, where it is noise."""
 
 _NEAREST = 11.0
 """In tolerances: how near vertices of smoothed stretches may be that are not needed to keep `_LINE_SHARE`."""
@@ -191,7 +191,7 @@ def _thinned(
 
 def _is_rough(point: Real, longest_mm: float) -> Flags:
     """Inner points (n - 2,) of a chain (n, 3) with a leg of at most this length where the chain turns back, or turns to
-    another side than at a neighbour, like nearly half of the points around: noise, not a curve.
+    another side than at a neighbour, like most points around: noise, not a curve.
     """
     leg = np.diff(point, axis=0)
     length = np.linalg.norm(leg, axis=1)
@@ -199,7 +199,7 @@ def _is_rough(point: Real, longest_mm: float) -> Flags:
     other = np.sum(side[:-1] * side[1:], axis=1) < 0.0
     wavers = np.append(False, other) | np.append(other, False)
     around = np.convolve(wavers, np.ones(_WINDOW))[_WINDOW // 2 :][: wavers.size]
-    wavers &= around >= _WINDOW // 2
+    wavers &= around > _WINDOW // 2
     near = np.minimum(length[:-1], length[1:]) <= longest_mm
     return np.asarray(near & (wavers | (turns(point)[1:-1] > SHARPEST_RAD)))
 
