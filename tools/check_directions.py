@@ -164,6 +164,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("pipeline", "job_outputs"),
         "toolpath",
     },
+    "job_view": {"job", "toolpath"},
     "job_run": {"errors", "config", "native", "program", "simulate", "bus", "job", "toolpath"},
     "stream": {
         *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
@@ -181,6 +182,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     },
     "report": {
         "errors",
+        "job_view",
         "data",
         "config",
         "spline",

@@ -71,9 +71,7 @@ def programmed_view(job: Job, offset_mm: Real) -> dict[str, list[float]]:
     step = max(1, -(-len(every) // MOST_PROGRAMMED))
     rows = np.unique(np.append(np.arange(0, len(every), step), max(len(every) - 1, 0)))
     shown = every[rows] if len(every) else every
-    return {
-        name: np.round(column, 4).tolist() for name, column in zip("xyz", shown.T, strict=True)
-    }
+    return {name: np.round(column, 4).tolist() for name, column in zip("xyz", shown.T, strict=True)}
 
 
 def _space(points: Real) -> Real:

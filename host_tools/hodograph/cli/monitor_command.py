@@ -32,10 +32,12 @@ _USUAL_COUNTS_PER_MM = 1_000_000
 
 def monitor(options: Namespace) -> None:
     """hodograph monitor."""
+    image: bytes | None = None
+    machine: Machine | None
     toolpath = None
     if options.program is not None and is_toolpath(options.program):
         job = toolpath_job(options, options.program)
-        image, machine, toolpath = None, job.machine, curve_view(job)
+        machine, toolpath = job.machine, curve_view(job)
     else:
         refuse_toolpath_options(options, options.program or Path("monitor"))
         image, machine = _image_and_machine(options)

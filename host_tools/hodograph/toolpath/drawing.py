@@ -182,23 +182,31 @@ class Drawing:
     def commands(self) -> Iterator[Command]:
         """Messages, moves and the end. Raises ToolpathError: no contour; InputError: an option that nothing has."""
         feeds = self._feeds()
-        for what, (count, first) in self._notes.items():
-            yield Message(first, f"left out: {what}, {count} times, first in line {first}")
-        if self._assumed_line:
-            text = "the page has no size: a unit counts 1/96 inch, or as --unit says"
-            yield Message(self._assumed_line, text)
+        yield from self._remarks()
         self._check_names()
         if not len(self.contours):
             raise self._empty()
-        if repeats := repeated(self.contours):
-            first = min(self.contours.line_of(index) for index in repeats)
-            text = f"drawn again: {len(repeats)} contours, first in line {first}: each is followed as often as it is drawn"
-            yield Message(first, text)
+        yield from self._repeats()
         visits, message = self._sequence()
         yield Message(0, message)
         x, y, z = self.options.start[:3]
         yield from self._moves(visits, feeds, (x, y, z))
         yield ProgramEnd(max(1, self.last_line))
+
+    def _remarks(self) -> Iterator[Message]:
+        """What was left out, and what the file does not say."""
+        for what, (count, first) in self._notes.items():
+            yield Message(first, f"left out: {what}, {count} times, first in line {first}")
+        if self._assumed_line:
+            text = "the page has no size: a unit counts 1/96 inch, or as --unit says"
+            yield Message(self._assumed_line, text)
+
+    def _repeats(self) -> Iterator[Message]:
+        """How many contours are drawn again."""
+        if repeats := repeated(self.contours):
+            first = min(self.contours.line_of(index) for index in repeats)
+            text = f"drawn again: {len(repeats)} contours, first in line {first}"
+            yield Message(first, f"{text}: each is followed as often as it is drawn")
 
     def _empty(self) -> ToolpathError:
         return self.error(max(1, self.last_line), "the drawing has no line or curve to follow")

@@ -59,7 +59,7 @@ _QUOTED = re.compile(r'\s*"([^"]*)"\s*')
 _NUMERIC = re.compile(r"\s*[-+]?(?:[0-9.]|nan\b|inf)", re.IGNORECASE)
 _COMMENTS = ("#", ";", "%", "//")
 _AXES = {name: axis for axis, name in enumerate(COLUMNS[:6])}
-_HEADER = re.compile(r'\s*([A-Za-z]+)\s*(?:[_ ]|\[|\()?\s*([A-Za-z/_]*)\s*[\])]?\s*')
+_HEADER = re.compile(r"\s*([A-Za-z]+)\s*(?:[_ ]|\[|\()?\s*([A-Za-z/_]*)\s*[\])]?\s*")
 _UNITS = {
     **dict.fromkeys(("", "mm", "deg", "mm/min", "mm_min"), 1.0),
     **dict.fromkeys(("in", "inch", "in/min", "in_min"), 25.4),

@@ -243,16 +243,20 @@ def test_noise_of_a_micrometre_hardly_changes_the_time(name: str, feed_mm_s: flo
         assert noisy == pytest.approx(plain, rel=share), seed
 
 
-@pytest.mark.parametrize(("chord_mm", "noise_mm"), [(0.005, 0.003), (0.01, 0.003), (0.002, 0.002)])
-def test_noise_larger_than_the_chords_hardly_changes_the_time(
-    chord_mm: float, noise_mm: float
+@pytest.mark.parametrize(
+    ("chord_mm", "noise_mm", "share"),
+    [(0.005, 0.003, 0.01), (0.01, 0.003, 0.01), (0.002, 0.002, 0.07)],
+)
+def test_noise_larger_than_the_chords_changes_the_time_a_little(
+    chord_mm: float, noise_mm: float, share: float
 ) -> None:
+    """Without care it would be several times as long."""
     turn = np.linspace(0.0, np.pi, round(3.0 * np.pi / chord_mm) + 1)
     points = 3.0 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
     noise = np.random.default_rng(4).uniform(-noise_mm, noise_mm, size=points.shape)
     found = fitted(points + noise)
     assert sampled_distance(found) <= found.deviation_mm <= TOLERANCE_MM
-    assert least_time_s(found) == pytest.approx(least_time_s(fitted(points)), rel=0.05)
+    assert least_time_s(found) == pytest.approx(least_time_s(fitted(points)), rel=share)
 
 
 def test_hooks_within_the_tolerance_take_no_time() -> None:

@@ -188,3 +188,11 @@ def test_the_order_of_many_contours_at_one_point_takes_no_time() -> None:
 def test_options_out_of_range(options: dict[str, Any]) -> None:
     with pytest.raises(InputError):
         DrawingOptions(**options)
+
+
+def test_contours_that_are_drawn_again_are_counted(tmp_path: Path) -> None:
+    """In either direction; not two halves of a circle, and not a longer line."""
+    twice = paths(tmp_path, "M0 0H10V5", "M50 0A5 5 0 0 1 60 0", "M10 5V0H0", "M0 0H10V5")
+    assert messages_in(twice)[0].startswith("drawn again: 2 contours, first in line ")
+    once = paths(tmp_path, "M50 0A5 5 0 0 1 60 0", "M50 0A5 5 0 0 0 60 0", "M0 0H10", "M0 0H11")
+    assert not any("drawn again" in text for text in messages_in(once))

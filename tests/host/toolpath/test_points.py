@@ -62,6 +62,8 @@ def test_the_start_is_not_approached_where_the_path_begins_there() -> None:
         "x,y\n1.5,2\n3,-425e-2\n",
         '"Y [mm]";"X [mm]"\n2;1.5\n-4.25;3\n',
         "x_mm y_mm\n1.5 2\n3 -4.25\n",
+        '"x","y"\n"1.5","2"\n "3" ,-4.25\n',
+        'sep=;\nx;y\n1,5;2\n"3";"-4,25"\n',
         "z,x (cm),y [um]\n0,0.15,2000\n0,0.3,-4250\n",
     ],
 )
@@ -189,3 +191,10 @@ def test_plain_lines_and_others_mean_the_same() -> None:
     lines[5_000] = "0.25,5.5,-0.1 # a comment is read by the careful path\n"
     plain = list(read_points(many(9_000), FILE, PointOptions(1.0)))
     assert list(read_points(lines, FILE, PointOptions(1.0))) == plain
+
+
+def test_what_a_spreadsheet_may_write_wrong_is_refused() -> None:
+    """A decimal comma inside quotes is no separator, UTF-16 is no list of columns."""
+    assert refusal_of('"1,5","2"\n"3","4"\n').line == 1
+    encoded = "x,y\n0,0\n1,1\n".encode("utf-16").decode("utf-8", "surrogateescape")
+    assert "UTF-16" in str(refusal_of(encoded))

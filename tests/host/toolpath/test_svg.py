@@ -385,3 +385,12 @@ def test_a_long_path_takes_little_memory(tmp_path: Path) -> None:
     tracemalloc.stop()
     assert count > 60_000
     assert peak < 10 * path.stat().st_size + 10_000_000
+
+
+@pytest.mark.parametrize("size", ["", 'width="100%" height="100%"'])
+def test_a_page_without_a_size_is_reported(tmp_path: Path, size: str) -> None:
+    text = f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 96 96"><path d="M0 0H96"/></svg>'
+    found = svg_commands(tmp_path, text)
+    assert messages_in(found)[0].startswith("the page has no size")
+    assert moves_in(found)[-1].end[0] == pytest.approx(25.4)
+    assert "no size" not in messages_in(svg_commands(tmp_path, text, unit_mm=1.0))[0]

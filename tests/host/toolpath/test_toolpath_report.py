@@ -112,7 +112,9 @@ def test_the_view_of_the_live_page_is_the_planned_path_in_machine_coordinates(
     programmed = np.column_stack([view["programmed"][name] for name in "xyz"])  # type: ignore[index]
     assert [6.0, 0.0, 0.0] in programmed.tolist()
     text = MILL.read_text(encoding="utf-8").replace("[0, 0, 0]", "[5, 0, -2]")
-    (tmp_path / "moved.toml").write_text(text.replace("../drives", str(MILL.parent.parent / "drives")))
+    (tmp_path / "moved.toml").write_text(
+        text.replace("../drives", str(MILL.parent.parent / "drives"))
+    )
     moved = curve_view(load_job(run.job.file, load_machine(tmp_path / "moved.toml")))
     there = np.column_stack([moved[name] for name in "xyz"])
     assert (there[[0, -1]] - at[[0, -1]]).tolist() == [[5.0, 0.0, -2.0]] * 2

@@ -26,6 +26,9 @@ _BESIDE = (2, 6, 6, 24)
 """Neighbours that are looked at on either side, at first and after the first halvings: places of noisy chords belong to
 each other roughly only. After the last of these numbers 6 again, around the nearest one found."""
 
+_MOST_PAIRS = 100_000
+"""Pairs of chords that are compared at once."""
+
 _SURE = 4
 """Halvings after which the chords around a chord surely are those nearest to it."""
 
@@ -152,16 +155,22 @@ def _nearest(
     """Distance (n,) of chords to the nearest one of `beside` chords on either side of chords `at` (n,), that one's
     error added; what the farther one of their ends alone has; and which is the nearest one.
     """
-    count = to.start.shape[0]
-    best, first, last = (np.full(at.size, np.inf) for _ in range(3))
-    nearest = at
-    for offset in range(-beside, beside + 1):
-        other = np.clip(at + offset, 0, count - 1)
-        a, b = to.start[other], to.end[other]
-        from_start = distance_to_chord(start, a, b) + to.error_mm[other]
-        from_end = distance_to_chord(end, a, b) + to.error_mm[other]
-        farther = np.maximum(from_start, from_end)
-        nearest = np.where(farther < best, other, nearest)
-        best = np.minimum(best, farther)
-        first, last = np.minimum(first, from_start), np.minimum(last, from_end)
-    return best, np.maximum(first, last), nearest
+    parts = np.array_split(np.arange(at.size), max(1, at.size * (2 * beside + 1) // _MOST_PAIRS))
+    found = [_nearest_of(start[own], end[own], at[own], to, beside) for own in parts]
+    bound, least, nearest = (np.concatenate(column) for column in zip(*found, strict=True))
+    return bound, least, nearest
+
+
+def _nearest_of(
+    start: Real, end: Real, at: Index, to: Chords, beside: int
+) -> tuple[Real, Real, Index]:
+    """The same for few chords, all neighbours at once."""
+    other = np.clip(at[:, None] + np.arange(-beside, beside + 1), 0, to.start.shape[0] - 1)
+    a, b, error = to.start[other], to.end[other], to.error_mm[other]
+    from_start = distance_to_chord(start[:, None], a, b) + error
+    from_end = distance_to_chord(end[:, None], a, b) + error
+    farther = np.maximum(from_start, from_end)
+    best = np.argmin(farther, axis=1)
+    row = np.arange(at.size)
+    least = np.maximum(from_start.min(axis=1), from_end.min(axis=1))
+    return farther[row, best], least, other[row, best]

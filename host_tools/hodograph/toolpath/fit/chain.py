@@ -168,21 +168,22 @@ def straightened(preimage: Real, spans: Real, direction: Real) -> Real:
         of `free` (m, 4, 3).
         """
         out = np.repeat(own[None], free.shape[0], axis=0)
-        begin, one, two = np.moveaxis(free, 2, 0)
+        begin, one, two = free[:, :, 0], free[:, :, 1], free[:, :, 2]
         middle = (1.0 - first) * one + first * two
         out[:, 0] = np.stack((begin, one, middle), axis=2)
         out[:, 1, :, 0], out[:, 1, :, 1] = middle, two
         out[:, 1, :, 2] = out[:, 2, :, 0] = (1.0 - second) * two + second * own[2, :, 1]
         return out * size[:, :, None]
 
+    aside = _across(direction)
+
     def residual(free: Real) -> Real:
-        """What is left (m, 9) of the conditions."""
+        """What is left (m, 7) of the conditions."""
         hodograph = hodograph_of(assembled(free))
         missing = (hodograph.mean(axis=3).sum(axis=1) - chord) / np.linalg.norm(chord)
         here, beside = hodograph[:, 0, :, 0], hodograph[:, 0, :, 1]
         speed = np.linalg.norm(here, axis=1)[:, None]
-        aside = (np.cross(here, direction) / speed, np.cross(beside, direction) / speed)
-        return np.concatenate((missing, *aside), axis=1)
+        return np.concatenate((missing, here @ aside / speed, beside @ aside / speed), axis=1)
 
     free = np.stack((own[0, :, 0], own[0, :, 1], own[1, :, 1]), axis=1)
     step = 1e-6 * float(np.abs(free).max())
@@ -193,10 +194,18 @@ def straightened(preimage: Real, spans: Real, direction: Real) -> Real:
     for _ in range(_STEPS):
         if float(np.abs(value).max()) <= _JOINED:
             break
-        slope = (residual(free + changes) - residual(free - changes)) / (2.0 * step)
+        both = residual(np.concatenate((free + changes, free - changes)))
+        slope = (both[: len(changes)] - both[len(changes) :]) / (2.0 * step)
         found = np.linalg.lstsq(slope.T, -value, rcond=1e-9)[0]
         free[rows] += found.reshape(-1, 3)
         value = residual(free[None])[0]
     if not float(np.abs(value).max()) <= _NEARLY:
         raise PlanError("no curve joins a straight line")
     return np.asarray(assembled(free[None])[0])
+
+
+def _across(direction: Real) -> Real:
+    """Two unit vectors as columns (3, 2) at right angles to a unit vector and to each other."""
+    first = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    first /= np.linalg.norm(first)
+    return np.stack((first, np.cross(direction, first)), axis=1)
