@@ -22,11 +22,6 @@
 #include "core/program.h"
 #include "offline/contour_curve.h"
 
-/* Expands a checked program into segments[program->header.segment_count], which must outlive
- * *contour. */
-void contour_begin(struct contour *contour, const struct program *program,
-                   struct contour_segment *segments);
-
 /* Distance in mm of a point (x, y, z in mm, machine coordinates; in the plane z counts for nothing) from the curve near the commanded arc
  * length, which is clamped to the program's. */
 double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);

@@ -4,8 +4,6 @@
 
 #include <math.h>
 
-#include "core/program.h"
-
 /* The hodograph of the preimage A is A i A*, a quadratic form; this is scale times the bilinear one that belongs to it. */
 static void hodograph_product(const double a[4], const double b[4], double scale, double out[3])
 {

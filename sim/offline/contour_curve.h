@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* The curve behind contour.h: places on it, seen from a point. Private to sim/offline; pure functions. */
+/* The curve of a program for offline/contour.h: expanded once, then places on it, seen from a point. Pure functions, but
+ * for contour_begin. */
 #ifndef HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 #define HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 
 #include <stdbool.h>
 #include <stdint.h>
+
+#include "core/program.h"
 
 /* One segment: position - origin = sum of r[k] xi^(k+1), k = 0 ... 4. Private to contour and contour_curve. */
 struct contour_segment {
@@ -51,6 +54,11 @@ static inline double contour_dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
+
+/* Expands a checked program into segments[program->header.segment_count], which must outlive
+ * *contour. */
+void contour_begin(struct contour *contour, const struct program *program,
+                   struct contour_segment *segments);
 
 /* Brings an arc length into the program: modulo the length on a closed path, else clamped. */
 double contour_wrap(const struct contour *c, double arc_length_mm);
