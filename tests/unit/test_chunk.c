@@ -500,46 +500,49 @@ static void test_no_takeover_while_a_stop_or_a_search_is_under_way(void)
     TEST_ASSERT_FALSE(take_over(&m)); /* a window is looked at */
 }
 
-/* A ramp that ends before the joint goes on in the next chunk as it would have in this one; one that was decided with pieces
- * behind it keeps this chunk. */
-static void test_ramps(void)
+/* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the joint.
+ * Returns 0 where it is refused. */
+static int goes_on_in_ramp(const struct motion *m)
+{
+    struct motion branch = *m;
+    struct motion same = *m;
+    if (!take_over(&branch)) {
+        return 0;
+    }
+    while (override_ramp_moves(&same.feed.plan.ramp)) {
+        tick(&same);
+        tick(&branch);
+        TEST_ASSERT_EQUAL_MEMORY(&same.point, &branch.point, sizeof m->point);
+        TEST_ASSERT_FALSE(passed_joint(&same, &chunks[1]));
+    }
+    return 1;
+}
+
+/* Takeovers are tried in each tick of a ramp that begins at a piece: how many are accepted, and how many are not. */
+static void try_in_ramp(uint32_t piece, uint32_t percent, uint32_t *accepted, uint32_t *refused)
 {
     struct motion m;
-    uint32_t in_ramp = 0;
-    uint32_t refused = 0;
-    cut_in_two();
-    accept_all(KERNEL_FIXED);
+    *accepted = *refused = 0;
     begin(&m);
-    run_to_piece(&m, 14);
-    feed_override_set(&m.feed, 95);
+    run_to_piece(&m, piece);
+    feed_override_set(&m.feed, percent);
     while (!passed_joint(&m, &chunks[1])) {
         tick(&m);
-        struct motion branch = m;
-        struct motion same = m;
         if (override_ramp_moves(&m.feed.plan.ramp)) {
-            if (!take_over(&branch)) {
-                refused++;
-                continue;
-            }
-            in_ramp++;
-            while (override_ramp_moves(&same.feed.plan.ramp)) {
-                tick(&same);
-                tick(&branch);
-                TEST_ASSERT_EQUAL_MEMORY(&same.point, &branch.point, sizeof m.point);
-            }
+            *(goes_on_in_ramp(&m) ? accepted : refused) += 1;
         }
     }
-    TEST_ASSERT_TRUE(in_ramp > 0u);
-    begin(&m);
-    run_to_piece(&m, 37); /* no window ends before the joint */
-    feed_override_set(&m.feed, 10);
-    for (int i = 0; i < 30; i++) {
-        tick(&m);
-        if (override_ramp_moves(&m.feed.plan.ramp) &&
-            m.feed.plan.ahead.end_q32_s > chunks[1].time_shift_q32_s) {
-            refused += take_over(&m) ? 0u : 1u;
-        }
-    }
+}
+
+static void test_ramps(void)
+{
+    uint32_t accepted;
+    uint32_t refused;
+    cut_in_two();
+    accept_all(KERNEL_FIXED);
+    try_in_ramp(14, 95, &accepted, &refused);
+    TEST_ASSERT_TRUE(accepted > 0u);
+    try_in_ramp(37, 10, &accepted, &refused); /* too near to the joint for a ramp to 10 % */
     TEST_ASSERT_TRUE(refused > 0u);
 }
 
