@@ -173,7 +173,7 @@ def ahead(job: Streamed, ring: int, bytes_per_s: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Block:
-    """A chunk in the ring, from a byte to one."""
+    """A chunk in the ring: its bytes are from `begin` to before `end`."""
 
     number: int
     begin: int

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * controller_state: the state of the controller, node 1, and what its parts need of the whole: commands, objects and
- * report. app/controller.h begins, runs and ends it.
+ * controller_state: the state of the controller, and the functions on it that several of its parts call (commands,
+ * objects, report). app/controller.h begins it, runs it and shuts it down.
  *
  * All functions: main loop.
  */
@@ -73,7 +73,7 @@ struct controller {
 /* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
 bool controller_configured(const struct controller *controller);
 
-/* Sends the heartbeat if it is due after another elapsed_us. */
+/* Sends the heartbeat if it is due. elapsed_us: since the last call. */
 void controller_heartbeat(struct controller *controller, uint32_t elapsed_us);
 
 /* To be called at each step of long work in the main loop, such as the check of a program: sends the heartbeat if it is

@@ -432,7 +432,7 @@ static int is_shared(const struct feed_override *f, const struct chunk *next)
            p->header.length_q40_mm - program_piece_start(p, joint) >= REACH_Q40;
 }
 
-/* The plan goes on, and what is on its way was decided with pieces before the joint. */
+/* The plan goes on, and an override ramp that is under way ends before the joint. */
 static int may_take_over_moving(const struct feed_override *f, const struct chunk *next)
 {
     return f->state == FEED_RUNNING && is_shared(f, next) &&

@@ -279,11 +279,13 @@ static void measure(struct override_plan *plan, const struct program_clock *cloc
     override_ticks_of(&plan->ticks, &limits, change_q57(plan, from_q57));
 }
 
-/* A ramp to the end of the stage ends, where the override may stay, inside the window. Notes by when. */
+/* Whether a ramp to the end of the stage ends inside the window, also if it ends early. Sets ends_q32_s. */
 static int fits(struct override_plan *plan, const struct program_clock *clock)
 {
     const int64_t mean_q57 = (plan->stage.end_q57 + plan->high_q57) / 2;
-    const uint64_t span = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
+    const uint64_t whole = override_span_q32(&plan->ticks, mean_q57, clock->period_q32_s);
+    /* A fall that ends early may last 1.09 times as long in program time. */
+    const uint64_t span = whole + (plan->stage.end_q57 < plan->high_q57 ? whole >> 3 : 0u);
     plan->ends_q32_s = qmath_q32_of_q42(clock->time_q42_s) + span + margin_q32(plan, clock);
     return plan->ends_q32_s <= plan->ahead.end_q32_s &&
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);

@@ -72,7 +72,7 @@ struct override_plan {
     struct ramp_stage stage;      /* where the next ramp on the way there ends, */
     struct ramp_ticks ticks;      /* and its ticks */
     int64_t high_q57;             /* greatest override on it */
-    uint64_t ends_q32_s;    /* program time by which the ramp looked for last ends, if known */
+    uint64_t ends_q32_s; /* program time by which the last ramp found ends; UINT64_MAX: not known */
     uint64_t return_q32_s;  /* above guaranteed_q57: a ramp back is known, if it begins by then, */
     struct ramp_ticks back; /* and its ticks */
 };

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a program may be refused for, and by which limits: the codes of refusals, the limits of a controller, and where a
- * fault is. Used by all parts of the check; core/program_check.h checks a whole program.
+ * The rules of a program, for all parts of the check: the codes with which a program is refused (enum program_error),
+ * the limits of the controller (struct program_limits), and the place of a fault (struct program_fault).
+ * core/program_check.h checks a whole program.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_RULES_H
 #define HODOGRAPH_CORE_PROGRAM_RULES_H
@@ -131,7 +132,7 @@ struct program_fault {
     uint32_t index; /* segment or piece, 0 for the header */
 };
 
-/* For the parts of the check: at each step of long work. */
+/* Calls `attend`, if there is one. The parts of the check do so at each step of long work. */
 static inline void program_limits_attend(const struct program_limits *limits)
 {
     if (limits->attend != NULL) {

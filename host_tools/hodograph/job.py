@@ -32,7 +32,7 @@ from .program.stop_planning import LongStopError, StopTerms
 from .program.stop_reserve import (
     EVERYWHERE,
     SPREADS,
-    late_mostly,
+    late_too_often,
     zones_at_places,
 )
 from .program.stops import FAULT
@@ -171,7 +171,7 @@ class SectionPipeline(Pipeline):
         program, zones = late.program, limits.reserve_zones
         whole: list[FeedPlan] = []
         for share in EVERYWHERE:
-            if whole and late_mostly(program, longest_s):
+            if whole and late_too_often(program, longest_s):
                 break
             lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
             try:
@@ -179,7 +179,7 @@ class SectionPipeline(Pipeline):
                 whole.append(lower)
             except LongStopError as error:
                 lowered = error.program
-                if late_mostly(lowered, longest_s):
+                if late_too_often(lowered, longest_s):
                     continue
             for spread in SPREADS:
                 more = zones_at_places(program, lowered, longest_s, share, spread)

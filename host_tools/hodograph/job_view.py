@@ -34,7 +34,7 @@ def curve_view(job: Job) -> dict[str, object]:
     Plans the feed of all sections. Raises PlanError.
     """
     sections = [section for section in job.sections if section.stands_at is None]
-    offset_mm = _space(np.array(job.machine.offset_mm)[None])[0]
+    offset_mm = np.array([*job.machine.offset_mm, 0.0][:3])
     whole_s = sum(section.pipeline.plan.duration_s for section in sections)
     columns: dict[str, list[object]] = {name: [] for name in "xyzflr"}
     for section in sections:
@@ -45,11 +45,18 @@ def curve_view(job: Job) -> dict[str, object]:
         s_mm = plan.arc_length(t_s)
         at = section.fitted.curve.point(s_mm) + offset_mm
         _append(columns, section, s_mm, np.column_stack((at, plan.feed(t_s))))
-    tolerances = {section.tolerance_mm for section in sections}
+    return with_programmed(job, columns, offset_mm)
+
+
+def with_programmed(
+    job: Job, columns: dict[str, list[object]], offset_mm: Real
+) -> dict[str, object]:
+    """Columns of places, with the source lines that they name, the programmed path and its tolerance (0: several)."""
+    tolerances = {one.tolerance_mm for one in job.sections if one.stands_at is None}
     return {
         **columns,
-        "text": source_lines(job, columns["l"]),
-        "programmed": programmed_view(job, offset_mm),
+        "text": _source_lines(job, columns["l"]),
+        "programmed": _programmed(job, offset_mm),
         "tolerance": tolerances.pop() if len(tolerances) == 1 else 0.0,
     }
 
@@ -64,7 +71,7 @@ def _append(
     columns["r"] += section.is_rapid_at(s_mm).astype(int).tolist()
 
 
-def programmed_view(job: Job, offset_mm: Real) -> dict[str, list[float]]:
+def _programmed(job: Job, offset_mm: Real) -> dict[str, list[float]]:
     """Points of the programmed path, `offset_mm` (3,) added: columns x, y, z in mm."""
     points = [one.fitted.reference.point for one in job.sections if one.stands_at is None]
     every = np.concatenate([np.zeros((0, 3)), *points]) + offset_mm
@@ -74,15 +81,7 @@ def programmed_view(job: Job, offset_mm: Real) -> dict[str, list[float]]:
     return {name: np.round(column, 4).tolist() for name, column in zip("xyz", shown.T, strict=True)}
 
 
-def _space(points: Real) -> Real:
-    """Points (n, 3) of the first three axes of points (n, axes)."""
-    full = np.zeros((len(points), 3))
-    axes = min(points.shape[1], 3)
-    full[:, :axes] = points[:, :axes]
-    return full
-
-
-def source_lines(job: Job, wanted: Iterable[object]) -> dict[str, str]:
+def _source_lines(job: Job, wanted: Iterable[object]) -> dict[str, str]:
     """Source lines by number; none where the file is no text of lines, or came from standard input."""
     if not is_gcode(job.file) or not job.file.is_file():
         return {}

@@ -18,6 +18,7 @@
  */
 #include "numerics/quadratic_program.h"
 
+#include <assert.h>
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
@@ -29,8 +30,8 @@ static const double STEP_SHARE = 0.995;  /* of the way to the nearest boundary *
 static const double LEAST_PIVOT = 1e-15; /* as a share of the diagonal */
 static const double FARTHEST = 1e8;      /* unknowns add up to less */
 static const double START_PRODUCT = 0.1; /* of slack and multiplier of each side */
-static const double START_SLACK = 0.05,
-                    LEAST_SLACK = 1e-3; /* in lengths of the coefficient, and at least */
+static const double START_SLACK = 0.05;  /* in lengths of the coefficients, */
+static const double LEAST_SLACK = 1e-3;  /* and at least */
 
 /* An inequality: a x - t + slack = most. */
 struct side {
@@ -148,6 +149,7 @@ static void sides_place(struct solving *s)
 {
     const struct quadratic_program *p = s->given;
     for (uint32_t k = 0; k < p->rows; k++) {
+        assert(p->interval[k] >= 0 && p->interval[k] < (int64_t)p->intervals);
         s->links[p->interval[k]].hard += sides_of(p->least[k], p->most[k]);
     }
     for (uint32_t k = 0; k < s->size; k++) {
@@ -196,7 +198,7 @@ static void sides_make(struct solving *s)
     }
 }
 
-/* The hessian as a band; rows and columns of known unknowns are 0. */
+/* The hessian as a band, known unknowns included: the gradient needs them. matrix_factor leaves them out. */
 static void hessian_make(struct solving *s)
 {
     const struct quadratic_program *p = s->given;
@@ -275,6 +277,12 @@ static void link_evaluate(struct solving *s, uint32_t interval)
     }
 }
 
+/* The greater magnitude; not a number where one is none. */
+static double worse(double worst, double value)
+{
+    return fabs(value) > worst || isnan(value) ? fabs(value) : worst;
+}
+
 /* The same of its share. */
 static void share_evaluate(struct solving *s, struct link *link)
 {
@@ -286,7 +294,7 @@ static void share_evaluate(struct solving *s, struct link *link)
     link->pull = 0.0;
     s->gap += link->share * link->price;
     s->objective += (p->penalty + 0.5 * p->curvature * link->share) * link->share;
-    s->unbalanced = fmax(s->unbalanced, fabs(rest));
+    s->unbalanced = worse(s->unbalanced, rest);
 }
 
 /* Weighted mean of the coefficients of the soft sides. */
@@ -414,7 +422,7 @@ static void assemble(struct solving *s)
     }
     for (uint32_t k = 0; k < s->size; k++) {
         s->residual[k] = known(s->given, k) ? 0.0 : s->residual[k];
-        s->unbalanced = fmax(s->unbalanced, fabs(s->residual[k]));
+        s->unbalanced = worse(s->unbalanced, s->residual[k]);
     }
 }
 
@@ -588,7 +596,7 @@ static bool impossible(const struct solving *s)
         const double own = known(s->given, k) ? 0.0 : s->residual[k] - s->gradient[k];
         rest = fmax(rest, fabs(own));
     }
-    return !s->soft && s->value < -FARTHEST * rest;
+    return !s->soft && s->violated >= s->given->tolerance && s->value < -FARTHEST * rest;
 }
 
 /* The greatest residual; not a number where one is none. */
@@ -653,7 +661,7 @@ int quadratic_solve(const struct quadratic_program *program, double *unknown, do
     struct solving s = solving_begin(program, unknown, work);
     *report = (struct quadratic_report){0, HUGE_VAL, HUGE_VAL, HUGE_VAL};
     uint32_t stalled = 0;
-    for (report->iterations = 0; report->iterations <= MOST_ITERATIONS; report->iterations++) {
+    for (report->iterations = 0;; report->iterations++) {
         assemble(&s);
         stalled = best_keep(&s, report) ? 0 : stalled + 1;
         if (worst_of(report) < program->tolerance) {
@@ -662,7 +670,8 @@ int quadratic_solve(const struct quadratic_program *program, double *unknown, do
         if (impossible(&s)) {
             return QUADRATIC_INFEASIBLE;
         }
-        if (stalled > MOST_STALLED && worst_of(report) < NEAR) {
+        if (report->iterations == MOST_ITERATIONS ||
+            (stalled > MOST_STALLED && worst_of(report) < NEAR)) {
             break;
         }
         step_make(&s);

@@ -38,7 +38,7 @@ struct quadratic_program {
     uint32_t intervals, rows; /* n at least 1, m */
     double penalty, curvature, tolerance;
     const double *gradient;     /* [2 n + 2] */
-    const double *hessian;      /* [n][4][4], symmetric, not indefinite */
+    const double *hessian;      /* [n][4][4], symmetric, positive semidefinite */
     const double *low, *high;   /* [2 n + 2], low <= high; where they are equal that is the value */
     const double *coefficient;  /* [m][4] */
     const int64_t *interval;    /* [m], 0 to n - 1, in any order */

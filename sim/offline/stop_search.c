@@ -224,7 +224,7 @@ static void known_choice(const struct stop_setting *setting, const struct stop_p
     out->first_s = times.first_s;
 }
 
-/* Codes that keep the limits but for brakes out of another stop; 0: they do not keep them out of these. */
+/* Takes the given codes. Returns 1 where they are `kept` and keep the limits out of `before` too. */
 static int kept_choice(const struct stop_setting *setting, struct stop_piece *piece,
                        const struct stop_found *found, double after_s, struct choice *best)
 {
@@ -249,7 +249,7 @@ static void choose(const struct stop_setting *setting, struct stop_piece *piece,
     }
 }
 
-/* The same for a piece whose codes may be given, or where to start. */
+/* The codes that are given, if they stay, else those of a search. */
 static void search_or_keep(const struct stop_setting *setting, struct stop_piece *piece,
                            const struct stop_found *found, const int warm[3], double after_s,
                            struct choice *best)

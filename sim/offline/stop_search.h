@@ -16,16 +16,16 @@
 #include "offline/stop_limits.h"
 #include "offline/stop_path.h"
 
-/* What was found for a piece. Codes of 0: no numbers keep the limits from all of its instants. */
+/* What was found for a piece. The caller sets all up to `start`. Codes of 0: no numbers keep the limits from all of its
+ * instants. */
 struct stop_found {
-    uint8_t known; /* set by the caller. 1: the codes are given, and stay; */
-    uint8_t kept;  /* 1: they are given, and stay if they keep the limits out of `before` too; */
-    uint8_t before[3]; /* codes of a brake out of which this one may begin, 0: none; */
-    uint8_t
-        start[3]; /* codes that a search of few trials tries first, 0: those of the next piece */
-    uint8_t codes[3]; /* jerk, deceleration, jerk */
-    double worst_s;   /* longest brake of the instants looked at at the rate 1, */
-    double mean_s;    /* and their mean */
+    uint8_t known; /* 1: `codes` are given, and stay */
+    uint8_t kept;  /* 1: `codes` are given, and stay if they keep the limits out of `before` too */
+    uint8_t before[3]; /* codes of a brake out of which this one may begin; 0: none */
+    uint8_t start[3];  /* codes that the search tries first; 0: those of the next piece */
+    uint8_t codes[3];  /* jerk, deceleration, jerk */
+    double worst_s;    /* longest brake of the instants looked at at the rate 1, */
+    double mean_s;     /* and their mean */
 };
 
 /* How far the program itself uses the limits at the rate 1: greatest value of each, limit by limit, in `used`

@@ -105,7 +105,7 @@ static double axis_share(const struct stop_inverse *inverse, uint32_t k, double 
                         (velocity + inverse->time_constant[k] * acceleration) * inverse->reach[k]);
 }
 
-/* Of small numbers: no overflow has to be guarded against. */
+/* sqrt instead of hypot: the values stay far below 1e150, so that no square overflows. */
 static double length_of(double along, double across)
 {
     return sqrt(along * along + across * across);

@@ -46,7 +46,10 @@ def stops_planned_once() -> Iterator[None]:
 def _stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     motion = replace(program, name="", events=no_events())
     limits = hold_limits(plan, terms), fault_limits(plan, terms)
-    key = "stops", pickle.dumps((encode(motion), limits, terms.stop_time_ms, terms.quick))
+    key = (
+        "stops",
+        pickle.dumps((encode(motion), limits, terms.stop_time_ms, terms.quick, terms.only_fault)),
+    )
     if key not in _kept:
         _keep(key, plan_stops(motion, plan, terms))
     return replace(_kept[key], name=program.name, events=program.events)

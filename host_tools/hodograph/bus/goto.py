@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from ..config import PLANE_AXES, SPACE_AXES, Machine
 from ..errors import InputError, RefusedError, RunError
-from ..feed import FeedRequest, Limits, plan_path
+from ..feed import FeedPlan, FeedRequest, Limits, plan_path
 from ..pipeline import (
     axis_limits,
     controller_limits,
@@ -19,7 +20,8 @@ from ..pipeline import (
     program_limits,
     stop_terms,
 )
-from ..program import ProgramOptions, compile_path, encode
+from ..program import ProgramOptions, StopTerms, compile_path, encode
+from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
 from .sdo.controller import Controller
@@ -35,8 +37,8 @@ DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
 FOLLOWING_SHARE = 0.5
 """Of the axis limits, for moves of axes after x, y, z: at their full speed they could not stop within stop_time_ms."""
 QUICK_ABOVE_MM = 50.0
-"""Stops of longer moves in space are searched with few trials: more take up to half a minute, and
-make them shorter by 8 % at most."""
+"""Stops of longer moves in space are searched with few trials. All trials take up to 36 s of processor time, and make
+stops 8 % shorter at most."""
 
 Place = tuple[float, ...]
 """Of path axes, mm or degrees: the two or three that draw a path, or these and the axes that follow them."""
@@ -67,14 +69,17 @@ def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
         plants(machine, limits),
         period_us=machine.period_us,
     )
-    is_long_in_space = len(start_mm) > PLANE_AXES and spline.length_mm > QUICK_ABOVE_MM
-    options = ProgramOptions(
-        "goto",
-        (),
-        program_limits(machine),
-        machine.period_us,
-        replace(stop_terms(machine, limits), quick=is_long_in_space),
-    )
+    terms = stop_terms(machine, limits)
+    if len(start_mm) > PLANE_AXES and spline.length_mm > QUICK_ABOVE_MM:
+        with suppress(LongStopError):  # all trials may find stops that are short enough
+            return _image(spline, plan, machine, replace(terms, quick=True))
+    return _image(spline, plan, machine, terms)
+
+
+def _image(
+    spline: PHSpline | SpatialPHSpline, plan: FeedPlan, machine: Machine, terms: StopTerms
+) -> bytes:
+    options = ProgramOptions("goto", (), program_limits(machine), machine.period_us, terms)
     return encode(compile_path(spline, plan, options).program)
 
 

@@ -33,7 +33,7 @@ from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
 from ..pipeline import Pipeline, program_limits
 from ..program.inspection import RING_BYTES
-from ..stream.chunk import largest_chunk
+from ..stream.chunk import BLOCK_HEAD, largest_chunk
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import JOURNAL_ELSEWHERE, Entry, Journal, journal_lock, load, mark
 from ..stream.output_check import require_outputs
@@ -369,8 +369,9 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
     kernel = options.kernel or machine.kernel
     found: list[StreamedMotion] = []
     begin_s = time.perf_counter()
+    most = largest_chunk(RING_BYTES - BLOCK_HEAD)
     with (
-        JobPlan(job, largest_chunk(RING_BYTES), 1, Place(), processes=_processes(options)) as plan,
+        JobPlan(job, most, 1, Place(), processes=_processes(options)) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():

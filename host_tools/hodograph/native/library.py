@@ -8,6 +8,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import HodographError
 
 
@@ -39,3 +42,10 @@ def text(pointer: Any) -> str:
     """A C string as Python text."""
     ffi, _ = library()
     return str(ffi.string(pointer).decode("utf-8"))
+
+
+def numbers(array: NDArray[Any]) -> Any:
+    """An array as C takes it: of int64_t, or of double, two of them for a complex number."""
+    ffi, _ = library()
+    kind = "int64_t *" if array.dtype == np.int64 else "double *"
+    return ffi.cast(kind, ffi.from_buffer(array))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .library import library
+from .library import library, numbers
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -33,11 +33,11 @@ class PhChain:
 
     def locate(self, arc_mm: Real, tolerance: float) -> tuple[Index, Real]:
         """Segment and xi (n,) at arc lengths (n,) on the path, to `tolerance` of the segment's length."""
-        s = np.ascontiguousarray(arc_mm)
+        s = np.ascontiguousarray(arc_mm, dtype=np.float64)
         segment, xi = np.empty(s.size, dtype=np.int64), np.empty(s.size)
         given, kept = self._struct()
         _, lib = library()
-        lib.ph_locate(given, s.size, _numbers(s), tolerance, _numbers(segment), _numbers(xi))
+        lib.ph_locate(given, s.size, numbers(s), tolerance, numbers(segment), numbers(xi))
         del kept
         return segment, xi
 
@@ -50,7 +50,7 @@ class PhChain:
         curvature = np.empty(x.size)
         given, kept = self._struct()
         _, lib = library()
-        lib.ph_frames(given, x.size, *map(_numbers, (at, x, r1, r2, r3, curvature)))
+        lib.ph_frames(given, x.size, *map(numbers, (at, x, r1, r2, r3, curvature)))
         del kept
         return r1, r2, r3, curvature
 
@@ -63,11 +63,4 @@ class PhChain:
             for one in (self.start, self.arc, self.speed, self.preimage, extra)
         ]
         counts = (self.arc.shape[0], int(self.extra is None), extra.shape[1])
-        return ffi.new("struct ph_chain *", (*counts, *map(_numbers, arrays))), arrays
-
-
-def _numbers(array: NDArray[Any]) -> Any:
-    """As C takes an array: of int64_t, or of double, two of them for a complex number."""
-    ffi, _ = library()
-    kind = "int64_t *" if array.dtype == np.int64 else "double *"
-    return ffi.cast(kind, ffi.from_buffer(array))
+        return ffi.new("struct ph_chain *", (*counts, *map(numbers, arrays))), arrays

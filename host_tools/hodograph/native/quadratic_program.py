@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .library import library
+from .library import library, numbers
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -81,11 +80,8 @@ def solve_quadratic(
     ]
     interval = np.ascontiguousarray(program.interval, dtype=np.int64)
 
-    def numbers(array: Real) -> Any:
-        return ffi.cast("double *", ffi.from_buffer(array))
-
     *first, least, most = map(numbers, arrays)
-    at = ffi.cast("int64_t *", ffi.from_buffer(interval))
+    at = numbers(interval)
     given = ffi.new(
         "struct quadratic_program *",
         (intervals, rows, penalty, curvature, tolerance, *first, at, least, most),

@@ -3,12 +3,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from .library import library
+from .library import library, numbers
 
 Real = NDArray[np.float64]
 
@@ -29,9 +27,6 @@ def least_squares_in_bounds(
     arrays = [np.ascontiguousarray(one) for one in (point, normal, bound, coefficient)]
     shift = np.array(start, dtype=np.float64, order="C")
     work = np.empty(int(lib.smoothing_work(count, ways)))
-
-    def numbers(array: Real) -> Any:
-        return ffi.cast("double *", ffi.from_buffer(array))
 
     given = ffi.new("struct smoothing *", (count, ways, *map(numbers, arrays)))
     lib.smoothing_solve(given, barrier, numbers(shift), numbers(work))

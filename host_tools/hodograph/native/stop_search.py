@@ -63,12 +63,12 @@ _MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class More:
-    """What else a search of codes is told of each piece.
+class SearchHints:
+    """Codes that a search of each piece has to fit, keeps, or tries first.
 
     before  codes (M, 3) of a brake out of which another may begin, 0: none
     kept    pieces (M,) whose codes keep the limits but for that; they stay if they keep them out of it too
-    start   codes (M, 3) that a search of few trials tries first, 0: those of the next piece
+    start   codes (M, 3) that the search tries first, 0: those of the next piece
     """
 
     before: NDArray[np.uint8] | None = None
@@ -76,7 +76,7 @@ class More:
     start: NDArray[np.uint8] | None = None
 
 
-NOTHING_MORE = More()
+NO_HINTS = SearchHints()
 
 
 class StopSearch:
@@ -107,15 +107,15 @@ class StopSearch:
         limits: StopLimits,
         given: NDArray[np.uint8],
         known: NDArray[np.bool_],
-        more: More = NOTHING_MORE,
+        hints: SearchHints = NO_HINTS,
     ) -> NDArray[np.uint8]:
         """Codes (M, 3): `given` where they are `known` (M,), found elsewhere."""
-        found = self._found(limits, given, known, more)
+        found = self._found(limits, given, known, hints)
         return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
 
     def mean_s(self, limits: StopLimits, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
         """Mean time to rest (M,) of stops from the instants of each piece at the rate 1, with these codes (M, 3)."""
-        found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), NOTHING_MORE)
+        found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), NO_HINTS)
         return np.array([one.mean_s for one in found])
 
     def _found(
@@ -123,7 +123,7 @@ class StopSearch:
         limits: StopLimits,
         given: NDArray[np.uint8],
         known: NDArray[np.bool_],
-        more: More,
+        hints: SearchHints,
     ) -> Any:
         """struct stop_found of each piece."""
         ffi, lib = library()
@@ -131,14 +131,14 @@ class StopSearch:
         found = ffi.new("struct stop_found[]", self._count)
         for one, codes, is_known in zip(found, given.tolist(), known.tolist(), strict=True):
             one.known, one.codes = is_known, codes
-        if more.before is not None:
-            for one, codes in zip(found, more.before.tolist(), strict=True):
+        if hints.before is not None:
+            for one, codes in zip(found, hints.before.tolist(), strict=True):
                 one.before = codes
-        if more.start is not None:
-            for one, codes in zip(found, more.start.tolist(), strict=True):
+        if hints.start is not None:
+            for one, codes in zip(found, hints.start.tolist(), strict=True):
                 one.start = codes
-        if more.kept is not None:
-            for one, is_kept in zip(found, more.kept.tolist(), strict=True):
+        if hints.kept is not None:
+            for one, is_kept in zip(found, hints.kept.tolist(), strict=True):
                 one.kept = is_kept
         path = self._path(own)
         lib.stop_search(self._program.pointer, own[0], path[0], found)

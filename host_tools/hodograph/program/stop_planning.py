@@ -20,7 +20,7 @@ from ..feed.limits import PerAxis
 from ..feed.pieces import halved
 from ..native.program import NativeProgram
 from ..native.stop_bounds import stop_bounds
-from ..native.stop_search import More, StopLimits, StopSearch
+from ..native.stop_search import SearchHints, StopLimits, StopSearch
 from .check_stops import END_TICKS, own_bounds
 from .image import Program, encode
 from .stops import DECELERATION, FAULT, HOLD, Stops, no_stops
@@ -63,7 +63,7 @@ class StopTerms:
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
     quick         few numbers are tried: for long programs
-    only_fault    no numbers for holds are searched: enough to see where fault stops may begin
+    only_fault    with `quick`: no numbers for holds are searched, enough to see where fault stops may begin
     """
 
     plants: Plants | None = None
@@ -319,11 +319,11 @@ def _search_round(
     hold, fault = codes[:, HOLD], codes[:, FAULT]
     if not known[:, HOLD].all():
         start = fault if quick else None
-        hold[:] = search.codes(limits[HOLD], hold, known[:, HOLD], More(start=start))
+        hold[:] = search.codes(limits[HOLD], hold, known[:, HOLD], SearchHints(start=start))
     given = known[:, FAULT] & (known[:, HOLD] | (hold[:, DECELERATION] == 0))
     if not given.all():
         kept = known[:, FAULT] & ~given & (fault[:, DECELERATION] != 0) if quick else None
-        fault[:] = search.codes(limits[FAULT], fault, given, More(before=hold, kept=kept))
+        fault[:] = search.codes(limits[FAULT], fault, given, SearchHints(before=hold, kept=kept))
 
 
 def _better_without(program: Program, kind: int, groups: Sequence[object]) -> NDArray[np.bool_]:

@@ -44,8 +44,8 @@ _MOST_LATE = 0.3
 """Share of the time: where more is late in a plan, it shows too few places where stops may begin."""
 
 
-def late_mostly(program: Program, stop_time_s: float) -> bool:
-    """Whether a fault stop may take longer than `stop_time_s` from so many pieces that few others are left."""
+def late_too_often(program: Program, stop_time_s: float) -> bool:
+    """Whether fault stops may take longer than `stop_time_s` for more than _MOST_LATE of the time."""
     seconds = program.pieces.duration_s
     late = program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s
     return float(seconds[late].sum()) > _MOST_LATE * float(seconds.sum())

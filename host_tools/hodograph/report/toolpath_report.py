@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..job import JobMotion
-from ..job_view import programmed_view, source_lines
+from ..job_view import with_programmed
 from ..pipeline import proved_limits
 from .page import Figure, render, write_page
 from .style import styled
@@ -112,10 +112,4 @@ def view_data(run: JobMotion) -> dict[str, object]:
         ):
             columns[name] += np.round(values, 4).tolist()
         columns["r"] += section.is_rapid_at(s_mm).astype(int).tolist()
-    tolerances = {section.tolerance_mm for section in run.job.sections}
-    return {
-        **columns,
-        "text": source_lines(run.job, columns["l"]),
-        "programmed": programmed_view(run.job, np.zeros(3)),
-        "tolerance": tolerances.pop() if len(tolerances) == 1 else 0.0,
-    }
+    return with_programmed(run.job, columns, np.zeros(3))

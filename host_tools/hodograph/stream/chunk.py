@@ -28,7 +28,7 @@ TIME_UNKNOWN = 0xFFFFFFFF
 LEAST_SHARED_PIECES = 16
 """The largest look-ahead window of the controller: so many pieces before a joint are in both chunks."""
 
-_BLOCK_HEAD = 384
+BLOCK_HEAD = 384
 """Bytes of the ring that the controller takes for each chunk at most, beside its own."""
 
 _HEADER = struct.Struct("<4sHH I I I I I I I I q Q q I I II".replace(" ", ""))
@@ -39,7 +39,7 @@ def largest_chunk(free_bytes: int) -> int:
     """Bytes of a chunk for which there is room as soon as its predecessor is the active one, in a ring with so many
     free bytes (object 0x2060 sub 7) without a job: a third of it, heads included; docs/reference/protocol.md 3.7.
     """
-    return max((free_bytes - 2 * _BLOCK_HEAD) // 3 - 8, 0)
+    return max((free_bytes - 2 * BLOCK_HEAD) // 3 - 8, 0)
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,6 @@ class PathsJob:
             if place is None:
                 pipeline, begun = self._begun(pipeline, begin_q40, switched), number
             else:
-                begin_q40 = 0
                 switched.act(self._events(pipeline))
             if end_q40 is not None:
                 self._require_meeting(number, pipeline, end_q40)

@@ -333,10 +333,9 @@ def _with_same_ends(contours: Contours) -> Iterator[list[int]]:
     first = np.argmax(differs, axis=1)[:, None]
     falls = np.take_along_axis(start, first, 1) > np.take_along_axis(end, first, 1)
     ends = np.where(falls, np.hstack((end, start)), ends)
-    count = len(contours)
     order = np.lexsort(ends.T)
-    same = np.append((ends[order[1:]] == ends[order[:-1]]).all(axis=1), False)
-    for run in np.split(order, np.flatnonzero(~same)[: count - 1] + 1):
+    same = (ends[order[1:]] == ends[order[:-1]]).all(axis=1)
+    for run in np.split(order, np.flatnonzero(~same) + 1):
         if run.size < 2:
             continue
         alike: dict[tuple[int, int], list[int]] = {}

@@ -219,8 +219,9 @@ class _Reader:
             number, text = entry[0], self._text(*entry)
             if number == 1 and text.startswith(_UTF_16):
                 raise self._error(1, "text in UTF-16: save it as UTF-8")
-            if named := _SEPARATOR.fullmatch(text):
-                self._options = replace(self._options, separator=named[1])
+            if number == 1 and (named := _SEPARATOR.fullmatch(text)):
+                if self._options.separator == "auto":
+                    self._options = replace(self._options, separator=named[1])
             elif text:
                 layout, is_header = self._layout(number, text)
                 if not is_header:

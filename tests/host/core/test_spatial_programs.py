@@ -20,7 +20,7 @@ from hodograph.native.feed_override import FeedOverride
 from hodograph.native.library import library
 from hodograph.native.program import NativeLimits, NativeProgram, kernel_code
 from hodograph.native.stop_bounds import stop_bounds
-from hodograph.native.stop_search import More, StopLimits, StopSearch
+from hodograph.native.stop_search import SearchHints, StopLimits, StopSearch
 from hodograph.native.stop_trial import run_trials
 from hodograph.program import Program, decode
 from hodograph.program.image import RECORD_BYTES, memory_bytes
@@ -438,7 +438,7 @@ def with_stops(case: Case, hold: StopLimits, fault: StopLimits) -> bytes:
     search = StopSearch(NativeProgram(case.image()))
     none, nothing = np.zeros((count, 3), np.uint8), np.zeros(count, np.bool_)
     own = search.codes(hold, none, nothing)
-    codes = np.stack([own, search.codes(fault, none, nothing, More(before=own))], axis=1)
+    codes = np.stack([own, search.codes(fault, none, nothing, SearchHints(before=own))], axis=1)
     feed = replace(case.feed, stops=replace(no_stops(count), codes=codes))
     program = NativeProgram(image(case.segments, feed))
     (hold_us, hold_um), (fault_us, fault_um) = (stop_bounds(program, kind) for kind in (0, 1))

@@ -23,13 +23,12 @@ _CURVATURE = 1e-8
 class Problem:
     """Least gradient @ x + x @ hessian @ x / 2 over low <= x <= high and the rows.
 
-    x (2 n + 2,) are q and dq/ds at each knot; their `scale` makes them about 1. `guess`: about what they will be.
+    x (2 n + 2,) are q and dq/ds at each knot; their `scale` makes them about 1.
     """
 
     gradient: Real
     hessian: Real  # (n, 4, 4), of the unknowns of each interval
     scale: Real
-    guess: Real
     low: Real
     high: Real
     rows: Rows
@@ -48,7 +47,7 @@ def solve(
     unit = 1.0 / np.abs(gradient).max()
     found = solve_quadratic(
         _scaled(problem, gradient, unit),
-        problem.guess / scale,
+        np.tile((1.0, 0.0), scale.size // 2),  # the feed before, without slopes
         tolerance=tolerance,
         curvature=_CURVATURE,
         penalty=0.0 if penalty is None else penalty * unit,

@@ -80,7 +80,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A feed over a grid; excess: greatest share by which it is above a limit; rounds: linear programs solved."""
+    """A feed over a grid; excess: greatest share by which it is above a limit; rounds: quadratic programs solved."""
 
     grid: Grid
     q: Real
@@ -136,7 +136,7 @@ def plan_window(
     before_s: float | None = None,
     effort: Effort = _WHOLE,
 ) -> Solution | None:
-    """From `low` to rest at `high`; None where the linear programs have no solution (a moving start only).
+    """From `low` to rest at `high`; None where the quadratic programs have no solution (a moving start only).
 
     known     an earlier solution that is good up to arc length known_to
     hurried   the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
@@ -481,9 +481,7 @@ def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float
     if setting.tight is not None:
         rows.high[:] /= setting.tight[rows.interval]
         rows.low[:] /= setting.tight[rows.interval]
-    guess = scale.copy()
-    guess[1::2] = 0.0
-    return Problem(*_cost(setting, p), scale, guess, low, high, rows)
+    return Problem(*_cost(setting, p), scale, low, high, rows)
 
 
 def _rest_scale(grid: Grid, interval: int, q: float) -> tuple[float, float]:

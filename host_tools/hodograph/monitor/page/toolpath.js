@@ -88,13 +88,19 @@ export class Toolpath {
     return found;
   }
 
+  /** Square of how far a position on the curve may be from the chord that ends at point i: long jobs have long chords. */
+  near(i) {
+    const chord = Math.hypot(this.x[i] - this.x[i - 1], this.y[i] - this.y[i - 1], this.z[i] - this.z[i - 1]);
+    return (ON_PATH + chord / 4) ** 2;
+  }
+
   /** The point at a position in mm, near the last one where the path passes there; -1: it is not on the path. */
   at(x, y, z) {
     const among = (first, end) => {
-      let best = ON_PATH * ON_PATH, found = -1;
+      let best = Infinity, found = -1;
       for (let i = Math.max(1, first); i < Math.min(end, this.size); i += 1) {
         const away = this.away(i, x, y, z);
-        if (away < best) { best = away; found = i; }
+        if (away < best && away < this.near(i)) { best = away; found = i; }
       }
       return found;
     };

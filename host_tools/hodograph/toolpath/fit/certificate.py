@@ -23,8 +23,8 @@ _CHORD_SHARE = 0.005
 _MOST_PIECES = 4096
 _HALVINGS = 16
 _BESIDE = (2, 6, 6, 24)
-"""Neighbours that are looked at on either side, at first and after the first halvings: places of noisy chords belong to
-each other roughly only. After the last of these numbers 6 again, around the nearest one found."""
+"""Neighbours on either side of the nearest chord so far, at first and after each of the first halvings; after these, 6.
+In noise, places of two chains belong to each other only roughly."""
 
 _MOST_PAIRS = 100_000
 """Pairs of chords that are compared at once."""
