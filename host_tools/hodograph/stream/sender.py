@@ -198,10 +198,10 @@ class Sender:
         """The one in motion."""
         return self._ahead[0]
 
-    def _note_place(self, **changes: int) -> None:
-        """Writes to the journal where the job is."""
+    def _note_place(self, *coming: PlannedSection, **changes: int) -> None:
+        """Writes to the journal where the job is; `coming`: a section whose first chunk is sent next."""
         if self.journal is not None:
-            starts = tuple((one.number, one.start_q40) for one in self._ahead)
+            starts = tuple((one.number, one.start_q40) for one in (*self._ahead, *coming))
             self.journal.update(section=self._section.number, starts=starts, **changes)
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
@@ -316,6 +316,9 @@ class Sender:
         if status is not None and status.free_bytes < len(data):
             return None
         place = f"{section.file}:{header.line}"
+        if header.rest is not None:
+            # Before the transfer: if this process is killed then, the motion may already be there.
+            self._note_place(section)
         begun_s = self.at.controller.clock.now_s()
         if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
             return None
