@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import json
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,15 @@ def bench(make_bench: MakeBench) -> Bench:
     return make_bench(file=MILL)
 
 
+def _await(clock: VirtualClock, command: Command, reached: Callable[[], bool]) -> None:
+    """Waits until it is so, while the command goes on."""
+    end_s = clock.now_s() + WAIT_S
+    while not reached():
+        assert clock.now_s() < end_s
+        assert command.child.poll() is None, command.err
+        clock.sleep(0.02)
+
+
 @pytest.fixture
 def under_way(bench: Bench, clock: VirtualClock, tmp_path: Path) -> Iterator[Command]:
     """A job that is 4 mm along its second section."""
@@ -46,11 +55,7 @@ def under_way(bench: Bench, clock: VirtualClock, tmp_path: Path) -> Iterator[Com
     with running(
         clock, "stream", str(file), "--machine", str(MILL), *journal, name="stream"
     ) as command:
-        end_s = clock.now_s() + WAIT_S
-        while bench.controller.targets(2)[1] < 4 * COUNTS_PER_MM:
-            assert clock.now_s() < end_s
-            assert command.child.poll() is None, command.err
-            clock.sleep(0.02)
+        _await(clock, command, lambda: bench.controller.targets(2)[1] >= 4 * COUNTS_PER_MM)
         yield command
 
 
@@ -161,11 +166,7 @@ def test_a_list_of_paths_goes_on_where_axes_turn_alone(
     with running(
         clock, "stream", str(EXAMPLES / "facets.toml"), *journal, name="stream"
     ) as command:
-        end_s = clock.now_s() + WAIT_S
-        while bench.controller.targets(5)[4] < 30 * COUNTS_PER_DEG:
-            assert clock.now_s() < end_s
-            assert command.child.poll() is None, command.err
-            clock.sleep(0.02)
+        _await(clock, command, lambda: bench.controller.targets(5)[4] >= 30 * COUNTS_PER_DEG)
         command.signal(signal.SIGINT)
         assert command.wait(WAIT_S) == 128 + signal.SIGINT
     *stands, _, c = bench.controller.targets(5)
