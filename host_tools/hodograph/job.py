@@ -241,7 +241,7 @@ class JobSection:
 
     @property
     def length_mm(self) -> float:
-        """Way of x, y and z."""
+        """Length of the curve of x, y and z; 0 where they stand."""
         return self.fitted.curve.length_mm if self.stands_at is None else 0.0
 
     @property

@@ -36,7 +36,7 @@ def curve_view(job: Job) -> dict[str, object]:
     sections = [section for section in job.sections if section.stands_at is None]
     offset_mm = np.array([*job.machine.offset_mm, 0.0][:3])
     whole_s = sum(section.pipeline.plan.duration_s for section in sections)
-    columns: dict[str, list[object]] = {name: [] for name in "xyzflr"}
+    columns = no_places()
     for section in sections:
         plan = section.pipeline.plan
         share = plan.duration_s / max(whole_s, 1e-9)
@@ -44,8 +44,13 @@ def curve_view(job: Job) -> dict[str, object]:
         t_s = np.linspace(0.0, plan.duration_s, max(count, 2))
         s_mm = plan.arc_length(t_s)
         at = section.fitted.curve.point(s_mm) + offset_mm
-        _append(columns, section, s_mm, np.column_stack((at, plan.feed(t_s))))
+        append_places(columns, section, s_mm, np.column_stack((at, plan.feed(t_s))))
     return with_programmed(job, columns, offset_mm)
+
+
+def no_places() -> dict[str, list[object]]:
+    """The columns of `append_places`, empty: x, y, z in mm, f (feed in mm/s), l (source line), r (1: rapid move)."""
+    return {name: [] for name in "xyzflr"}
 
 
 def with_programmed(
@@ -61,7 +66,7 @@ def with_programmed(
     }
 
 
-def _append(
+def append_places(
     columns: dict[str, list[object]], section: JobSection, s_mm: Real, values: Real
 ) -> None:
     """Adds places of a section at arc lengths (n,) with their x, y, z and feed (n, 4)."""

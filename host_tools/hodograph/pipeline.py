@@ -546,7 +546,7 @@ def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeli
     points = np.concatenate((path.points, path.extra), axis=1)
     still = np.zeros((len(points), count - path.axes))
     moved = np.concatenate((points, still), axis=1)[:, first:]
-    _require_one_way(file, moved, path.closed)
+    _require_one_direction(file, moved, path.closed)
     limits = replace(
         file.limits, axis=file.limits.axis.behind(first), names=AXES[: path.axes - first]
     )
@@ -558,7 +558,7 @@ def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeli
     )
 
 
-def _require_one_way(file: PathFile, moved: NDArray[np.float64], closed: bool) -> None:
+def _require_one_direction(file: PathFile, moved: NDArray[np.float64], closed: bool) -> None:
     """Raises PlanError: the only axis that turns turns back, which a smooth curve does by a loop of another axis."""
     turning = np.flatnonzero(np.ptp(moved, axis=0))
     step = np.diff(moved[:, turning[0]])
@@ -567,8 +567,8 @@ def _require_one_way(file: PathFile, moved: NDArray[np.float64], closed: bool) -
         return
     place = "a closed path" if closed else f"point {back[0]}"
     raise PlanError(
-        f"{file.file}: [path] the only axis that turns turns back at {place}: end the path there, and give the way "
-        "back a file of its own"
+        f"{file.file}: [path] the only axis that turns turns back at {place}: end the path there, and put the rest "
+        "into a file of its own"
     )
 
 

@@ -558,13 +558,16 @@ def _drive_file() -> Schema:
     }
     in_one_unit = {
         key: _number(f"Gain of the servo loop in {unit}", 0, 1e6)
-        for keys, unit in ((MOTOR_GAINS, "mm of way"), (MOTOR_GAINS.values(), "rad of the motor"))
+        for keys, unit in (
+            (MOTOR_GAINS, "mm of table motion"),
+            (MOTOR_GAINS.values(), "rad of the motor"),
+        )
         for key in keys
     }
     integral = _choice("Euler's method of the loop's integral", INTEGRALS, "backward")
     pairs = [
-        {"oneOf": [{"required": [by_way]}, {"required": [by_motor]}]}
-        for by_way, by_motor in MOTOR_GAINS.items()
+        {"oneOf": [{"required": [by_table]}, {"required": [by_motor]}]}
+        for by_table, by_motor in MOTOR_GAINS.items()
     ]
     return _table(
         "A drive file of Hodograph: one simulated axis",

@@ -26,7 +26,7 @@
 enum { WIDTH = 4, BAND = 3, LOWER = 10, MOST_ITERATIONS = 100, MOST_STALLED = 6 };
 static const double NEAR = 1e-3;
 static const double LEAST_TARGET = 0.01; /* of the gap, in tolerances: below it is rounding */
-static const double STEP_SHARE = 0.995;  /* of the way to the nearest boundary */
+static const double STEP_SHARE = 0.995;  /* of the distance to the nearest boundary */
 static const double LEAST_PIVOT = 1e-15; /* as a share of the diagonal */
 static const double FARTHEST = 1e8;      /* unknowns add up to less */
 static const double START_PRODUCT = 0.1; /* of slack and multiplier of each side */
@@ -41,14 +41,14 @@ struct side {
     double excess;          /* a x - t + slack - most */
     double inverse, weight; /* 1 / slack, multiplier / slack */
     double d_slack, d_multiplier;
-    double pull; /* (second order term - target) / slack, 0 in the predictor */
+    double correction; /* (product of the steps - target) / slack; 0 in the predictor */
 };
 
-/* An interval: its sides, the soft ones first, and the share t by which these may be exceeded. */
+/* An interval: its sides, the soft ones first, and its share t: by how much the soft sides may be exceeded. */
 struct link {
-    uint32_t first, hard, end; /* numbers of its sides; `hard`: the first hard one */
-    double share, price;       /* t and its multiplier */
-    double d_share, d_price, pull;
+    uint32_t first, hard, end;      /* numbers of its sides; `hard`: the first hard one */
+    double share, share_multiplier; /* t, and the multiplier of t >= 0 */
+    double d_share, d_share_multiplier, correction;
     double sum, own;    /* W, w */
     double mean[WIDTH]; /* m */
     double right;       /* right side of the equation of t */
@@ -70,11 +70,11 @@ struct solving {
     double count;  /* of products of slack and multiplier */
     double length; /* share of the last step that is taken */
     double objective;
-    double gap;        /* sum of all products */
-    double bend;       /* sum of the products of their steps */
-    double violated;   /* the greatest excess, slack aside */
-    double unbalanced; /* the greatest entry of the residual, that of shares among them */
-    double value;      /* sum of most multiplier */
+    double gap;           /* sum of slack multiplier, those of the shares among them */
+    double step_products; /* sum of d_slack d_multiplier, those of the shares among them */
+    double violated;      /* the greatest excess, slack aside */
+    double unbalanced;    /* the greatest entry of the residual, that of shares among them */
+    double value;         /* sum of most multiplier */
 };
 
 static size_t numbers_of(size_t bytes)
@@ -97,7 +97,7 @@ static double *taken(double **work, size_t count)
     return own;
 }
 
-/* The same behind some zeros. */
+/* The same, with some zeros before it. */
 static double *zeros_taken(double **work, size_t zeros, size_t count)
 {
     double *before = taken(work, zeros + count);
@@ -247,7 +247,7 @@ static void link_move(const struct solving *s, struct link *link)
         one->multiplier += s->length * one->d_multiplier;
     }
     link->share += s->length * link->d_share;
-    link->price += s->length * link->d_price;
+    link->share_multiplier += s->length * link->d_share_multiplier;
 }
 
 /* Excesses and weights of an interval's sides, and what they add to the residual. */
@@ -256,7 +256,7 @@ static void link_evaluate(struct solving *s, uint32_t interval)
     struct link *link = &s->links[interval];
     const double *x = s->x + 2 * (size_t)interval;
     double *residual = s->residual + 2 * (size_t)interval;
-    double pull[WIDTH] = {0.0};
+    double added[WIDTH] = {0.0};
     for (uint32_t k = link->first; k < link->end; k++) {
         struct side *one = &s->sides[k];
         const double share = k < link->hard ? link->share : 0.0;
@@ -264,16 +264,16 @@ static void link_evaluate(struct solving *s, uint32_t interval)
         one->excess = beyond + one->slack;
         one->inverse = 1.0 / one->slack;
         one->weight = one->multiplier * one->inverse;
-        one->pull = 0.0;
+        one->correction = 0.0;
         s->gap += one->slack * one->multiplier;
         s->value += one->most * one->multiplier;
         s->violated = beyond > s->violated ? beyond : s->violated;
         for (uint32_t l = 0; l < WIDTH; l++) {
-            pull[l] += one->a[l] * one->multiplier;
+            added[l] += one->a[l] * one->multiplier;
         }
     }
     for (uint32_t l = 0; l < WIDTH; l++) {
-        residual[l] += pull[l];
+        residual[l] += added[l];
     }
 }
 
@@ -287,12 +287,12 @@ static double worse(double worst, double value)
 static void share_evaluate(struct solving *s, struct link *link)
 {
     const struct quadratic_program *p = s->given;
-    double rest = p->penalty + p->curvature * link->share - link->price;
+    double rest = p->penalty + p->curvature * link->share - link->share_multiplier;
     for (uint32_t k = link->first; k < link->hard; k++) {
         rest -= s->sides[k].multiplier;
     }
-    link->pull = 0.0;
-    s->gap += link->share * link->price;
+    link->correction = 0.0;
+    s->gap += link->share * link->share_multiplier;
     s->objective += (p->penalty + 0.5 * p->curvature * link->share) * link->share;
     s->unbalanced = worse(s->unbalanced, rest);
 }
@@ -312,7 +312,7 @@ static void mean_make(const struct solving *s, struct link *link)
         link->mean[l] = sum > 0.0 ? mean[l] / sum : 0.0;
     }
     link->sum = sum;
-    link->own = s->soft ? s->given->curvature + link->price / link->share : 1.0;
+    link->own = s->soft ? s->given->curvature + link->share_multiplier / link->share : 1.0;
 }
 
 /* Adds weight (a - m) (a - m)' of sides to the lower half of a block, row by row. */
@@ -364,7 +364,7 @@ static void soft_right(const struct solving *s, struct link *link, double *sum)
     double soft = 0.0, multipliers = 0.0;
     for (uint32_t k = link->first; k < link->hard; k++) {
         const struct side *one = &s->sides[k];
-        const double own = one->weight * one->excess - one->pull;
+        const double own = one->weight * one->excess - one->correction;
         soft += own;
         multipliers += one->multiplier;
         for (uint32_t l = 0; l < WIDTH; l++) {
@@ -372,7 +372,7 @@ static void soft_right(const struct solving *s, struct link *link, double *sum)
         }
     }
     const double all = link->sum + link->own;
-    const double alone = -p->penalty - p->curvature * link->share - link->pull;
+    const double alone = -p->penalty - p->curvature * link->share - link->correction;
     const double both = link->own * (soft - multipliers) - link->sum * (alone + multipliers);
     link->right = alone + soft;
     for (uint32_t l = 0; l < WIDTH; l++) {
@@ -390,7 +390,7 @@ static void link_right(struct solving *s, uint32_t interval)
     }
     for (uint32_t k = link->hard; k < link->end; k++) {
         const struct side *one = &s->sides[k];
-        const double own = one->weight * one->excess - one->multiplier - one->pull;
+        const double own = one->weight * one->excess - one->multiplier - one->correction;
         for (uint32_t l = 0; l < WIDTH; l++) {
             sum[l] += one->a[l] * own;
         }
@@ -441,7 +441,7 @@ static void matrix_factor(struct solving *s)
         row[1] = u2 * pivot[-2];
         row[2] = u1 * pivot[-1];
         const double own = row[3] - u3 * row[0] - u2 * row[1] - u1 * row[2];
-        /* A pivot that rounding has used up: the unknown stays as it is. */
+        /* Rounding left no digit of this pivot: the unknown stays as it is. */
         pivot[0] = own > LEAST_PIVOT * row[3] && !known(s->given, i) ? 1.0 / own : 0.0;
     }
 }
@@ -475,12 +475,13 @@ static double reach(double value, double step, double most)
 static double side_step(struct solving *s, struct side *one, double moved, double most)
 {
     one->d_slack = -one->excess - moved;
-    one->d_multiplier = -one->multiplier - one->pull - one->weight * one->d_slack;
-    s->bend += one->d_slack * one->d_multiplier;
+    one->d_multiplier = -one->multiplier - one->correction - one->weight * one->d_slack;
+    s->step_products += one->d_slack * one->d_multiplier;
     return reach(one->multiplier, one->d_multiplier, reach(one->slack, one->d_slack, most));
 }
 
-/* What the step of the unknowns means for an interval. Returns how far it may go, at most as far as `most`. */
+/* The steps of an interval's sides and share that follow from the step of the unknowns. Returns how far the step may go
+ * as a share of it, at most `most`. */
 static double link_step(struct solving *s, uint32_t interval, double most)
 {
     struct link *link = &s->links[interval];
@@ -489,10 +490,11 @@ static double link_step(struct solving *s, uint32_t interval, double most)
         const double all = link->sum + link->own, mean = dot(link->mean, dx);
         const double base = (link->own * mean - link->right) / all;
         link->d_share = (link->right + link->sum * mean) / all;
-        link->d_price = -link->price - link->pull - link->price / link->share * link->d_share;
-        s->bend += link->d_share * link->d_price;
+        link->d_share_multiplier = -link->share_multiplier - link->correction -
+                                   link->share_multiplier / link->share * link->d_share;
+        s->step_products += link->d_share * link->d_share_multiplier;
         most = reach(link->share, link->d_share, most);
-        most = reach(link->price, link->d_price, most);
+        most = reach(link->share_multiplier, link->d_share_multiplier, most);
         for (uint32_t k = link->first; k < link->hard; k++) {
             struct side *one = &s->sides[k];
             double moved = base;
@@ -508,19 +510,19 @@ static double link_step(struct solving *s, uint32_t interval, double most)
     return most;
 }
 
-/* Solves for a step. Returns how far it may go: less than to the nearest boundary, and not beyond its end. */
+/* Solves for a step. Returns the share of it to take: at most 1, and STEP_SHARE of the distance to the nearest boundary. */
 static double direction(struct solving *s)
 {
     double most = 1.0 / STEP_SHARE;
     matrix_solve(s);
-    s->bend = 0.0;
+    s->step_products = 0.0;
     for (uint32_t i = 0; i < s->given->intervals; i++) {
         most = link_step(s, i, most);
     }
     return STEP_SHARE * most;
 }
 
-/* The right side of the corrector: the terms of second order of the predictor, and the target of each product. */
+/* The right side of the corrector: the products of the predictor's steps, and the target of each product. */
 static void correct(struct solving *s, double target)
 {
     memset(s->step, 0, sizeof(double) * s->size);
@@ -528,16 +530,16 @@ static void correct(struct solving *s, double target)
         struct link *link = &s->links[i];
         for (uint32_t k = link->first; k < link->end; k++) {
             struct side *one = &s->sides[k];
-            one->pull = (one->d_slack * one->d_multiplier - target) * one->inverse;
+            one->correction = (one->d_slack * one->d_multiplier - target) * one->inverse;
         }
         if (s->soft) {
-            link->pull = (link->d_share * link->d_price - target) / link->share;
+            link->correction = (link->d_share * link->d_share_multiplier - target) / link->share;
         }
         link_right(s, i);
     }
 }
 
-/* Slack as the unknowns leave it, or some more, and a multiplier for it. */
+/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes START_PRODUCT. */
 static void hard_start(struct side *one, double left)
 {
     const double least = fmax(LEAST_SLACK, START_SLACK * sqrt(dot(one->a, one->a)));
@@ -545,7 +547,8 @@ static void hard_start(struct side *one, double left)
     one->multiplier = START_PRODUCT / one->slack;
 }
 
-/* A share that leaves slack to every soft side. One half of the penalty is the sides', the other the share's. */
+/* Starts a share so that every soft side has slack. The multipliers of the sides add up to half the penalty, and the
+ * multiplier of the share is the other half. */
 static void soft_start(const struct solving *s, struct link *link, const double *x)
 {
     double over = 0.0, sum = 0.0;
@@ -555,7 +558,7 @@ static void soft_start(const struct solving *s, struct link *link, const double 
         over = fmax(over, -one->slack);
     }
     link->share = 1.0 + 2.0 * over;
-    link->price = 0.5 * s->given->penalty;
+    link->share_multiplier = 0.5 * s->given->penalty;
     for (uint32_t k = link->first; k < link->hard; k++) {
         s->sides[k].slack += link->share;
         sum += 1.0 / s->sides[k].slack;
@@ -578,7 +581,7 @@ static void start(struct solving *s)
         if (s->soft) {
             soft_start(s, link, x);
         } else {
-            link->share = link->price = 1.0;
+            link->share = link->share_multiplier = 1.0;
         }
         for (uint32_t k = link->hard; k < link->end; k++) {
             hard_start(&s->sides[k], s->sides[k].most - dot(s->sides[k].a, x));
@@ -587,8 +590,9 @@ static void start(struct solving *s)
     s->length = 0.0;
 }
 
-/* Whether the multipliers prove that there is no solution: their sum of all sides says 0 <= value < 0 nearly, for
- * unknowns that are not beyond all measure (Farkas). */
+/* Whether the multipliers prove that there is no solution (lemma of Farkas): the sum of all sides, each times its
+ * multiplier, is a x <= value with a of at most `rest`. With value < -FARTHEST rest no x with entries that add up to
+ * less than FARTHEST satisfies it. */
 static bool impossible(const struct solving *s)
 {
     double rest = 0.0;
@@ -644,12 +648,12 @@ static struct solving solving_begin(const struct quadratic_program *p, double *u
     return s;
 }
 
-/* Mehrotra's step: a predictor without a target says how near the boundary is, which makes the corrector's target. */
+/* Mehrotra's step. The predictor has the target 0. How far it may go gives the target of the corrector. */
 static void step_make(struct solving *s)
 {
     matrix_factor(s);
     const double length = direction(s);
-    const double left = fmax(0.0, 1.0 - length + length * length * s->bend / s->gap);
+    const double left = fmax(0.0, 1.0 - length + length * length * s->step_products / s->gap);
     const double least = LEAST_TARGET * s->given->tolerance * fmax(1.0, fabs(s->objective));
     correct(s, fmax(left * left * left * s->gap, least) / s->count);
     s->length = direction(s);

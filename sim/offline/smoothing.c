@@ -10,12 +10,12 @@ enum { SMOOTHING_ORDER = 3, SMOOTHING_STEPS = 60, SMOOTHING_TRIALS = 40 };
 static const double SMOOTHING_CLOSE = 1e-3;  /* a step that gains less, in barriers, is the last */
 static const double SMOOTHING_FIRST = 1e-3;  /* barrier of the first minimum */
 static const double SMOOTHING_SHRINK = 0.1;  /* of the barrier, from one minimum to the next */
-static const double SMOOTHING_INSIDE = 0.95; /* of the way to the nearest bound */
+static const double SMOOTHING_INSIDE = 0.95; /* of the distance to the nearest bound */
 static const double SMOOTHING_GAIN = 0.1;    /* of the gain that the gradient promises */
 
 /* Shifts, and what follows from them. */
 struct smoothing_state {
-    double *shift;      /* [count][ways] */
+    double *shift;      /* [count][directions] */
     double *room;       /* [count]: what is left of the squares of the bounds */
     double *difference; /* [count - 3][3] */
     double value;       /* sum of squares and barrier; inf outside the bounds */
@@ -32,12 +32,12 @@ struct smoothing_search {
     struct smoothing_state at, tried;
 };
 
-size_t smoothing_work(uint32_t count, uint32_t ways)
+size_t smoothing_work(uint32_t count, uint32_t directions)
 {
     const size_t n = count;
-    const size_t width = (size_t)SMOOTHING_ORDER * ways + ways;
-    const size_t state = n * ways + n + 3 * n;
-    return 3 * n + 2 * n * ways * width + 2 * n * ways + 2 * state;
+    const size_t width = (size_t)SMOOTHING_ORDER * directions + directions;
+    const size_t state = n * directions + n + 3 * n;
+    return 3 * n + 2 * n * directions * width + 2 * n * directions + 2 * state;
 }
 
 static double *smoothing_taken(double **work, size_t count)
@@ -50,7 +50,7 @@ static double *smoothing_taken(double **work, size_t count)
 static struct smoothing_state smoothing_state(const struct smoothing *s, double **work)
 {
     struct smoothing_state made = {0};
-    made.shift = smoothing_taken(work, (size_t)s->count * s->ways);
+    made.shift = smoothing_taken(work, (size_t)s->count * s->directions);
     made.room = smoothing_taken(work, s->count);
     made.difference = smoothing_taken(work, (size_t)3 * s->count);
     return made;
@@ -66,11 +66,11 @@ static double smoothing_square(const struct smoothing *s, uint32_t k)
 static double smoothing_cosine(const struct smoothing *s, uint32_t k, uint32_t a, uint32_t l,
                                uint32_t b)
 {
-    const double *first = s->normal + (size_t)3 * s->ways * k;
-    const double *second = s->normal + (size_t)3 * s->ways * l;
+    const double *first = s->normal + (size_t)3 * s->directions * k;
+    const double *second = s->normal + (size_t)3 * s->directions * l;
     double sum = 0.0;
     for (uint32_t axis = 0; axis < 3; axis++) {
-        sum += first[axis * s->ways + a] * second[axis * s->ways + b];
+        sum += first[axis * s->directions + a] * second[axis * s->directions + b];
     }
     return sum;
 }
@@ -83,10 +83,10 @@ static void smoothing_couple(struct smoothing_search *m, uint32_t k, uint32_t la
     if (both == 0.0 || !(s->bound[k] > 0.0) || !(s->bound[l] > 0.0)) {
         return;
     }
-    for (uint32_t b = 0; b < s->ways; b++) {
-        const uint32_t row = l * s->ways + b;
-        for (uint32_t a = 0; a < s->ways; a++) {
-            const uint32_t column = k * s->ways + a;
+    for (uint32_t b = 0; b < s->directions; b++) {
+        const uint32_t row = l * s->directions + b;
+        for (uint32_t a = 0; a < s->directions; a++) {
+            const uint32_t column = k * s->directions + a;
             if (column <= row) {
                 double *entry =
                     m->hessian + (size_t)(m->width + 1) * row + m->width - (row - column);
@@ -111,8 +111,8 @@ static void smoothing_hessian(struct smoothing_search *m)
             }
             smoothing_couple(m, k, lag, both);
         }
-        for (uint32_t a = 0; a < s->ways && !(s->bound[k] > 0.0); a++) {
-            m->hessian[(size_t)(m->width + 1) * (k * s->ways + a) + m->width] = 1.0;
+        for (uint32_t a = 0; a < s->directions && !(s->bound[k] > 0.0); a++) {
+            m->hessian[(size_t)(m->width + 1) * (k * s->directions + a) + m->width] = 1.0;
         }
     }
 }
@@ -121,9 +121,10 @@ static void smoothing_move(struct smoothing_search *m, const double *shift)
 {
     const struct smoothing *s = m->given;
     for (uint32_t i = 0; i < 3 * s->count; i++) {
-        const double *normal = s->normal + (size_t)s->ways * i;
-        const double *own = shift + (size_t)s->ways * (i / 3);
-        m->point[i] = s->point[i] + normal[0] * own[0] + (s->ways > 1 ? normal[1] * own[1] : 0.0);
+        const double *normal = s->normal + (size_t)s->directions * i;
+        const double *own = shift + (size_t)s->directions * (i / 3);
+        m->point[i] =
+            s->point[i] + normal[0] * own[0] + (s->directions > 1 ? normal[1] * own[1] : 0.0);
     }
 }
 
@@ -143,8 +144,8 @@ static void smoothing_evaluate(struct smoothing_search *m, struct smoothing_stat
     for (uint32_t k = 0; k < s->count; k++) {
         const double square = smoothing_square(s, k);
         at->room[k] = square;
-        for (uint32_t a = 0; a < s->ways; a++) {
-            at->room[k] -= at->shift[k * s->ways + a] * at->shift[k * s->ways + a];
+        for (uint32_t a = 0; a < s->directions; a++) {
+            at->room[k] -= at->shift[k * s->directions + a] * at->shift[k * s->directions + a];
         }
         inside = inside && at->room[k] > 0.0;
         barrier -= inside && s->bound[k] > 0.0 ? log(at->room[k] / square) : 0.0;
@@ -155,18 +156,18 @@ static void smoothing_evaluate(struct smoothing_search *m, struct smoothing_stat
 static void smoothing_gradient(struct smoothing_search *m, double level)
 {
     const struct smoothing *s = m->given;
-    double *pull = m->point; /* the points are no longer needed */
-    memset(pull, 0, sizeof(double) * 3 * s->count);
+    double *slope = m->point; /* the points are no longer needed */
+    memset(slope, 0, sizeof(double) * 3 * s->count);
     for (uint32_t i = 0; i < 3 * m->rows; i++) {
         for (uint32_t k = 0; k <= SMOOTHING_ORDER; k++) {
-            pull[i + 3 * k] += s->coefficient[(size_t)4 * (i / 3) + k] * m->at.difference[i];
+            slope[i + 3 * k] += s->coefficient[(size_t)4 * (i / 3) + k] * m->at.difference[i];
         }
     }
     for (uint32_t i = 0; i < m->size; i++) {
-        const uint32_t k = i / s->ways, a = i % s->ways;
+        const uint32_t k = i / s->directions, a = i % s->directions;
         double sum = 2.0 * level * m->at.shift[i] / m->at.room[k];
         for (uint32_t axis = 0; axis < 3; axis++) {
-            sum += s->normal[(size_t)s->ways * (3 * k + axis) + a] * pull[3 * k + axis];
+            sum += s->normal[(size_t)s->directions * (3 * k + axis) + a] * slope[3 * k + axis];
         }
         m->gradient[i] = s->bound[k] > 0.0 ? sum : 0.0;
     }
@@ -178,8 +179,8 @@ static void smoothing_curvature(struct smoothing_search *m, double level)
     const struct smoothing *s = m->given;
     memcpy(m->band, m->hessian, sizeof(double) * (m->width + 1) * m->size);
     for (uint32_t i = 0; i < m->size; i++) {
-        const uint32_t first = i - i % s->ways;
-        const double room = m->at.room[i / s->ways];
+        const uint32_t first = i - i % s->directions;
+        const double room = m->at.room[i / s->directions];
         double *row = m->band + (size_t)(m->width + 1) * i + m->width - i;
         for (uint32_t j = first; j <= i; j++) {
             row[j] += 4.0 * level * m->at.shift[i] * m->at.shift[j] / (room * room);
@@ -238,7 +239,7 @@ static double smoothing_step(struct smoothing_search *m, double level)
     smoothing_curvature(m, level);
     const bool sound = smoothing_factor(m);
     for (uint32_t i = 0; i < m->size; i++) {
-        const double flat = 2.0 * level / m->at.room[i / m->given->ways];
+        const double flat = 2.0 * level / m->at.room[i / m->given->directions];
         m->step[i] = sound ? -m->gradient[i] : -m->gradient[i] / flat;
     }
     if (sound) {
@@ -257,8 +258,8 @@ static double smoothing_longest(const struct smoothing_search *m)
     double least = (double)INFINITY;
     for (uint32_t k = 0; k < s->count; k++) {
         double a = 0.0, b = 0.0;
-        for (uint32_t way = 0; way < s->ways; way++) {
-            const uint32_t i = k * s->ways + way;
+        for (uint32_t direction = 0; direction < s->directions; direction++) {
+            const uint32_t i = k * s->directions + direction;
             a += m->step[i] * m->step[i];
             b += m->at.shift[i] * m->step[i];
         }
@@ -304,8 +305,8 @@ void smoothing_solve(const struct smoothing *s, double barrier, double *shift, d
 {
     struct smoothing_search m = {.given = s};
     m.rows = s->count > SMOOTHING_ORDER ? s->count - SMOOTHING_ORDER : 0;
-    m.size = s->count * s->ways;
-    m.width = SMOOTHING_ORDER * s->ways + s->ways - 1;
+    m.size = s->count * s->directions;
+    m.width = SMOOTHING_ORDER * s->directions + s->directions - 1;
     m.point = smoothing_taken(&work, (size_t)3 * s->count);
     m.hessian = smoothing_taken(&work, (size_t)(m.width + 1) * m.size);
     m.band = smoothing_taken(&work, (size_t)(m.width + 1) * m.size);

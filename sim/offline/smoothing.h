@@ -14,20 +14,20 @@
 /* Points that may be moved. Arrays are of `count` rows, the last index runs fastest. */
 struct smoothing {
     uint32_t count;       /* at least 1 */
-    uint32_t ways;        /* directions in which each point may move: 1 or 2 */
+    uint32_t directions;  /* directions in which each point may move: 1 or 2 */
     const double *point;  /* [3], mm */
-    const double *normal; /* [3][ways], these directions, orthonormal */
+    const double *normal; /* [3][directions], these directions, orthonormal */
     const double *bound;  /* how far, mm; 0: not at all */
-    const double *
-        coefficient; /* count - 3 rows of [4]: weighted third difference of point k and the next three */
+    /* [4] in count - 3 rows: weighted third difference of point k and the next three */
+    const double *coefficient;
 };
 
 /* Numbers that `work` has to hold. */
-size_t smoothing_work(uint32_t count, uint32_t ways);
+size_t smoothing_work(uint32_t count, uint32_t directions);
 
-/* Shifts (count rows of [ways], mm) of least sum of squares plus `barrier` (above 0) times the barrier of the bounds.
- * At the call `shift` has shifts strictly inside the bounds (0 where a bound is 0). Linear: about 20 us for each
- * hundred points that move in one direction and each halving of the barrier. */
+/* Shifts (count rows of [directions], mm) of least sum of squares plus `barrier` (above 0) times the barrier of the
+ * bounds. At the call `shift` has shifts strictly inside the bounds (0 where a bound is 0). Linear: about 20 us for
+ * each hundred points that move in one direction and each halving of the barrier. */
 void smoothing_solve(const struct smoothing *s, double barrier, double *shift, double *work);
 
 #endif

@@ -65,7 +65,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def replayed(page: Page) -> dict[str, float]:
     page.wait("document.querySelector('#replay-state').textContent === 'at its end'")
-    page.wait("document.querySelector('#way').value > 0.999")
+    page.wait("document.querySelector('#progress').value > 0.999")
     peaks = page.js(
         "[...document.querySelectorAll('.chart canvas')].map(c => Number(c.dataset.peak))"
     )

@@ -60,7 +60,7 @@ def stream_words(stream: StreamStatus) -> str:
     if stream.remaining_s is not None:
         left = f"{stream.remaining_s:.0f} s left"
     return (
-        f"{_STREAM_STATES[stream.state]}, line {stream.line}, {stream.way_mm:.3f} mm, "
+        f"{_STREAM_STATES[stream.state]}, line {stream.line}, {stream.arc_length_mm:.3f} mm, "
         f"{stream.committed_s:.1f} s ahead in the controller, {left}, {stream.underruns} rests for want of chunks"
     )
 

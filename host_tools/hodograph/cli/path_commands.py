@@ -334,7 +334,7 @@ def _stopped(pipeline: Pipeline, kernel: str | None, kind: str, at_s: float) -> 
 def _print_stops(stops: list[StoppedRun], unit: str) -> None:
     off = "contour um" if unit == "mm" else "mdeg"
     print(
-        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {f'way {unit}':>9} {f'{unit}/s^2':>9} "
+        f"{'stop':<10} {'at s':>9} {'rest after s':>12} {'bound s':>9} {f'dist. {unit}':>9} {f'{unit}/s^2':>9} "
         f"{f'{unit}/s^3':>9} {off:>10}"
     )
     for stop in stops:

@@ -279,7 +279,7 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
         if controller.state() in ON_PATH:
             controller.stop_and_wait()
         status = stream_status(controller)
-        return Place(*entry.place_at(round(status.way_mm * 2**40)))
+        return Place(*entry.place_at(round(status.arc_length_mm * 2**40)))
 
 
 def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> Place:

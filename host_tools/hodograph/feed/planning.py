@@ -152,7 +152,7 @@ def _fit_notes(raw: RawPieces, period_us: int) -> tuple[str, ...]:
         return ()
     return (
         f"the ramp has too few periods of {period_us} us for its profile: its pieces stay within "
-        f"{raw.jerk_error_mm_s3:.3g} mm/s^3 of its jerk and {raw.length_error_mm:.2g} mm of its way "
+        f"{raw.jerk_error_mm_s3:.3g} mm/s^3 of its jerk and {raw.length_error_mm:.2g} mm of its length "
         "(a longer ramp, or quintic, or minimax of degree 5 or 6, has none of this)",
     )
 

@@ -235,7 +235,7 @@ def _hermite(distance: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
 
 
 def _distance_sums(ramp: _Ramp) -> Int:
-    """Ways from the start of the ramp to the ends of its pieces, 0 first; 2^-40 mm."""
+    """Distances from the start of the ramp to the ends of its pieces, 0 first; 2^-40 mm."""
     total = np.concatenate((np.zeros(1), np.cumsum(ramp.distance)))
     return np.rint(total * 2.0**40).astype(np.int64)
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..stream.bus_chunks import curve_of
 from ..stream.chunk import Chunk
-from ..stream.geometry import Curve, points_at
+from ..stream.geometry import Curve
 from .decoder import Floats
 
 _ON_PATH_UM = 1.0
@@ -92,13 +92,19 @@ class JobPath:
         """Arc lengths of setpoints, and whether they are on the path."""
         guesses = []
         if self._last_mm is not None and self._last_point is not None:
-            guesses.append(self._last_mm + _way(np.vstack((self._last_point, points)))[1:])
-        way = _way(points)
+            guesses.append(
+                self._last_mm + _chord_lengths(np.vstack((self._last_point, points)))[1:]
+            )
+        passed = _chord_lengths(points)
         arcs, off_um = np.zeros(len(points)), np.full(len(points), np.inf)
         for known in (None, len(points) - 1, 0):
             if known is None and not guesses:
                 continue
-            guess = guesses[0] if known is None else self._nearest(points[known]) + way - way[known]
+            guess = (
+                guesses[0]
+                if known is None
+                else self._nearest(points[known]) + passed - passed[known]
+            )
             found, away_um = self._projected(guess, points)
             better = (away_um < _ON_PATH_UM) & (off_um >= _ON_PATH_UM)
             arcs[better], off_um[better] = found[better], away_um[better]
@@ -119,6 +125,7 @@ class JobPath:
         return arcs, 1e3 * np.linalg.norm(points - self._at(arcs), axis=1)
 
     def _nearest(self, point: Floats) -> float:
+        """Arc length of the sample of the path that is nearest to a point (A,)."""
         if self._samples is None:
             low = self._parts[0].begin_mm
             length = self._parts[-1].begin_mm + self._parts[-1].length_mm - low
@@ -135,7 +142,8 @@ class JobPath:
         points = np.empty((arcs.size, self._axes))
         for k in np.unique(of).tolist():
             part, own = self._parts[k], of == k
-            points[own] = points_at(part.curve, np.clip(arcs[own] - begins[k], 0.0, part.length_mm))
+            arc_mm = np.clip(arcs[own] - begins[k], 0.0, part.length_mm)
+            points[own] = part.curve.axes_point(arc_mm)
         return points
 
     def _forget(self, before_mm: float) -> None:
@@ -144,6 +152,7 @@ class JobPath:
             self._samples = None
 
 
-def _way(points: Floats) -> Floats:
+def _chord_lengths(points: Floats) -> Floats:
+    """Lengths (n,) of the chords up to each of points (n, A), 0 first."""
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     return np.concatenate(([0.0], np.cumsum(chords)))

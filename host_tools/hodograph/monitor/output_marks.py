@@ -17,7 +17,6 @@ from ..config.outputs import Outputs, placed_outputs, words_of
 from ..events import Events
 from ..stream.bus_chunks import curve_of
 from ..stream.chunk import Chunk
-from ..stream.geometry import points_at
 from .decoder import Floats
 from .derived import ProgramPath
 
@@ -115,7 +114,7 @@ class JobMarks:
         if program.first_axis or not len(new):
             return
         made = output_marks(self._outputs, new)
-        points = points_at(curve_of(program), np.array([mark.place_mm for mark in made]))
+        points = curve_of(program).axes_point(np.array([mark.place_mm for mark in made]))
         begin_mm = begin_q40 * 2.0**-40
         moved = tuple(OutputMark(begin_mm + mark.place_mm, mark.text) for mark in made)
         self.marks = (*self.marks, *moved)[-_MOST:]

@@ -301,7 +301,7 @@ int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t
 
 /* offline/smoothing.h */
 struct smoothing {
-    uint32_t count, ways;
+    uint32_t count, directions;
     const double *point, *normal, *bound, *coefficient;
 };
 size_t smoothing_work(uint32_t count, uint32_t ways);

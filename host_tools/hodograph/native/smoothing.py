@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Points moved sideways within bounds, found in C (sim/offline/smoothing.h)."""
+"""Points moved sidedirections within bounds, found in C (sim/offline/smoothing.h)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ def least_squares_in_bounds(
     start        (n, m) shifts strictly inside the bounds
     """
     ffi, lib = library()
-    count, _, ways = normal.shape
+    count, _, directions = normal.shape
     arrays = [np.ascontiguousarray(one) for one in (point, normal, bound, coefficient)]
     shift = np.array(start, dtype=np.float64, order="C")
-    work = np.empty(int(lib.smoothing_work(count, ways)))
+    work = np.empty(int(lib.smoothing_work(count, directions)))
 
-    given = ffi.new("struct smoothing *", (count, ways, *map(numbers, arrays)))
+    given = ffi.new("struct smoothing *", (count, directions, *map(numbers, arrays)))
     lib.smoothing_solve(given, barrier, numbers(shift), numbers(work))
     return shift

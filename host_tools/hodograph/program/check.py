@@ -408,7 +408,7 @@ def _moving(feed_q24: float, acceleration_q16: float) -> bool:
 
 
 def _distances_q44(duration: Int, c: Int) -> Int:
-    """Way of each piece in 2^-44 mm, rounded down from the exact sum of its terms."""
+    """Length of each piece in 2^-44 mm, rounded down from the exact sum of its terms."""
     shift = exponents(duration) + 32
     distances = [
         _distance_q44(int(d), int(e), row) for d, e, row in zip(duration, shift, c, strict=True)

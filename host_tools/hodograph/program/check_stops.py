@@ -32,10 +32,10 @@ WINDOW_TICKS = 6
 WINDOW = 8
 """and how many pieces may begin in them."""
 HALVINGS = 3
-"""Each eighth of a piece is looked at for itself."""
+"""Each eighth of a piece is checked by itself."""
 LITTLE = 0.25
 """Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
-_HAIR = 1e-12
+_ROUNDING = 1e-12
 """Share of a bound that rounding may take from it here."""
 _MOST_US = 2.0**32 - 1.0
 
@@ -81,7 +81,7 @@ def _entry_faults(
 def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramError, int] | None:
     least_us, least_um = bounds(program, kind)
     said = program.stops.bound_us[:, kind].astype(np.float64)
-    brief = said < np.minimum(least_us, _MOST_US) * (1.0 - _HAIR)
+    brief = said < np.minimum(least_us, _MOST_US) * (1.0 - _ROUNDING)
     too_long = (said > most_ms * 1000.0) & (most_ms > 0)
     hits = np.flatnonzero(brief | too_long)
     if hits.size:
@@ -89,18 +89,18 @@ def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramErro
         return (ProgramError.STOP_BOUND if brief[index] else ProgramError.STOP_LONG), index
     worst_us, worst_um = program.stops.worst_us[kind], program.stops.worst_um[kind]
     if worst_us != int(said.max()) or worst_um < min(float(least_um.max()), _MOST_US) * (
-        1.0 - _HAIR
+        1.0 - _ROUNDING
     ):
         return ProgramError.STOP_WORST, 0
     return None
 
 
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
-    """Least bounds (M,) of time in us and of the way in um, from the command to rest."""
+    """Least bounds (M,) of time in us and of the distance in um, from the command to rest."""
     own_s, own_mm, waits = own_bounds(program, kind)
     duration = program.pieces.duration_s
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
-    way = np.maximum(np.diff(start), 0.0)
+    distance = np.maximum(np.diff(start), 0.0)
     window_s = WINDOW_TICKS * program.period_us * 1e-6
     count = duration.size
     out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
@@ -108,7 +108,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     for i in range(count - 1, -1, -1):
         if waits[i] > 0.0:
             own_s[i] = max(own_s[i], waits[i] * duration[i] + out_s[i + 1])
-            own_mm[i] = max(own_mm[i], way[i] + out_mm[i + 1])
+            own_mm[i] = max(own_mm[i], distance[i] + out_mm[i + 1])
         last, ahead = i + 1, 0.0
         while last < min(count, i + 1 + WINDOW) and ahead < window_s:
             ahead += duration[last]
@@ -118,8 +118,8 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
 
 
 def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
-    """Time in s and way in mm (M,) of a stop that brakes in the piece in which it was requested, 0 where none may, and
-    the share of the piece, up to its end, from which it may go on into the next.
+    """Time in s and distance in mm (M,) of a stop that brakes in the piece in which it was requested, 0 where none may,
+    and the share of the piece, up to its end, from which it may go on into the next.
     """
     pieces, codes = program.pieces, program.stops.codes[:, kind]
     period_s = program.period_us * 1e-6
@@ -133,7 +133,7 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
     wait_s = longest * pieces.duration_s
     speed = np.maximum(feed.max(axis=(1, 2)), 0.0)
     rising = np.maximum(acceleration.max(axis=(1, 2)), 0.0)
-    time_s, way_mm = np.zeros(speed.size), np.zeros(speed.size)
+    time_s, distance_mm = np.zeros(speed.size), np.zeros(speed.size)
     for level in range(LEVELS):
         rate = (
             pieces.override_factor if level == FULL else np.full_like(speed, LEVEL_OVERRIDES[level])
@@ -147,9 +147,13 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
             kind,
             period_s,
         )
-        time_s, way_mm = np.maximum(time_s, own_s), np.maximum(way_mm, own_mm)
-    time_s, way_mm = time_s + wait_s, way_mm + speed * pieces.override_factor * wait_s
-    return np.where(given, time_s, 0.0), np.where(given, way_mm, 0.0), np.where(given, last, 1.0)
+        time_s, distance_mm = np.maximum(time_s, own_s), np.maximum(distance_mm, own_mm)
+    time_s, distance_mm = time_s + wait_s, distance_mm + speed * pieces.override_factor * wait_s
+    return (
+        np.where(given, time_s, 0.0),
+        np.where(given, distance_mm, 0.0),
+        np.where(given, last, 1.0),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +169,7 @@ class _Start:
 
 
 def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Real, Real]:
-    """Time and way (M,) of stops that begin in one level of the rate, waits left out."""
+    """Time and distance (M,) of stops that begin in one level of the rate, waits left out."""
     speed, rising, slope, cut_s = start.speed, start.rising, start.slope, start.cut_s
     more_s = np.full(speed.size, STOP_TICKS * period_s)
     if kind == HOLD:
@@ -179,8 +183,8 @@ def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Rea
     peak = (
         speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
     )
-    time_s, way_mm = _curve(peak, lead_s + slope_s, number)
-    return time_s + more_s, way_mm + speed * more_s
+    time_s, distance_mm = _curve(peak, lead_s + slope_s, number)
+    return time_s + more_s, distance_mm + speed * more_s
 
 
 def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
@@ -202,7 +206,9 @@ def _runs(mask: Bool) -> tuple[Real, Real]:
 
 
 def _curve(peak: Real, lead_s: Real, number: Real) -> tuple[Real, Real]:
-    """Time and way of the S-curve to rest in continuous time, from `peak` of the speed, to which `lead_s` leads."""
+    """Time and distance of the S-curve to rest in continuous time, from the greatest speed `peak`, which is reached
+    after `lead_s`.
+    """
     down, most, up = number[:, JERK_DOWN], number[:, DECELERATION], number[:, JERK_UP]
     depth = np.minimum(np.sqrt(peak * 2.0 * down * up / (down + up)), most)
     first_s, last_s = depth / down, depth / up

@@ -77,8 +77,8 @@ def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def widest_corners(job: Job) -> list[Place]:
     """The vertices that the curve passes at the greatest distance, one for each kind of corner."""
-    ways = [section for section in job.sections if section.stands_at is None]
-    found = [place for section in ways for place in _corners_of(section)]
+    moving = [section for section in job.sections if section.stands_at is None]
+    found = [place for section in moving for place in _corners_of(section)]
     found.sort(key=lambda place: -place.distance_mm)
     shown: list[Place] = []
     kinds: set[tuple[int, int, int]] = set()
@@ -94,8 +94,8 @@ def widest_corners(job: Job) -> list[Place]:
 
 def _corners_of(section: JobSection) -> list[Place]:
     reference, curve = section.fitted.reference, section.fitted.curve
-    way = np.diff(reference.point, axis=0) / reference.length_mm[:, None]
-    turn = np.arccos(np.clip(np.sum(way[:-1] * way[1:], axis=1), -1.0, 1.0))
+    direction = np.diff(reference.point, axis=0) / reference.length_mm[:, None]
+    turn = np.arccos(np.clip(np.sum(direction[:-1] * direction[1:], axis=1), -1.0, 1.0))
     found = []
     for vertex in (np.flatnonzero(turn > _LEAST_TURN_RAD) + 1).tolist():
         at_mm = float(section.fitted.arc_length_at(reference.place_mm[[vertex]])[0])

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..job import JobMotion
-from ..job_view import with_programmed
+from ..job_view import append_places, no_places, with_programmed
 from ..pipeline import proved_limits
 from .page import Figure, render, write_page
 from .style import styled
@@ -99,17 +99,12 @@ def view_data(run: JobMotion) -> dict[str, object]:
     programmed path with its tolerance (0: sections have several).
     """
     step = max(1, -(-run.ticks // MOST_POINTS))
-    columns: dict[str, list[object]] = {name: [] for name in ("x", "y", "z", "f", "l", "r")}
+    columns = no_places()
     for section, motion in zip(run.job.sections, run.motions, strict=True):
         rows = np.unique(np.append(np.arange(0, motion.ticks, step), motion.ticks - 1))
         s_mm = motion.arc_length_mm[rows]
         at = section.places(motion.cmd_mm[rows])
         z = at[:, 2] if at.shape[1] > 2 else np.zeros(rows.size)
-        for name, values in zip(
-            columns,
-            (at[:, 0], at[:, 1], z, motion.feed_mm_s[rows], section.line_at(s_mm)),
-            strict=False,
-        ):
-            columns[name] += np.round(values, 4).tolist()
-        columns["r"] += section.is_rapid_at(s_mm).astype(int).tolist()
+        values = np.column_stack((at[:, :2], z, motion.feed_mm_s[rows]))
+        append_places(columns, section, s_mm, values)
     return with_programmed(run.job, columns, np.zeros(3))

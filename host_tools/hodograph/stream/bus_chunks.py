@@ -21,7 +21,7 @@ from ..program.image import Program
 from ..spline import PHSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from .chunk import Chunk, parse
-from .geometry import Curve, points_at
+from .geometry import Curve
 
 REQUEST, RESPONSE = 0x600, 0x580
 _CHUNK = struct.pack("<HB", STREAM, 1)
@@ -99,7 +99,7 @@ def curve_of(program: Program) -> Curve:
 def _drawn(program: Program) -> tuple[Floats, Floats]:
     """Arc lengths (n,) of a program and the points there, (n, 2) or (n, 3) in mm."""
     arc_mm = np.linspace(0.0, program.length_mm, _POINTS)
-    return arc_mm, points_at(curve_of(program), arc_mm)
+    return arc_mm, curve_of(program).axes_point(arc_mm)
 
 
 class JobPoints:

@@ -20,7 +20,7 @@ from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_e
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
-from ..spline import PHSpline, coordinates
+from ..spline import PHSpline
 from ..spline.quintics import part_of_quintics
 from ..spline.spatial import SpatialPHSpline
 from ..spline.splitting import cut_segments, part_of
@@ -183,11 +183,6 @@ def with_joints(curve: Curve, at_mm: Real) -> Curve:
 def _behind_at(w: Any, x: float) -> Any:
     """Preimages (n, …, 3) whose first one begins at x of it."""
     return np.concatenate((part_of(w[:1], np.array([x]), np.ones(1)), w[1:]))
-
-
-def points_at(curve: Curve, s_mm: Real) -> Real:
-    """Points (n, 2) or (n, 3) at arc lengths (n,)."""
-    return coordinates(curve.point(s_mm))
 
 
 class StreamPath:

@@ -61,9 +61,9 @@ _SHORT_SHARE = 0.5
 
 @dataclass
 class _Windows(Divider):
-    """A divider that cuts sections which become too long to be fitted at once."""
+    """A divider that cuts sections which become too long to be fitted at once: about every `window` chords."""
 
-    window: int = field(default_factory=lambda: FIRST_CHORDS)
+    window: int = field(kw_only=True)
     searched: int = 0
 
     @property
@@ -197,7 +197,9 @@ class StreamReader:
         section waits for that.
         """
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
-        divider = _Windows(str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag))
+        divider = _Windows(
+            str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag), window=FIRST_CHORDS
+        )
         divider.tolerance_mm = self.tolerance_mm
         divider.laser_mode = in_laser_mode(self.machine)
         waits = self.machine.outputs is not None

@@ -276,7 +276,7 @@ class Sender:
 
     def _pass_sections(self, status: StreamStatus) -> None:
         """Goes on to the section in motion, and says what is to be said before it."""
-        arc_q40 = round(status.way_mm * 2**40)
+        arc_q40 = round(status.arc_length_mm * 2**40)
         while len(self._ahead) > 1 and arc_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
             self._ahead.popleft()
             section = self._section
@@ -351,7 +351,7 @@ class Sender:
         now_s = self.at.controller.clock.now_s()
         if self.journal is not None and now_s - self._journal_s >= _JOURNAL_S:
             self._journal_s = now_s
-            self._note_place(arc_q40=round(status.way_mm * 2**40) - section.start_q40)
+            self._note_place(arc_q40=round(status.arc_length_mm * 2**40) - section.start_q40)
         self._note_underruns(status, now_s)
         self._slow_down()
         if self.progress is not None:

@@ -5,13 +5,23 @@ another solver finds (least squares that are not negative).
 
 from __future__ import annotations
 
+import ctypes
+import hashlib
+import shutil
+import subprocess
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from hodograph.native import quadratic_program
+from hodograph.native.library import library
 from hodograph.native.quadratic_program import (
     QuadraticProgram,
     QuadraticSolution,
@@ -20,6 +30,11 @@ from hodograph.native.quadratic_program import (
 )
 
 Real = NDArray[np.float64]
+
+NUMERICS = Path(__file__).resolve().parents[3] / "host_tools" / "numerics"
+BUILDS = [(c, level) for c in ("gcc", "clang") if shutil.which(c) for level in ("-O0", "-O3")]
+BITS = {0.0: "7dfe88f560dc9c6c", 10.0: "be97fd992d25646f"}
+"""Digests of the solutions of `exact_program` by penalty: arithmetic of doubles without contraction gives them."""
 
 TOLERANCE, CURVATURE = 1e-8, 1e-8
 _NEAR = 1e-5
@@ -188,6 +203,70 @@ def test_a_program_without_rows_is_solved_at_its_bounds() -> None:
     assert np.allclose(found.unknowns, [-1.0, 3.0, -1.0, 3.0, -1.0, 3.0], atol=1e-7)
 
 
-def test_the_same_bits_every_time() -> None:
-    program = random_program(np.random.default_rng(11), 12, 80)
-    assert solved(program).unknowns.tobytes() == solved(program).unknowns.tobytes()
+def exact_program() -> QuadraticProgram:
+    """A program whose numbers are the same on every computer: random ones without a function of the C library."""
+    rng = np.random.default_rng(11)
+
+    def some(*shape: int) -> Real:
+        return rng.integers(-512, 513, shape) / 256.0
+
+    intervals, rows = 12, 80
+    inside, factor = some(2 * intervals + 2), some(intervals, 2, 4)
+    coefficients, interval = some(rows, 4), rng.integers(0, intervals, rows)
+    value = np.sum(coefficients * inside[2 * interval[:, None] + np.arange(4)], axis=1)
+    return QuadraticProgram(
+        some(inside.size),
+        factor[:, 0, :, None] * factor[:, 0, None] + factor[:, 1, :, None] * factor[:, 1, None],
+        inside - 2.0,
+        inside + 2.0,
+        coefficients,
+        interval,
+        value - np.abs(some(rows)) - 0.5,
+        value + np.abs(some(rows)) + 0.5,
+    )
+
+
+def compiled(compiler: str, level: str, target: Path) -> Any:
+    """The solver of another compiler, as a function of the package's module."""
+    source = NUMERICS / "quadratic_program.c"
+    command = [compiler, "-std=c99", level, "-ffp-contract=off", "-fPIC", "-shared"]
+    subprocess.run(
+        [*command, f"-I{NUMERICS.parent}", str(source), "-lm", "-o", str(target)], check=True
+    )
+    address = ctypes.cast(ctypes.CDLL(str(target)).quadratic_solve, ctypes.c_void_p).value
+    ffi, lib = library()
+    return ffi.cast(ffi.typeof(lib.quadratic_solve), address)
+
+
+@pytest.mark.parametrize(("compiler", "level"), BUILDS)
+def test_every_compiler_gives_the_same_bits(
+    compiler: str, level: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = [solved(exact_program(), penalty) for penalty in BITS]
+    ffi, lib = library()
+    other = SimpleNamespace(
+        quadratic_work=lib.quadratic_work,
+        quadratic_solve=compiled(compiler, level, tmp_path / "solver.so"),
+    )
+    monkeypatch.setattr(quadratic_program, "library", lambda: (ffi, other))
+    for penalty, solution in zip(BITS, own, strict=True):
+        found = solved(exact_program(), penalty)
+        assert found.unknowns.tobytes() == solution.unknowns.tobytes()
+        assert found.iterations == solution.iterations > 5
+
+
+@pytest.mark.parametrize("penalty", BITS)
+def test_the_bits_are_those_of_every_computer(penalty: float) -> None:
+    found = solved(exact_program(), penalty)
+    assert hashlib.sha256(found.unknowns.tobytes()).hexdigest()[:16] == BITS[penalty]
+
+
+@pytest.mark.parametrize("penalty", BITS)
+def test_memory_that_is_lent_does_not_change_the_bits(
+    penalty: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = solved(exact_program(), penalty)
+    for content in (0.0, np.nan, -1e300):
+        lent = {**vars(np), "empty": partial(np.full, fill_value=content)}
+        monkeypatch.setattr(quadratic_program, "np", SimpleNamespace(**lent))
+        assert solved(exact_program(), penalty).unknowns.tobytes() == own.unknowns.tobytes()

@@ -35,10 +35,10 @@ def job(tmp_path: Path, machine: Machine) -> JobFiles:
     return JobFiles((file,), machine, 0.01, ReadOptions())
 
 
-def _entry(section: int, way_mm: float, to_mm: float) -> Entry:
+def _entry(section: int, from_mm: float, to_mm: float) -> Entry:
     """A job of the controller that began with section 0."""
     starts = tuple((k, 10 * k * Q40) for k in range(section, 5))
-    return Entry((), "", {}, 1, section, round(way_mm * Q40), round(to_mm * Q40), starts=starts)
+    return Entry((), "", {}, 1, section, round(from_mm * Q40), round(to_mm * Q40), starts=starts)
 
 
 @pytest.mark.parametrize(

@@ -127,9 +127,17 @@ def test_the_status_knows_what_is_not_known() -> None:
     node: Any = Scripted([], wanted=5)
     node.values |= {2: 1, 7: 1000, 8: 2500, 11: 3 << 40, 12: 0xFFFFFFFF}
     status = stream_status(node)
-    assert (status.committed_s, status.way_mm, status.remaining_s) == (2.5, 3.0, None)
+    assert (status.committed_s, status.arc_length_mm, status.remaining_s) == (2.5, 3.0, None)
     node.values[12] = 4000
     assert stream_status(node).remaining_s == 4.0
+
+
+def test_the_keys_of_the_status_are_an_interface() -> None:
+    """docs/reference/cli.md, `hodograph status --json`."""
+    keys = "state job wanted free_bytes committed_s sequence line way_mm remaining_s underruns"
+    found = _status(OPEN).json()
+    assert list(found) == keys.split()
+    assert found["way_mm"] == 3.0
 
 
 def test_only_an_open_stream_is_closed() -> None:

@@ -203,10 +203,9 @@ class Status:
     def json(self) -> dict[str, Any]:
         """As nested dictionaries and lists, ready for JSON."""
         found = asdict(self)
-        found["axes"] = [
-            axis | {"inputs_on": list(axis["inputs_on"])} for axis in asdict(self)["axes"]
-        ]
+        found["axes"] = [axis | {"inputs_on": list(axis["inputs_on"])} for axis in found["axes"]]
         found["unhomed_nodes"] = list(self.unhomed_nodes)
+        found["stream"] = None if self.stream is None else self.stream.json()
         return found
 
 
@@ -258,7 +257,7 @@ def stream_dict(controller: Controller) -> dict[str, Any] | None:
     """The job in chunks, as in `read_status`; None: there is none."""
     if controller.read(STREAM, 2) == NONE:
         return None
-    return asdict(stream_status(controller))
+    return stream_status(controller).json()
 
 
 def _fault(controller: Controller) -> Fault | None:

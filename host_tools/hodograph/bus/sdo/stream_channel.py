@@ -3,7 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
@@ -26,9 +27,10 @@ _CORRUPT = (-4, -80, -81)
 class StreamStatus:
     """The content of object 0x2060.
 
-    committed_s   motion from here to the rest at the end of the newest accepted chunk
-    line, way_mm  where the motion is: source line of the executed chunk, arc length of the job
-    remaining_s   from here to the end of the job, by the newest accepted chunk; None: not known
+    committed_s    motion from here to the rest at the end of the newest accepted chunk
+    line           source line of the executed chunk
+    arc_length_mm  where the motion is, in the job
+    remaining_s    from here to the end of the job, by the newest accepted chunk; None: not known
     """
 
     state: int
@@ -38,15 +40,20 @@ class StreamStatus:
     committed_s: float
     sequence: int
     line: int
-    way_mm: float
+    arc_length_mm: float
     remaining_s: float | None
     underruns: int
+
+    def json(self) -> dict[str, Any]:
+        """As a dictionary for JSON. `way_mm` is the arc length: the key is an interface."""
+        keys = {"arc_length_mm": "way_mm"}
+        return {keys.get(name, name): value for name, value in asdict(self).items()}
 
 
 def stream_status(node: Node) -> StreamStatus:
     """Raises BusError and RefusedError: the controller does not answer, or has no streams."""
     values = [node.read(STREAM, sub) for sub in (2, 3, 4, 7, 8, 9, 10, 11, 12, 13)]
-    state, job, wanted, free, committed, sequence, line, way, remaining, underruns = values
+    state, job, wanted, free, committed, sequence, line, arc_length, remaining, underruns = values
     return StreamStatus(
         state,
         job,
@@ -55,7 +62,7 @@ def stream_status(node: Node) -> StreamStatus:
         1e-3 * committed,
         sequence,
         line,
-        way * 2.0**-40,
+        arc_length * 2.0**-40,
         None if remaining == UNKNOWN_MS else 1e-3 * remaining,
         underruns,
     )

@@ -88,7 +88,7 @@ export class Panel {
     const rows = [["program", program.state]];
     if (program.state === "ready") {
       const length = program.length_mm;
-      $("way").value = length ? Math.min(1, motion.arc_length_mm / length) : 0;
+      $("progress").value = length ? Math.min(1, motion.arc_length_mm / length) : 0;
       rows[0] = ["program", `${this.name ? `${this.name}, ` : ""}${text(length, 2)} mm, ${text(program.duration_s, 2)} s`];
       rows.push(["arc length", `${text(motion.arc_length_mm, 3)} mm`]);
     }
@@ -116,7 +116,7 @@ export class Panel {
         ["program", this.name || "–"], ["arc length", message.arc_length_mm === null ? "–" : `${text(message.arc_length_mm, 3)} mm`],
         ["bus load", message.load_percent === null ? "–" : `${text(message.load_percent, 1)} %`],
       ]);
-      $("way").value = this.lengthMm && message.arc_length_mm !== null ? message.arc_length_mm / this.lengthMm : 0;
+      $("progress").value = this.lengthMm && message.arc_length_mm !== null ? message.arc_length_mm / this.lengthMm : 0;
     }
   }
 

@@ -176,8 +176,10 @@ class Divider:
         if not isinstance(move, StraightMove):
             return None
         here = self._place
-        way = float(np.linalg.norm(np.subtract(move.end[:3], here[:3])))
-        if way >= SHORTEST_MM or (move.end[3:] == here[3:] and (way or self.stands_at is None)):
+        length = float(np.linalg.norm(np.subtract(move.end[:3], here[:3])))
+        if length >= SHORTEST_MM or (
+            move.end[3:] == here[3:] and (length or self.stands_at is None)
+        ):
             return None
         feed = move.feed
         if feed is not None and feed.mode is not FeedMode.INVERSE_TIME:
@@ -213,9 +215,9 @@ class Divider:
         self.builder.add(move)
         self.moved = True
         if isinstance(move, StraightMove):
-            way = np.subtract(move.end[:3], before[:3])
-            length = float(np.linalg.norm(way))
-            self.direction = way / length if length > 0.0 else self.direction
+            leg = np.subtract(move.end[:3], before[:3])
+            length = float(np.linalg.norm(leg))
+            self.direction = leg / length if length > 0.0 else self.direction
         else:
             self.direction = None
 
@@ -223,9 +225,9 @@ class Divider:
         """Whether a straight move goes on in the direction of the straight move before it."""
         if self.direction is None or not isinstance(move, StraightMove):
             return False
-        way = np.subtract(move.end[:3], self.builder.position[:3])
-        along = float(way @ self.direction)
-        aside = float(np.linalg.norm(way - along * self.direction))
+        leg = np.subtract(move.end[:3], self.builder.position[:3])
+        along = float(leg @ self.direction)
+        aside = float(np.linalg.norm(leg - along * self.direction))
         return along >= 0.0 and aside <= _STRAIGHT_RAD * along
 
     def _mode(self, mode: PathMode) -> None:
