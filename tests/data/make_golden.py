@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Writes the golden program images of tests/data/programs and their table, `manifest.txt`.
 
-    python tests/data/make_golden.py
+    .venv/bin/python tests/data/make_golden.py
 
-Good images hold the alpha, the heart, the star and lines with all profiles. Broken ones each break one
-rule of docs/reference/protocol.md:
-the table gives the code that C and Python must both answer, with its segment or piece. All are to be
-checked against LIMITS (repeated in the table). The files are committed; run this again only when the
-format changes.
+Good images hold the alpha, the heart, the star and lines with all profiles. Broken ones each break one rule of
+docs/reference/protocol.md: the table gives the code that C and Python must both answer, with its segment or piece. All
+are to be checked against LIMITS (repeated in the table).
+
+The files are committed. Run this again when the format or the planning of stops changes:
+tests/host/program/test_golden.py compares the files with what this module makes.
 """
 
 from __future__ import annotations
@@ -102,7 +103,7 @@ def base() -> Program:
 
 
 def _with_event(p: Program, event: Event) -> Program:
-    """A program with good events and this one, by its place behind the last of them."""
+    """A program with good events and this one, by its place after the last of them."""
     wrong = event._replace(place_q40=EVENTS[-1].place_q40 + event.place_q40)
     table = np.array([*map(tuple, EVENTS), tuple(wrong)], dtype=events_of(EVENTS).dtype)
     return replace(p, events=table)
@@ -118,7 +119,7 @@ def segments(p: Program, **change: Callable[[np.ndarray], None]) -> Program:
 
 
 def pieces(p: Program, **change: Callable[[np.ndarray], None]) -> Program:
-    """The same for the arrays of the pieces."""
+    """`p` with arrays of the pieces changed in place by functions of a copy."""
     arrays = {}
     for key, function in change.items():
         arrays[key] = getattr(p.pieces, key).copy()
@@ -454,12 +455,10 @@ def spatial(extras: int) -> bytes:
     return space.image(own, space.feed_along(own, 80.0, 0.1, CONTROLLER))
 
 
-def main() -> None:
-    """Writes everything, and insists that the Python check agrees."""
-    PROGRAMS.mkdir(exist_ok=True)
-    for old in PROGRAMS.glob("*.hdgp"):
-        old.unlink()
+def golden() -> tuple[dict[str, bytes], str]:
+    """The images by file name, and the table. Raises SystemExit where the Python check disagrees with it."""
     low, high = LIMITS.min_q40_mm, LIMITS.max_q40_mm
+    images: dict[str, bytes] = {}
     rows = [
         "# Golden programs: file, code it is refused with (OK: none), its number, index of the segment or piece.",
         "# Written by make_golden.py. All are to be checked against these limits:",
@@ -472,18 +471,29 @@ def main() -> None:
         fault = check_image(image, LIMITS)
         if fault is not None:
             raise SystemExit(f"{name}: {fault}")
-        (PROGRAMS / f"{name}.hdgp").write_bytes(image)
+        images[f"{name}.hdgp"] = image
         rows.append(f"{name}.hdgp OK 0 0")
     for name, (image, code, index) in broken().items():
         fault = check_image(image, LIMITS)
         expected = Fault(ProgramError[code], index if index >= 0 or fault is None else fault.index)
         if fault != expected:
             raise SystemExit(f"broken_{name}: expected {expected}, the check says {fault}")
-        (PROGRAMS / f"broken_{name}.hdgp").write_bytes(image)
+        images[f"broken_{name}.hdgp"] = image
         rows.append(f"broken_{name}.hdgp {code} {int(expected.code)} {expected.index}")
     for extras in (0, 3):
-        (PROGRAMS / f"space{3 + extras}.hdgp").write_bytes(spatial(extras))
-    (HERE / "manifest.txt").write_text("\n".join(rows) + "\n")
+        images[f"space{3 + extras}.hdgp"] = spatial(extras)
+    return images, "\n".join(rows) + "\n"
+
+
+def main() -> None:
+    """Writes everything."""
+    images, table = golden()
+    PROGRAMS.mkdir(exist_ok=True)
+    for old in PROGRAMS.glob("*.hdgp"):
+        old.unlink()
+    for name, image in images.items():
+        (PROGRAMS / name).write_bytes(image)
+    (HERE / "manifest.txt").write_text(table)
 
 
 if __name__ == "__main__":

@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import shared_programs
 from hodograph.config import load_machine, load_path_file
 from hodograph.native import NativeProgram
 from hodograph.native.stop_search import StopSearch
 from hodograph.native.stop_trial import StopTrials, run_trials
-from hodograph.pipeline import Pipeline, load_pipeline
-from hodograph.program import Program, encode, stop_planning
+from hodograph.pipeline import Pipeline, load_pipeline, pipeline_of
+from hodograph.program import Program, compiler, encode, stop_planning
 from hodograph.program.stop_planning import fault_limits, hold_limits
 from hodograph.program.stops import DECELERATION, FAULT
 from hodograph.simulate import simulate, simulate_stop
@@ -149,7 +150,13 @@ def test_long_pieces_that_gain_nothing_stay_whole(tmp_path: Path) -> None:
     assert (made.program.pieces.duration_q32_s * 2.0**-32).max() > 0.2
 
 
-def test_the_same_stops_in_every_call() -> None:
-    """Other tests plan the stops of a motion once, and rely on that (shared_programs.py)."""
-    first, second = (load_pipeline(EXAMPLES / "alpha.toml").image for _ in range(2))
-    assert first == second
+@pytest.mark.parametrize("example", ["alpha", "helix"])
+def test_the_same_stops_in_every_call(example: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other tests plan the stops of a motion once, and rely on that (shared_programs.py): also in space, and where
+    only the name of the program differs.
+    """
+    own = load_pipeline(EXAMPLES / f"{example}.toml", allow_space=True)
+    monkeypatch.setattr(compiler, "plan_stops", shared_programs._stops)
+    first, second = (pipeline_of(own.file) for _ in range(2))
+    assert first.image == own.image
+    assert second.image == own.image
