@@ -497,12 +497,12 @@ def _cost(setting: _Setting, p: Real) -> tuple[Real, Real]:
     basis = setting.gauss[2].reshape(grid.size, -1, 4)
     weights = (np.tile(GAUSS_W, grid.size) * np.repeat(grid.h, GAUSS_W.size)).reshape(grid.size, -1)
     p = p.reshape(grid.size, -1)
-    bend = 0.75 * weights * p**-2.5
-    pull = np.einsum("ng,ngk->nk", -0.5 * weights * p**-1.5 - bend * p, basis)
+    second = 0.75 * weights * p**-2.5
+    first = np.einsum("ng,ngk->nk", -0.5 * weights * p**-1.5 - second * p, basis)
     gradient = np.zeros(2 * grid.size + 2)
     for k in range(4):
-        gradient[k : k + 2 * grid.size : 2] += pull[:, k]
-    return gradient, np.einsum("ng,ngk,ngl->nkl", bend, basis, basis, optimize=True)
+        gradient[k : k + 2 * grid.size : 2] += first[:, k]
+    return gradient, np.einsum("ng,ngk,ngl->nkl", second, basis, basis, optimize=True)
 
 
 def _excess(setting: _Setting, p: Real, d: Real, dd: Real) -> float:
