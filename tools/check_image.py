@@ -34,11 +34,11 @@ def breaches(image: Image, rules: Rules, allowed: Sequence[str] = ()) -> Iterato
     try:
         stack = Stack(image, rules)
         if stack.bytes > stack.room:
-            ways = "; ".join(
-                f"{name} {need.bytes}: {' -> '.join(need.way)}"
+            paths = "; ".join(
+                f"{name} {need.bytes}: {' -> '.join(need.path)}"
                 for name, need in stack.parts.items()
             )
-            yield f"stack: {stack.bytes} bytes needed, {stack.room} there ({ways})"
+            yield f"stack: {stack.bytes} bytes needed, {stack.room} there ({paths})"
     except StackError as error:
         yield f"stack: {error}"
 

@@ -138,7 +138,7 @@ def test_stack_of_calls(tmp_path: Path, core: tuple[str, ...]) -> None:
     stack = Stack(linked(tmp_path, core, DEEP + RESET), Rules())
     assert 100 < stack.bytes < 180
     assert stack.room == 256
-    assert stack.parts["main"].way[:2] == ("startup_reset", "deep")
+    assert stack.parts["main"].path[:2] == ("startup_reset", "deep")
 
 
 @pytest.mark.parametrize("core", CORES, ids=lambda core: core[1])

@@ -85,7 +85,7 @@ def kinds_of(names: Sequence[str], called: npt.NDArray[np.bool_]) -> npt.NDArray
 
 
 def _rising(counts: Counts) -> npt.NDArray[np.bool_]:
-    """The first tick of each row of those whose supervision takes the thorough way."""
+    """The first tick of each row of those whose supervision evaluates everything."""
     thorough = counts[:, _SUPERVISION] > np.median(counts[:, _SUPERVISION])
     return thorough & ~np.roll(thorough, 1)
 

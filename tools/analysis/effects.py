@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an instruction does to the stack pointer and to the way on, for Thumb and RISC-V as objdump writes them."""
+"""What an instruction does to the stack pointer and where the code goes on, for Thumb and RISC-V as objdump writes them."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _thumb(image: Image, function: Function, index: int) -> Effect:
 def _thumb_branch(image: Image, function: Function, index: int, name: str) -> Effect:
     instruction = function.instructions[index]
     if name in ("bx", "blx") and not instruction.operands[0].isdigit():
-        returns = name == "bx" and _holds_the_way_back(function, index)
+        returns = name == "bx" and _holds_return_address(function, index)
         return Effect(falls=name == "blx", indirect=not returns)
     target = _target(instruction)
     if name in ("bl", "blx"):
@@ -93,7 +93,7 @@ def _inside(function: Function, address: int) -> bool:
     return own[0].address < address <= own[-1].address
 
 
-def _holds_the_way_back(function: Function, index: int) -> bool:
+def _holds_return_address(function: Function, index: int) -> bool:
     """Of `bx`: ARMv6-M pops the saved lr to a low register where arguments are still to be given back."""
     register = function.instructions[index].operands
     before = function.instructions[max(index - 2, 0) : index]

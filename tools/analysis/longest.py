@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The longest path through a function of a linked image, with all that it calls, in instructions.
 
-Every way that the instructions leave open counts, whether values can take it or not, so nothing that runs can be
+Every path that the instructions allow counts, whether values can take it or not, so nothing that runs can be
 longer. firmware/targets/loops.toml has what they do not say: how often loops go round, where calls through pointers go,
 and what a tick of the controller never calls. A loop or a call that it does not know is a LongestError.
 """
@@ -17,7 +17,7 @@ from pathlib import Path
 from analysis.effects import effect
 from analysis.image import Function, Image
 
-_NEVER = -(10**9)  # what cannot be on the way
+_NEVER = -(10**9)  # what no path reaches
 
 
 class LongestError(Exception):

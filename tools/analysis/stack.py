@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The most stack that a linked image can need, from its own instructions.
 
-Every way through every function is followed with the stack pointer in hand, so that each call is known with what
+Every path through every function is followed with the value of the stack pointer, so that each call is known with what
 is taken at that place; functions of the libraries are as good as ours. What the instructions do not say is in
 firmware/targets/stack.toml: where calls through pointers go, and which interrupts there are. Recursion, a stack that
 grows in a loop and anything that cannot be judged are StackErrors.
@@ -53,13 +53,13 @@ class Frame:
 
 
 def frame(image: Image, function: Function) -> Frame:
-    """Follows all ways through a function."""
+    """Follows all paths through a function."""
     index = {instruction.address: i for i, instruction in enumerate(function.instructions)}
     taken: dict[int, int] = {}
     calls: set[Call] = set()
     todo, jumped = [(0, 0)], -1
     while todo or jumped >= 0:
-        if not todo:  # after a jump by a table: whatever no other way leads to
+        if not todo:  # after a jump by a table: whatever no other path leads to
             left = [i for i in index.values() if i not in taken]
             if not left:
                 break
@@ -103,7 +103,7 @@ class Need:
     """Bytes, and the chain of calls that needs them."""
 
     bytes: int
-    way: tuple[str, ...]
+    path: tuple[str, ...]
 
 
 class Stack:
@@ -130,7 +130,7 @@ class Stack:
             found[name] = max(need, found.get(name, need))
         frame_bytes = _FPU_FRAME_BYTES if self.image.has_fpu else _FRAME_BYTES
         return {
-            name: Need(need.bytes + (0 if name == "main" else frame_bytes), need.way)
+            name: Need(need.bytes + (0 if name == "main" else frame_bytes), need.path)
             for name, need in sorted(found.items(), reverse=True)
         }
 
@@ -167,7 +167,7 @@ class Stack:
         for call in own.calls:
             for callee in [call.callee] if call.callee else self._pointed(function):
                 deeper = self.worst(callee, (*above, function))
-                worst = max(worst, Need(call.taken + deeper.bytes, (function.name, *deeper.way)))
+                worst = max(worst, Need(call.taken + deeper.bytes, (function.name, *deeper.path)))
         self._worst[function.address] = worst
         return worst
 
