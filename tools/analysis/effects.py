@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What an instruction does to the stack pointer and where the code goes on, for Thumb and RISC-V as objdump writes them."""
+"""What an instruction does to the stack pointer and where the code goes on; Thumb and RISC-V, as objdump writes it."""
 
 from __future__ import annotations
 
