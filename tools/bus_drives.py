@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What one drive sends and receives: legal statuswords and transitions of CiA 402, setpoints within the feed limit."""
+"""Rules for the frames of one drive: statuswords and transitions of CiA 402, setpoints within the feed limit. Used by
+tools/bus_checker.py.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Heartbeats of all nodes: in time, and with the state that NMT commanded; no boot-up that was not requested."""
+"""Rules for heartbeats of all nodes: in time, in the state that NMT commanded, no boot-up that was not requested. Used
+by tools/bus_checker.py.
+"""
 
 from __future__ import annotations
 

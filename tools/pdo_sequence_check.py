@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames that must come once for each SYNC: counts them off against the SYNCs."""
+"""Checks that each PDO comes once for each SYNC. Used by tools/bus_checker.py."""
 
 from __future__ import annotations
 

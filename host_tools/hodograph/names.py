@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Words that the command line, files and the bus share; no heavy imports, so that `--help` is quick."""
+"""Names of kernels, axes, units and kinds of files that the command line, files and the bus share. Imports nothing
+heavy, so that `--help` is quick.
+"""
 
 from __future__ import annotations
 

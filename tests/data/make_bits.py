@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Writes the programs of tests/data/bits: the alpha, the heart, the star and 200 random ones.
 
-    python tests/data/make_bits.py
+    .venv/bin/python tests/data/make_bits.py
 
 They are kept, not made by each test: the tools plan in floating point, whose last bit may be another on the next
-machine, and the hashes of golden.txt (`make golden`) forgive nothing. Run this again only when the format changes.
+machine, and the hashes of golden.txt (`make golden`) are compared bit by bit. Run this again only when the format
+changes.
 """
 
 from __future__ import annotations

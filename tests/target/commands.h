@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * commands: what is asked of a motion while it runs, read from a file of pairs of u32, little-endian, in order of
+ * commands: commands to a motion while it runs, read from a file of pairs of u32, little-endian, in order of
  * their ticks: before this tick (0 is the first), this override in per cent (0 ... 200) or one of the commands below.
  */
 #ifndef TARGET_COMMANDS_H

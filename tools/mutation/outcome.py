@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What became of a mutant, and the file that remembers it."""
+"""The result of one planted mistake, and the file that keeps results until the source changes."""
 
 from __future__ import annotations
 

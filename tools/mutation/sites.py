@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A planted mistake: where it is, what it replaces, and how a source reads with it."""
+"""A planted mistake: its place, the text that it replaces, and the changed source."""
 
 from __future__ import annotations
 

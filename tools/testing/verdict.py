@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What test programs say, read into counts; nothing that went wrong may look like a success."""
+"""Counts from what test programs print. Anything that is not understood counts as a failure."""
 
 from __future__ import annotations
 

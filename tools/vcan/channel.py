@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the agent passes streams of: something with an input and outputs, a command or a TCP connection."""
+"""One stream of bytes between `tools/with-vcan` and user-mode Linux: base class of a command (vcan/job) and of a TCP
+connection (vcan/connection). Used by the agent, inside of that kernel.
+"""
 
 from __future__ import annotations
 

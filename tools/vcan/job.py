@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A command that runs inside user-mode Linux, with its streams."""
+"""A command that runs inside user-mode Linux, with its streams: one channel of the agent."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The user-mode Linux process: starting it, and ending all of it."""
+"""Starts a Linux kernel as a process (user-mode Linux) and ends it with all its processes. Used by the broker of
+`tools/with-vcan`, outside of that kernel.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The machine's parts: what it is, what others may ask of it. */
+/* Implements app/machine/machine.h (see there): initial values, the parts of the machine, and its queries. */
 #include "app/machine/machine.h"
 
 #include <string.h>

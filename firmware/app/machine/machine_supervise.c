@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Supervision of the drives, once a tick: answers, states, bits of the statusword, own frames. */
+/* machine_supervise() of app/machine/machine.h: checks answers, states and statuswords of the drives, once a tick. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The states that time moves on. */
+/* machine_step() of app/machine/machine.h: what each tick does in each state. Timer context, under the lock. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"

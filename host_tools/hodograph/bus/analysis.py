@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From the frames of a run, just recorded or read from a file, to its motion and its bus load."""
+"""From the frames of a run to its motion and its bus load. Used by `run`, which has just recorded them, and `replay`,
+which reads them from a file.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Keeping interrupts away while the axes are being stopped."""
+"""Ignores Ctrl-C, SIGTERM and SIGHUP while commands stop the axes. Main thread."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Whether a machine's tick fits its period, and what would."""
+"""Decides whether the frames of a machine fit its period, and which period, bit rate or number of drives would. Used by
+all commands that configure a machine.
+"""
 
 from __future__ import annotations
 

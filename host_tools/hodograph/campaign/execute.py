@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What workers do: compile a program, make a batch of runs. Nothing here knows which engine calls it."""
+"""Compiles the program of a campaign and makes a batch of its runs. Called by both engines: a worker of Dask, and the
+process itself.
+"""
 
 from __future__ import annotations
 

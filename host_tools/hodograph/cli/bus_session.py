@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What run and stream share: the controller of a machine on a bus, and what the operator does at program stops."""
+"""What `run` and `stream` share: opens the controller of a machine on a bus, and waits for the operator at program
+stops.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph demo: path, program, run and report once, with nothing but what the package brings."""
+"""hodograph demo: path, program, run and report of one example that the package contains."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph faults: the campaign of injected faults."""
+"""hodograph faults: runs fault scenarios and prints their verdicts."""
 
 from __future__ import annotations
 

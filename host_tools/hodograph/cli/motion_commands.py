@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that plan and speak to a controller: upload, goto, rig; and how a run is printed."""
+"""Commands that plan and then speak to a controller: upload, goto, rig; and the text for the result of a run."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands to begin with: init, schema."""
+"""hodograph init and schema: files to begin with, and the schemas of all input files."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a case works with, and what it leaves for the judge."""
+"""The machine, program and notes of one fault case while it runs; the input of the judge."""
 
 from __future__ import annotations
 

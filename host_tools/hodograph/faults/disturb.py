@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The first run of a case: bring up, start, disturb, and wait until all is over."""
+"""The first run of a fault case: starts machine and program, disturbs them, and waits until everything is at rest."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the host does while a case runs: it kills processes, cuts uploads, watches drives without a controller."""
+"""Actions of the host in a fault case: kills processes, cuts uploads, watches drives without a controller."""
 
 from __future__ import annotations
 

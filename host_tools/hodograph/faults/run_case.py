@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One scenario with one seed: bring up, run, disturb, look, recover, run again."""
+"""Runs one scenario with one seed: start, run, disturbance, judgement, recovery, second run."""
 
 from __future__ import annotations
 

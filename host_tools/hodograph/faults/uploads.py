@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Uploads that break off: what was there before must stay."""
+"""Cases in which an upload breaks off: the program before it must stay active."""
 
 from __future__ import annotations
 

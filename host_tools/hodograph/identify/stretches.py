@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The motions in a recording: what an axis was commanded, and what its drive surely reported."""
+"""The motions in a recording: setpoints and reported positions of an axis, from standstill to standstill or to the
+first missing frame.
+"""
 
 from __future__ import annotations
 

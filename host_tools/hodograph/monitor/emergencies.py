@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Emergency frames as messages to the browsers: some of a storm, and how many were left out."""
+"""Emergency frames as messages to the browsers: a few of many equal ones, with the number of those left out."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""One axis under given setpoints, before anything rounds what it does (sim/offline/axis_run.h)."""
+"""Runs one simulated axis along given setpoints, without rounding of its position (sim/offline/axis_run.h). Used by
+`hodograph identify`.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Points moved sidedirections within bounds, found in C (sim/offline/smoothing.h)."""
+"""Moves points sideways within bounds, in C (sim/offline/smoothing.h). Used by toolpath/fit/smoothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Figures of the feed: plain against modified (paper figures 2 and 4), pattern search (figure 3)."""
+"""Figures of the feed: plain and modified ramp (paper figures 2 and 4), pattern search (figure 3)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One look for all figures, and turning them into PNG bytes."""
+"""Colours, fonts and sizes of all figures, and their PNG bytes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the outputs on the path did in a run."""
+"""When and where each output of the path switched in a run, simulated or on a bus: `outputs` of `--json`, and marks in
+figures.
+"""
 
 from __future__ import annotations
 

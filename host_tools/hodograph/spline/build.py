@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The doors of the package: from points to a PHSpline."""
+"""Public functions of the package: from points or a control polygon to a PHSpline."""
 
 from __future__ import annotations
 

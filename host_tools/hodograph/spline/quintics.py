@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Quintics in Bezier form: the extra axes of a path, in the parameter of its segments."""
+"""Parts of quintics in Bezier form, which are the extra axes of a path, in the parameter of its segments. Pure
+functions.
+"""
 
 from __future__ import annotations
 

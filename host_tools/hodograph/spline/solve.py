@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From starting values to the good solution, or a clear refusal; docs/theory/numerics.md section 3."""
+"""From starting values to an accepted solution, or PlanError; docs/theory/numerics.md section 3."""
 
 from __future__ import annotations
 

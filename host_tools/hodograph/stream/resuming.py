@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a job goes on when the controller has forgotten it: the place of its path that is nearest to the axes."""
+"""Where a job goes on when the controller no longer knows it: the place of its path that is nearest to the axes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Contour error where the plant is not what the gains and the feedforward were made for."""
+"""Contour errors of a tuned loop with plants that differ from the model: friction, load, gain, time constant, late
+sensing.
+"""
 
 from __future__ import annotations
 

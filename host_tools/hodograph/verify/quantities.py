@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The limited quantities of a motion, and their limits in each cell."""
+"""The limited quantities of a motion (feed, axis jerks, volts …), each as a function of the motion, with its limit in
+each cell.
+"""
 
 from __future__ import annotations
 

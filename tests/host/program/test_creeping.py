@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A piece that creeps back, so slowly that it passes for rounding, and comes back faster than its neighbours say."""
+"""A feed piece that runs back below the feed that counts as rounding, and returns faster than the pieces beside it
+allow: both checks refuse it.
+"""
 
 from __future__ import annotations
 

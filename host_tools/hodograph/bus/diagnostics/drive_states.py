@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""States of a CiA 402 drive by the standard's names, and the bits that say more."""
+"""Names of the states of a CiA 402 drive, and texts for the bits of its statusword."""
 
 from __future__ import annotations
 

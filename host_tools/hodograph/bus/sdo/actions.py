@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that take a while, and what to wait for: hold, home, quick stop, reset of a fault."""
+"""Commands that take a while: sends one (hold, home, quick stop, reset) and waits until the machine is in the
+state that it leads to.
+"""
 
 from __future__ import annotations
 

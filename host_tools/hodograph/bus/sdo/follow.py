@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Following a program: what keeps it from moving is said, once each time."""
+"""Waits until a program has ended, and prints what keeps it from moving, once each time. Used by `start --follow`,
+`goto` and `run`.
+"""
 
 from __future__ import annotations
 

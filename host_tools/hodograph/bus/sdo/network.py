@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The python-can and canopen side of a bus: opening it, and errors in our words."""
+"""Opens a bus by python-can and canopen; their errors become BusError."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""All limits of a feed along a path together, from every source; docs/theory/numerics.md 5.6."""
+"""All limits of a feed along a path as one object, reserves taken off; docs/theory/numerics.md 5.6. Made from path
+file, machine and drives by `gather`; read by the planner.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The doors of the package: from points in space to a SpatialPHSpline."""
+"""Public functions of the package: from points or a control polygon in space to a SpatialPHSpline."""
 
 from __future__ import annotations
 

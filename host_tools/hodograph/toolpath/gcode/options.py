@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the reader of G-code has to know besides the program: the machine's tables and how far to go."""
+"""Options of the G-code reader: the machine's tables, and the bounds of loops and subroutines."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which channel of a file is meant."""
+"""Chooses the channel of a recording that holds several buses (`--channel`). Used by the readers of all formats."""
 
 from __future__ import annotations
 
