@@ -122,7 +122,8 @@ def test_a_place_at_the_end_as_typed(tmp_path: Path, beyond_mm: float) -> None:
     """A straight of 12 mm whose computed length is less by rounding."""
     file = path_file(tmp_path, output(name="valve", at_mm=12 + beyond_mm, on=True))
     points = "[[0, 0], [20, 0], [40, 2], [52, 12]]"
-    assert points in (text := file.read_text())
+    text = file.read_text()
+    assert points in text
     file.write_text(text.replace(points, "[[0, 0], [4, 0], [12, 0]]"))
     pipeline = load_pipeline(file)
     assert pipeline.curve.length_mm < 12.0
