@@ -10,6 +10,9 @@ from .errors import InputError
 from .events import Event, Events, events_of, no_events
 from .spline.frames import Curve
 
+END_MM = 1e-6
+"""A place so little beyond the end is the end: a length that is computed may be short of the one meant by rounding."""
+
 
 def events_on_path(file: PathFile, machine: Machine, curve: Curve) -> Events:
     """The events of a path file on its curve. Raises InputError: no such output or place, or a value that is wrong."""
@@ -36,7 +39,7 @@ def _event(file: PathFile, output: PathOutput, machine: Machine, place_q40: int)
 
 def _place_q40(output: PathOutput, curve: Curve, points: int) -> int:
     place_mm, length_mm = _place_mm(output, curve, points), curve.length_mm
-    if place_mm > length_mm:
+    if place_mm > length_mm + END_MM:
         raise InputError(
             f"{output.where}: at_mm = {place_mm:.9g} is beyond the end of the path, {length_mm:.9g} mm"
         )

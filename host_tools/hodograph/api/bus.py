@@ -99,6 +99,8 @@ class Controller:
         """Starts the loaded program; returns at once.
 
         from_mm   from rest at this arc length, where the axes have to stand
+
+        Raises InputError for an arc length that the path does not have.
         """
         self._node.start(from_mm=from_mm, unhomed=unhomed)
 

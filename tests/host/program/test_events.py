@@ -117,6 +117,20 @@ def test_places_of_a_path_file(tmp_path: Path) -> None:
     assert pipeline.accepted.check() is None
 
 
+@pytest.mark.parametrize("beyond_mm", [0.0, 0.9e-6])
+def test_a_place_at_the_end_as_typed(tmp_path: Path, beyond_mm: float) -> None:
+    """A straight of 12 mm whose computed length is less by rounding."""
+    file = path_file(tmp_path, output(name="valve", at_mm=12 + beyond_mm, on=True))
+    points = "[[0, 0], [20, 0], [40, 2], [52, 12]]"
+    text = file.read_text()
+    assert points in text
+    file.write_text(text.replace(points, "[[0, 0], [4, 0], [12, 0]]"))
+    pipeline = load_pipeline(file)
+    assert pipeline.curve.length_mm < 12.0
+    assert pipeline.program.events["place"].tolist() == [pipeline.program.length_q40]
+    assert pipeline.accepted.check() is None
+
+
 def test_without_outputs_the_image_is_that_of_before(tmp_path: Path) -> None:
     file = path_file(tmp_path, "")
     assert load_pipeline(file).image[76:80] == bytes(4)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...data import CONTROLLER_EDS, object_dictionary
-from ...errors import BusError, RefusedError, RunError, one_line
+from ...errors import BusError, InputError, RefusedError, RunError, one_line
 from ..address import BusAddress
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
 from ..diagnostics.texts import (
@@ -96,6 +96,8 @@ __all__ = [
 ]
 
 POLL_S = 0.02
+ROUNDING_MM = 1e-6
+"""By so little a place may be beyond an end of the path: arc lengths are copied from output with fewer digits."""
 
 
 class Controller(Node):
@@ -181,7 +183,7 @@ class Controller(Node):
 
     def program_crc(self) -> int | None:
         """CRC-32 of the active program, None when there is none."""
-        return self.read(PROGRAM, 5) if self.read(PROGRAM, 2) == 2 else None
+        return self.read(PROGRAM, 5) if self.read(PROGRAM, _STATE) == _READY else None
 
     # -- commands -----------------------------------------------------------------------------
 
@@ -286,9 +288,10 @@ class Controller(Node):
         """Starts the program, waiting as long as the axes are said to be still moving.
 
         `from_mm`: from rest at this arc length of the path, where the axes must stand. `unhomed`: also when axes with a
-        homing method are not homed.
+        homing method are not homed. Raises InputError for a place that the path does not have.
         """
         if from_mm is not None:
+            self._require_place(from_mm)
             self.write(START_POSITION, None, round(from_mm * 2**40))
         deadline = self.clock.now_s() + wait_s
         while True:
@@ -302,6 +305,16 @@ class Controller(Node):
                 if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
             self.clock.sleep(POLL_S)
+
+    def _require_place(self, arc_length_mm: float) -> None:
+        """The controller itself takes a place beyond an end of the path as this end."""
+        if self.read(PROGRAM, _STATE) != _READY:
+            return  # it refuses the start and says why
+        length_mm = self.read(PROGRAM, _LENGTH) * 2.0**-40
+        if not -ROUNDING_MM <= arc_length_mm <= length_mm + ROUNDING_MM:
+            raise InputError(
+                f"start from {arc_length_mm:.9g} mm: the path has arc lengths from 0 to {length_mm:.9g} mm"
+            )
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
@@ -322,7 +335,7 @@ class Controller(Node):
 
     def program_summary(self) -> dict[str, Any]:
         """Object 0x2000 by name."""
-        state = self.read(PROGRAM, 2)
+        state = self.read(PROGRAM, _STATE)
         return {"state": PROGRAM_STATES.get(state, str(state))} | {
             name: self.read(PROGRAM, sub) for name, sub in _PROGRAM
         }
@@ -348,6 +361,8 @@ _STATISTICS = (
     "missed_tpdos",
     "frames_not_sent",
 )
+_STATE, _READY, _LENGTH = 2, 2, 11
+"""Of PROGRAM: subindex of its state and the state of a whole program, subindex of the length."""
 _PROGRAM = (
     ("refused_code", 3),
     ("refused_index", 4),
