@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from .config import Machine, PathFile, SpacePathSpec
 from .config.outputs import Outputs
+from .equal_sections import EqualSections, SharedPrograms, moved_program
 from .errors import InputError, PlanError
 from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
-from .pipeline import Pipeline
+from .pipeline import Judged, Pipeline, program_limits
 from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
@@ -87,6 +88,7 @@ _IGNORED: dict[tuple[type[Command], ...], str] = {
 }
 _LONGEST_NAME = 40
 _ROUNDING_MM = 1e-9
+_Q40 = 2.0**40
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +97,14 @@ class SectionPipeline(Pipeline):
 
     thorough    whether stops are searched with all trials
     only_fault  whether none are searched for holds: the program shows where fault stops may begin
+    shared      with equal sections of the job
     """
 
     fitted: FittedPath | None = None
     given_events: Events = field(default_factory=no_events)
     thorough: bool = False
     only_fault: bool = False
+    shared: SharedPrograms = field(default_factory=SharedPrograms)
 
     @property
     def events(self) -> Events:
@@ -120,6 +124,33 @@ class SectionPipeline(Pipeline):
     def stop_terms(self) -> StopTerms:
         """What the stops of the program keep."""
         return replace(super().stop_terms, quick=not self.thorough, only_fault=self.only_fault)
+
+    @cached_property
+    def _timed_plan(self) -> tuple[FeedPlan, float]:
+        begin = perf_counter()
+        if self.shared.plan is None:
+            self.shared.plan = self._planned(self.limits)
+        return self.shared.plan, perf_counter() - begin
+
+    def _judge_plans(self) -> Judged:
+        """The program of an equal section where there is one, moved here."""
+        known = self.shared.judged.get(self.given_events.tobytes())
+        moved = known and moved_program(known, self._start_q40, program_limits(self.machine))
+        if moved:
+            return moved
+        judged = super()._judge_plans()
+        self.shared.judged.setdefault(self.given_events.tobytes(), judged)
+        return judged
+
+    @property
+    def _start_q40(self) -> Int:
+        """The first point of its program (axes,), in machine coordinates."""
+        assert self.fitted is not None
+        first = self.fitted.curve.axes_nodes[0]
+        offset = np.rint(np.array(self.machine.offset_mm) * _Q40)
+        start = np.zeros(offset.size)
+        start[: first.size] = np.rint(first * _Q40)[: offset.size]
+        return np.asarray(start + offset).astype(np.int64)
 
     def _planned(self, limits: Limits) -> FeedPlan:
         """The plan; with more reserve, then with a lower feed there, where a piece would have none left for the least
@@ -409,7 +440,7 @@ def load_job(
     path = divided(commands, tolerance_mm, str(file), laser_mode=in_laser_mode(machine))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
-    maker = SectionMaker(file, machine, reading.feed_mm_s, notes)
+    maker = SectionMaker(file, machine, reading.feed_mm_s, notes, EqualSections())
     sections = tuple(made for section in path.sections for made in maker.made(section))
     notes += _ignored_commands(path, file, machine.outputs)
     sections = _with_outputs(sections, path.after, machine, file)
@@ -504,12 +535,16 @@ def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> It
 
 @dataclass(frozen=True, eq=False)
 class SectionMaker:
-    """Makes sections of a job."""
+    """Makes sections of a job.
+
+    known  sections made before, whose curves and programs equal ones share. None: none does
+    """
 
     file: Path
     machine: Machine
     feed_mm_s: float | None
     notes: list[str]
+    known: EqualSections | None = None
 
     def made(self, section: Section) -> Iterator[JobSection]:
         """The section, or its parts where no curve was found within the tolerance."""
@@ -524,10 +559,15 @@ class SectionMaker:
         yield from self._parts(section)
 
     def _parts(self, section: Section) -> Iterator[JobSection]:
+        equal = None if self.known is None else self.known.find(section)
+        if equal is not None:
+            yield self._section(section, equal.fitted, equal.shared)
+            return
         limits = _motion_limits(self._moving(section))
         found = fit(section.reference, Tolerance(section.tolerance_mm, limits), section.tied)
         if isinstance(found, FittedPath):
-            yield self._section(section, found)
+            shared = SharedPrograms() if self.known is None else self.known.add(section, found)
+            yield self._section(section, found, shared)
             return
         reference, chord = section.reference, found.chord
         first, last = (int(reference.line[chord[k]]) for k in (0, -1))
@@ -597,7 +637,9 @@ class SectionMaker:
                 line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
                 raise no_such_axis(self.file, int(line), name, self.machine)
 
-    def _section(self, section: Section, fitted: FittedPath) -> JobSection:
+    def _section(
+        self, section: Section, fitted: FittedPath, shared: SharedPrograms
+    ) -> JobSection:
         machine = self._moving(section)
         fitted = self._turned(section, fitted)
         nominal, zones = _feeds(fitted)
@@ -616,7 +658,7 @@ class SectionMaker:
         events = tuple(
             (float(s), event.command) for s, event in zip(places, section.events, strict=True)
         )
-        pipeline = SectionPipeline(file, machine, fitted)
+        pipeline = SectionPipeline(file, machine, fitted, shared=shared)
         return JobSection(
             *(fitted, section.tolerance_mm, pipeline, section.before, events, section.tied),
             section.stands_at,

@@ -233,7 +233,7 @@ _PROVED = (
 
 
 @dataclass(frozen=True, eq=False)
-class _Judged:
+class Judged:
     """A program, and what the controller finds in it."""
 
     compilation: Compilation
@@ -241,9 +241,9 @@ class _Judged:
     fault: NativeFault | None
 
 
-def _judge(compilation: Compilation, machine: Machine) -> _Judged:
+def _judge(compilation: Compilation, machine: Machine) -> Judged:
     native = NativeProgram(encode(compilation.program))
-    return _Judged(compilation, native, controller_verdict(native, machine))
+    return Judged(compilation, native, controller_verdict(native, machine))
 
 
 @dataclass(frozen=True, eq=False)
@@ -415,7 +415,10 @@ class Pipeline:
         return self._judged.compilation
 
     @cached_property
-    def _judged(self) -> _Judged:
+    def _judged(self) -> Judged:
+        return self._judge_plans()
+
+    def _judge_plans(self) -> Judged:
         """The first program that the controller accepts; where it accepts none, the last one tried.
 
         The controller's bounds of what lies between its samples may be too wide for a plan that uses a limit fully.

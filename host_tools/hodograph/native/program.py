@@ -144,6 +144,10 @@ class NativeProgram:
             return None
         return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
 
+    def accept_as(self, other: NativeProgram) -> None:
+        """Counts as accepted if `other` does, which has the same integers at another place within the same range."""
+        self._accepted = other._accepted
+
     def require(self) -> None:
         """Raise InputError unless the program passes `check` (without limits of a machine)."""
         if self._accepted:

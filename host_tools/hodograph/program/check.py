@@ -269,6 +269,11 @@ def boxes_q40(program: Program) -> tuple[Real, Real]:
     return points.min(axis=1), points.max(axis=1)
 
 
+def leaves_range(program: Program, limits: ProgramLimits) -> bool:
+    """Whether a point is beyond the format, or a segment may leave the travel."""
+    return bool(_beyond(program.point_q40, POINT_LIMIT_Q40).any() or _leaves(program, limits).any())
+
+
 def _leaves(program: Program, limits: ProgramLimits) -> Bool:
     """The box is not within the travel."""
     lowest, highest = boxes_q40(program)

@@ -318,6 +318,9 @@ def divided(
 
 def _without_reversals(section: Section) -> Iterator[Section]:
     """The section cut where it turns so sharply that a stop costs no more than a curve."""
+    if section.reference.count == 1:
+        yield section
+        return
     path = outline(section.reference, section.tolerance_mm, section.tied)
     sharp = path.place_mm[path.turn_rad > SHARPEST_RAD]
     yield from cut_at(section, sharp)
