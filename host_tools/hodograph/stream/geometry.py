@@ -19,6 +19,7 @@ from ..errors import InputError, PlanError
 from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
+from ..program.check import REACH_Q40
 from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
 from ..spline import PHSpline
 from ..spline.quintics import part_of_quintics
@@ -37,8 +38,8 @@ _SPEED_RATIO = 2.0
 _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
-_PAIR_BESIDE_MM = 1e-4
-"""How far the zone of short segments reaches beyond them: so that it touches the pieces beside it."""
+_PAIR_BESIDE_MM = REACH_Q40 * 2.0**-40 + 1e-6
+"""How far the zone of short segments reaches beyond them: the controller counts pieces that end this near as on them."""
 
 _BESIDE_MM = 1e-6
 LEAST_REST_MM = 0.002
