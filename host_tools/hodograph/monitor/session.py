@@ -111,7 +111,7 @@ class LivePage:
         server = Server(
             Guard(self._place.host, self._place.token),
             broadcaster,
-            self._greeting(),
+            self._hello(),
             _execute(link, pump),
         )
         runner = server.runner()
@@ -167,7 +167,7 @@ class LivePage:
             given=self._image,
         )
 
-    def _greeting(self) -> dict[str, Any]:
+    def _hello(self) -> dict[str, Any]:
         what = self._what
         return {
             "version": __version__,
