@@ -231,7 +231,7 @@ class Link:
             with suppress(RefusedError, BusError):
                 image = _fetch(controller, self._has_other_work)
             if image is None:
-                self._crc32 = None  # once more at the next look
+                self._crc32 = None  # once more at the next poll
             else:
                 self._show_program(image, "")
 

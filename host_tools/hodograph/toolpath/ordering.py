@@ -38,7 +38,7 @@ _LEAST_REACH = 50
 
 _MOST_PASSES = 8
 _PASSED = 10_000
-"""Passes end when they have looked at so many visits."""
+"""Passes end when they have tried so many visits."""
 
 _LEAST_GAIN = 1e-9
 
