@@ -203,7 +203,7 @@ def test_random_commands_on_random_programs(tmp_path) -> None:
 
 @pytest.mark.long
 def test_100_000_random_commands(tmp_path) -> None:
-    """None over its bound, none late, none over its limits by more than what lies between the places that are checked."""
+    """None over its bound, none late, none over its limits by more than what lies between the places checked."""
     assert sum(check_random(tmp_path, seed, 1500) for seed in range(100, 190)) >= 100_000
 
 
