@@ -177,7 +177,7 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 
 # SOAK_S: bus time in seconds
 SOAK_S ?= 3600
-soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame looked at
+soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame checked
 	@$(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
 soak-stream: build firmware ## a streamed job of SOAK_S seconds of motion on the emulated M4F in virtual time: setpoints against the offline simulation, memory of both sides
 	@$(PY) tools/stream_soak.py --seconds $(SOAK_S) --json $(BUILD)/stream_soak.json
@@ -425,7 +425,7 @@ $(BUILD)/lint/%.tidy: % $(BUILD)/clang/obj/%.tidy-deps .clang-tidy
 	$(call say,tidy,$<)
 	$(Q)$(VENV)/bin/clang-tidy --quiet $< -- -std=c99 $(INCLUDES) -Itests/unit -isystem $(UNITY_DIR) $(UNITY_DEF) 2> $@.err || { cat $@.err; exit 1; }
 	@touch $@
-# A file is looked at again when its clang object is newer: that one knows the headers.
+# A file is checked again when its clang object is newer: that one knows the headers.
 $(BUILD)/clang/obj/%.c.tidy-deps: $(BUILD)/clang/obj/%.o
 	@touch $@
 CPPCHECK := --quiet --std=c99 --enable=warning,performance,portability --inline-suppr --error-exitcode=1 \

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Looks at every frame of a machine's bus as a strict observer: nothing may be there that should not.
+"""Checks every frame of a machine's bus: nothing may be there that should not.
 
 Known identifiers with the length that the machine's DBC gives them; SYNC counters in order; each PDO of SYNC type
 once a SYNC while its drive is operational, and none of a drive that is not; setpoints within the feed limit; legal
@@ -113,7 +113,7 @@ class BusChecker:
         return self._beats.worst_s
 
     def take(self, frames: Frames) -> None:
-        """Looks at the frames that follow those of the last call (`RECORD_DTYPE`), by their time stamps."""
+        """Checks the frames that follow those of the last call (`RECORD_DTYPE`), by their time stamps."""
         times_s = frames["time_us"] / 1e6
         commands = np.flatnonzero(frames["id"] == _NMT)
         start = 0

@@ -34,14 +34,14 @@ class Beats:
     def __init__(self, controller: int, drives: Collection[int]) -> None:
         self._controller, self._drives = controller, tuple(drives)
         self._last_s: dict[int, float] = {}
-        self._told: dict[int, set[int]] = {}
+        self._commanded: dict[int, set[int]] = {}
         self._boots: Counter[int] = Counter()
         self.worst_s = 0.0
         """The longest time between two of a node."""
 
     def commanded(self, drive: int, command: int) -> None:
         """The heartbeat that was on its way may still tell the state before."""
-        self._told.setdefault(drive, {_PRE}).add(AFTER[command])
+        self._commanded.setdefault(drive, {_PRE}).add(AFTER[command])
         if command in (RESET, RESET_COMMUNICATION):
             self._boots[drive] -= 1
             self._last_s.pop(drive, None)
@@ -71,7 +71,7 @@ class Beats:
                 if self._boots[node] > 1:
                     yield f"node {node} booted without a command"
                 self._last_s[node] = time_s
-                self._told[node] = {_PRE}
+                self._commanded[node] = {_PRE}
                 continue
             yield from self._state(node, state, operational)
             gap_s = time_s - self._last_s.get(node, time_s)
@@ -84,8 +84,8 @@ class Beats:
         if node == self._controller:
             allowed = {_PRE, _OPERATIONAL}
         else:
-            allowed = self._told.get(node, {_PRE})
+            allowed = self._commanded.get(node, {_PRE})
         if state not in allowed:
             yield f"heartbeat of node {node} with state {state}"
         elif state == _OPERATIONAL and node in operational:
-            self._told[node] = {_OPERATIONAL}
+            self._commanded[node] = {_OPERATIONAL}

@@ -38,7 +38,7 @@ class FactsError(Exception):
 
 
 def fetch(cache: Path) -> Path:
-    """The crate in the folder `cache`, downloaded when it is not there; its hash is looked at every time."""
+    """The crate in the folder `cache`, downloaded when it is not there; its hash is checked every time."""
     path = cache / f"{NAME}.crate"
     if not path.exists():
         try:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Runs programs over and over on a virtual bus and looks at every frame.
+"""Runs programs over and over on a virtual bus and checks every frame.
 
     .venv/bin/python tools/soak.py [--seconds 3600] [--periods 1000,2000] [--json FILE] [--bus vcan0]
 
@@ -93,9 +93,7 @@ class Soak:
                     self.note(self.line())
             self.dropped = recorder.dropped
         if self.dropped:
-            self.checker.found(
-                f"{self.dropped} frames dropped by the kernel: not all were looked at"
-            )
+            self.checker.found(f"{self.dropped} frames dropped by the kernel: not all were checked")
 
     def line(self) -> str:
         """Where it stands, in a line."""
@@ -159,7 +157,7 @@ def _periods(text: str) -> list[int]:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="programs over and over, every frame looked at")
+    parser = argparse.ArgumentParser(description="programs over and over, every frame checked")
     parser.add_argument("--seconds", type=float, default=3600.0, help="bus time (%(default)g)")
     parser.add_argument(
         "--periods", type=_periods, default=list(PERIODS_US), help="in us, some of %(default)s"

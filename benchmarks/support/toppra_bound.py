@@ -110,7 +110,7 @@ def bound(spline: Curve, limits: Limits) -> Bound:
 
 
 def _sampled_jerk(spline: Curve, grid: Real, speed: Real, t: Real) -> float:
-    """Constant tangential acceleration within each interval, looked at every millisecond."""
+    """Constant tangential acceleration within each interval, sampled every millisecond."""
     at = np.arange(0.0, t[-1], _PERIOD_S)
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     u = at - t[k]

@@ -67,7 +67,7 @@ static void carry_out_reset(struct nmt_slave *slave)
     }
 }
 
-static void tell(struct nmt_slave *slave)
+static void report_state(struct nmt_slave *slave)
 {
     enum nmt_state state = slave->state;
 
@@ -81,14 +81,14 @@ static void tell(struct nmt_slave *slave)
 
 bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out)
 {
-    tell(slave);
+    report_state(slave);
     if (slave->state != NMT_INITIALISING) {
         return false;
     }
     carry_out_reset(slave);
     cob_frame(out, COB_HEARTBEAT + slave->node, 1);
     slave->state = NMT_PRE_OPERATIONAL;
-    tell(slave);
+    report_state(slave);
     return true;
 }
 

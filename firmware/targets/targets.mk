@@ -135,7 +135,7 @@ UPDATE ?=
 size: firmware ## code, data, RAM and worst stack of every image; what changed since the commit (UPDATE=1: written to firmware/targets/sizes.json)
 	@$(PYTHON) tools/size.py --build $(BUILD) $(if $(UPDATE),--update)
 
-# clang-tidy looks at a port's files as the compiler of its core sees them.
+# clang-tidy reads a port's files as the compiler of its core sees them.
 PICOLIBC := /usr/lib/picolibc
 bare_arm  := --target=thumbv7em-none-eabihf -mfpu=fpv4-sp-d16 -isystem $(PICOLIBC)/arm-none-eabi/include
 bare_rv32 := --target=riscv32-none-elf -march=rv32imc -isystem $(PICOLIBC)/riscv64-unknown-elf/include

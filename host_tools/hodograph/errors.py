@@ -57,7 +57,7 @@ class RunError(HodographError):
 
 
 class LimitError(HodographError):
-    """A program goes beyond the limits that it was looked at with."""
+    """A program goes beyond the limits that it was checked with."""
 
     exit_status = 7
 

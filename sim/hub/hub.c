@@ -636,8 +636,8 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     return count;
 }
 
-/* The next message of the participant that alone computes, without a look at the others: nothing that they do changes what
- * happens until it waits. False: it takes long, or it is time to look at all. */
+/* The next message of the participant that alone computes, without polling the others: nothing that they do changes what
+ * happens until it waits. False: it takes long, or it is time to poll all. */
 static bool take_granted(struct hub *hub)
 {
     union packet packet;

@@ -32,7 +32,7 @@
 #define HUB_CONNECTIONS 64u
 #define HUB_QUEUE       2048u
 #define HUB_HELD        2048u /* frames for a member, before its participant wakes */
-#define HUB_UNPOLLED    64u   /* grants between two looks at all connections, at most */
+#define HUB_UNPOLLED    64u   /* grants between two polls of all connections, at most */
 
 struct hub_options {
     bool is_virtual;
@@ -91,7 +91,7 @@ struct hub {
     uint64_t pace_virtual_ns;       /* and that of virtual time which may not come before it */
     bool poll_all;                  /* members of participants that compute, too */
     struct hub_connection *granted; /* that alone computes, and waits for no process; or NULL */
-    unsigned unpolled;              /* grants since the last look at all connections */
+    unsigned unpolled;              /* grants since the last poll of all connections */
     uint64_t lost;                  /* frames that found no room */
 };
 

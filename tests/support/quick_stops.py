@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How programs are compiled whose motion is looked at, and not how they stop."""
+"""Compiles programs for tests of their motion: their stops are searched with few trials."""
 
 from hodograph.program import ProgramOptions, StopTerms
 

@@ -41,7 +41,7 @@ class Neighbour:
         self.send(0, bytes([command, node]))
 
     def write(self, node: int, index: int, sub: int, value: int, size: int) -> None:
-        """An SDO download of up to four bytes; nobody looks at the answer."""
+        """An SDO download of up to four bytes; the answer is not read."""
         head = bytes([0x23 | (4 - size) << 2]) + index.to_bytes(2, "little") + bytes([sub])
         self.send(0x600 + node, head + value.to_bytes(size, "little").ljust(4, b"\0"))
 

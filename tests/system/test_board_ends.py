@@ -36,7 +36,7 @@ NO_HEARTBEAT, NO_SETPOINTS, NO_SYNC = 0x8130, 0x8250, 0x8700
 END_S = 300.0
 SYNC_TIMEOUT_US = 200_000
 LOOK_US = 10_000
-"""A simulated drive that nobody wakes looks at its clock that often."""
+"""A simulated drive that nobody wakes reads its clock that often."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ QUICK_STOP = 0x07
 QUIET_S = 1.0
 """In which an answer that must not come would have come."""
 DRIVE_LOOK_MS = 10.2
-"""A drive that receives nothing looks at its clock every 10 ms; then its frame has to go over the bus."""
+"""A drive that receives nothing reads its clock every 10 ms; then its frame has to go over the bus."""
 
 
 class Listened:

@@ -297,7 +297,7 @@ def test_block_download_of_more_than_told(controller: canopen.RemoteNode, by_han
 def test_block_download_of_less_than_told(
     controller: canopen.RemoteNode, by_hand: Hand, wrong: int, code: int
 ) -> None:
-    """The CRC is looked at first."""
+    """The CRC is checked first."""
     image = program("line_tiny")
     begun = image[: SEGMENTS * 7]
     initiate_block(by_hand, 5000)

@@ -9,7 +9,7 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.data import EXAMPLES
-from hodograph.faults.campaign import run_campaign
+from hodograph.faults.case_runner import run_campaign
 from hodograph.faults.scenario import find_scenarios
 
 pytestmark = pytest.mark.usefixtures("one_core")

@@ -33,7 +33,7 @@ from traffic import alpha
 ROOT = Path(__file__).resolve().parents[2]
 MACHINE = str(ROOT / "examples/machines/paper_alpha.toml")
 LOOK_S = 0.05
-"""Of virtual time, between two looks at the page."""
+"""Of virtual time, between two readings of the page."""
 TOKEN = "a-token-of-this-test"
 
 STATE = "document.querySelector('#state').textContent"

@@ -242,7 +242,7 @@ def test_the_third_drive_fails(
 
 
 def on_path_until_lost(run: Started, machine: Machine) -> None:
-    """No setpoint jumps; a drive that restarts follows its position again, so only the jumps are looked at."""
+    """No setpoint jumps; a drive that restarts follows its position again, so only the jumps are checked."""
     frames = run.frames()
     limits = step_limits(machine, setpoints_of(run.whole, machine))
     assert find_jumps(frames, machine.nodes, limits) == []

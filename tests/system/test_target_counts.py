@@ -25,7 +25,7 @@ from analysis.emulator import TARGETS, Target  # noqa: E402
 BUILD = ROOT / "build"
 INSTRUCTION_NS = 128  # -icount shift=7
 ICOUNT = ("-icount", "shift=7,sleep=off")
-MOST_OF_THE_CALL = 10  # instructions between two looks at the clock that are not the tick's
+MOST_OF_THE_CALL = 10  # instructions between two readings of the clock that are not the tick's
 
 
 @pytest.mark.parametrize("image", ["setpoints", "isr"])
@@ -48,7 +48,7 @@ def test_the_clock_of_the_core_counts_the_same(
     times = np.fromfile(file, "<u4") * 1000.0 / target.clock_mhz / INSTRUCTION_NS
     assert len(times) == len(counts) > 100
     beside = times - counts.sum(axis=1)
-    # a look at the clock rounds to a cycle, which is less than half an instruction
+    # a reading of the clock rounds to a cycle, which is less than half an instruction
     assert len(np.unique(np.round(beside))) == 1
     assert 0 < np.round(beside[0]) <= MOST_OF_THE_CALL
 

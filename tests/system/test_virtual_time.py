@@ -28,7 +28,7 @@ from hodograph.bus.sdo.controller import OFF
 from hodograph.config import load_machine
 from hodograph.data import EXAMPLES
 from hodograph.errors import BusError
-from hodograph.faults.run_case import run_case
+from hodograph.faults.case_runner import run_case
 from hodograph.faults.scenario import draw, find_scenarios
 
 STOP_S = 1.0

@@ -10,7 +10,7 @@
 /* Paths of its buses. */
 extern char hub_thread_paths[HUB_THREAD_BUSES][64];
 
-/* Only to be looked at when the thread has ended. */
+/* Only to be read when the thread has ended. */
 extern struct hub hub_thread_hub;
 
 void hub_thread_begin(struct hub_options options);

@@ -5,7 +5,7 @@
  *
  *     chip_power_on();                      registers as after power-on; the flash keeps what it holds
  *     ...
- *     fdcan_model_...   flash_model_...     the world outside, and what to look at
+ *     fdcan_model_...   flash_model_...     what happens outside of the chip, and what tests read
  *
  * Registers of peripherals without a model are plain memory.
  */

@@ -497,7 +497,7 @@ static void test_no_takeover_while_a_stop_or_a_search_is_under_way(void)
     feed_override_set(&m.feed, 50);
     TEST_ASSERT_FALSE(take_over(&m));
     tick(&m);
-    TEST_ASSERT_FALSE(take_over(&m)); /* a window is looked at */
+    TEST_ASSERT_FALSE(take_over(&m)); /* a window is evaluated */
 }
 
 /* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the joint.

@@ -32,7 +32,7 @@ apt_of() {
         -o Acquire::Languages=none -o APT::Sandbox::User="$(id -un)" "${@:2}"
 }
 
-# fetch SUITE PACKAGE: into debs/; apt looks at the signature.
+# fetch SUITE PACKAGE: into debs/; apt checks the signature.
 fetch() {
     [ -e "$out/apt/$1/updated" ] || apt_of "$1" update
     touch "$out/apt/$1/updated"

@@ -115,7 +115,7 @@ class Longest:
             follow = [i + 1] if does.falls and i + 1 < len(function.instructions) else []
             if does.branch in index:
                 follow.append(index[does.branch])
-            graph.cost[i] = 1 + self._dearest(called)
+            graph.cost[i] = 1 + self._most_expensive(called)
             graph.follow[i] = follow if graph.cost[i] > 0 else []
             todo += graph.follow[i]
             if does.branch is not None and does.branch not in index:
@@ -125,7 +125,7 @@ class Longest:
                 jumps.append(i)
         return graph
 
-    def _dearest(self, called: list[Function]) -> int:
+    def _most_expensive(self, called: list[Function]) -> int:
         """Of what an instruction may call; far below zero where it calls what is never called."""
         there = [f for f in called if f.name not in self.bounds.never]
         if called and not there:
@@ -134,7 +134,7 @@ class Longest:
 
     def _leave(self, graph: _Graph, at: int, leaving: int, to: Function, falls: bool) -> None:
         """A jump into another function, which returns to the caller: whoever takes it does nothing else."""
-        cost = self._dearest([to])
+        cost = self._most_expensive([to])
         if cost > 0:
             graph.cost[leaving], graph.follow[leaving] = cost, []
             graph.follow[at] = [*graph.follow[at], leaving]

@@ -14,6 +14,6 @@ with tools/ in PYTHONPATH. `make build` calls the first for each dictionary of t
 | `check` | rules of CiA 306 about sections and keys, of CiA 301 and 402 about objects and PDOs |
 
 python canopen reads sections, types, defaults, limits and $NODEID. It reads a file with faults as far as it can: a
-default that is no number is left out, SubNumber and the lists of objects are not looked at. So `reading` compares what
+default that is no number is left out, SubNumber and the lists of objects are not read. So `reading` compares what
 canopen has found with what is written, and names the section of each fault.
 """

@@ -104,7 +104,7 @@ def check(path: Path) -> list[str]:
         dictionary = parse(ini)
         found.extend(_rules(dictionary))
         load(str(path), 1)  # as it is: others need an object before its sub-indices
-    except EdsError as error:  # nothing after it can be looked at
+    except EdsError as error:  # nothing after it can be checked
         found.append(str(error))
     return found
 

@@ -97,7 +97,7 @@ class Object:
     values: tuple[Value, ...]
 
 
-def snake(label: str, where: str) -> str:
+def snake_case(label: str, where: str) -> str:
     """A C identifier for a ParameterName; `where` is its section, for the error text."""
     name = re.sub(r"[^0-9a-z]+", "_", label.lower()).strip("_")
     if not name:
@@ -190,7 +190,7 @@ def _value(variable: Any, name: str, member: str) -> Value:
 
 def _object(entry: Any, name: str) -> Object:
     """An object of the dictionary `name`."""
-    field = snake(entry.name, f"{entry.index:04X}")
+    field = snake_case(entry.name, f"{entry.index:04X}")
     variables = values_of(entry)
     if isinstance(entry, ODArray):
         count, first = f"{field}_count", variables[1]
@@ -199,7 +199,7 @@ def _object(entry: Any, name: str) -> Object:
         lines = [values[0].declaration, _declaration(first, f"{field}[{len(variables) - 1}]")]
     elif isinstance(entry, ODRecord):
         names = [
-            snake(v.name, f"{v.index:04X}sub{v.subindex:X}") if v.subindex else "count"
+            snake_case(v.name, f"{v.index:04X}sub{v.subindex:X}") if v.subindex else "count"
             for v in variables
         ]
         values = [

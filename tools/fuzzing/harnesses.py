@@ -16,7 +16,7 @@ _OF_LIBFUZZER = (
     "-len_control=20",
 )
 _RUNS_LONG = ("controller", "program")
-"""Their time is in runs, not in reading: comparisons of values are not looked at, which doubles their speed."""
+"""Their time is in runs, not in reading: comparisons of values are not traced, which doubles their speed."""
 EXTRA_S = 180
 """A run that takes so much longer than requested hangs."""
 _EXECUTIONS = re.compile(r"stat::number_of_executed_units:\s*(\d+)")

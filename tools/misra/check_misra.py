@@ -4,7 +4,7 @@
 
 tools/misra/deviations.txt has a line `RULE PLACE reason` for each: PLACE is a glob of paths, `*` for all. Prints
 FILE:LINE: RULE for what remains, and deviations that nothing needs any more. Exit status 1 then. The rules' texts are
-not free, so only their numbers are given. Files whose objects have not changed are not looked at again.
+not free, so only their numbers are given. Files whose objects have not changed are not checked again.
 """
 
 from __future__ import annotations

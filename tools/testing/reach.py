@@ -29,7 +29,7 @@ SOURCE_FOLDERS = ("host_tools", "tools", "tests/support", "tests/system")
 SETTINGS = ("pyproject.toml", "requirements.lock")
 _NATIVE_USER = "host_tools/hodograph/native/library.py"
 _NATIVE = "host_tools/hodograph/native/_native.abi3.so"
-# All that a process started by a test can be made of; folders are looked at as a whole.
+# All that a process started by a test can be made of; folders count as a whole.
 OF_PROCESSES = (
     "host_tools",
     "tools",

@@ -75,7 +75,7 @@ class Broker:
         finally:
             user_mode.end(self._kernel)
             registry.remove(self._bus)
-            self._farewell(trouble)
+            self._report_end(trouble)
 
     def _watch(self) -> None:
         """Asks for readiness to write only where something waits."""
@@ -170,7 +170,7 @@ class Broker:
             return "".join(f"\n    {line}" for line in lines[-12:])
         return ""
 
-    def _farewell(self, trouble: str) -> None:
+    def _report_end(self, trouble: str) -> None:
         """The last word to every client; the owner's connection is closed last, when nothing is left."""
         others = [client for client in self._clients.values() if client is not self._owner]
         for client in [*others, self._owner]:

@@ -25,7 +25,7 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
-/* For the hub: it looks at frames of the base format, without remote frames. */
+/* For the hub: it reads frames of the base format, without remote frames. */
 static void raw_filters(struct can_filter *raw, const struct can_match *filters, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {

@@ -26,7 +26,7 @@
 
 struct can_socket {
     int fd; /* for poll(); -1 when closed */
-    /* On a local bus the kernel cannot look at frames: filters are applied here, and by the hub in virtual time. */
+    /* On a local bus the kernel does not know frames: filters are applied here, and by the hub in virtual time. */
     struct can_match filters[CAN_SOCKET_FILTERS];
     size_t filter_count;
     bool local;

@@ -169,7 +169,7 @@ void port_unlock(void)
     (void)cpu_hold(0);
 }
 
-static void tell(const char *text, uint32_t count)
+static void log_count(const char *text, uint32_t count)
 {
     if (count != 0u) {
         port_log(PORT_WARNING, text, (int32_t)count);
@@ -177,7 +177,7 @@ static void tell(const char *text, uint32_t count)
 }
 
 /* From 128 on it is error passive; 256 when sending is bus-off. */
-static void tell_errors(void)
+static void log_errors(void)
 {
     uint8_t transmit = 0;
     uint8_t receive = 0;
@@ -194,12 +194,12 @@ static void tell_events(uint32_t now_us)
     }
     self.reported_us = now_us;
     const struct fdcan_events events = fdcan_take_events(&self.can);
-    tell("left the CAN bus after too many errors, times", events.bus_offs);
-    tell("error passive on the CAN bus began or ended, times", events.error_passives);
+    log_count("left the CAN bus after too many errors, times", events.bus_offs);
+    log_count("error passive on the CAN bus began or ended, times", events.error_passives);
     if (events.error_passives != 0u) {
-        tell_errors();
+        log_errors();
     }
-    tell("frames came too fast, lost", events.lost);
+    log_count("frames came too fast, lost", events.lost);
 }
 
 void port_progress(void)

@@ -384,7 +384,7 @@ def hub_clock(path: str) -> VirtualClock | None:
         connection.close()
         return known.hold()
     name = os.environ.get(NAME_VARIABLE, "client")
-    flags, number, now_ns = _greet(connection, _HELLO_PARTICIPANT, _WATCHES, 0, name)
+    flags, number, now_ns = _handshake(connection, _HELLO_PARTICIPANT, _WATCHES, 0, name)
     if not flags & _VIRTUAL:
         connection.close()
         return None
@@ -395,7 +395,7 @@ def hub_clock(path: str) -> VirtualClock | None:
 def has_virtual_time(path: str) -> bool:
     """Whether the time of the hub at `path` is virtual. Raises OSError when nobody serves the path."""
     with _connect(path) as connection:
-        flags, _, _ = _greet(connection, _HELLO_MEMBER, 0, 0, "")
+        flags, _, _ = _handshake(connection, _HELLO_MEMBER, 0, 0, "")
         return bool(flags & _VIRTUAL)
 
 
@@ -408,7 +408,7 @@ def _process_behind(connection: socket.socket) -> int:
 def member_connection(path: str, participant: int) -> socket.socket:
     """A connection for frames; those that come wake `participant` (0: nobody). Raises OSError."""
     connection = _connect(path)
-    _greet(connection, _HELLO_MEMBER, 0, participant, "")
+    _handshake(connection, _HELLO_MEMBER, 0, participant, "")
     return connection
 
 
@@ -428,7 +428,7 @@ def _connect(path: str) -> socket.socket:
     return connection
 
 
-def _greet(
+def _handshake(
     connection: socket.socket, kind: int, flags: int, number: int, name: str
 ) -> tuple[int, int, int]:
     """Sends hello to the hub: flags, number and time of its welcome. Raises OSError, with the connection closed."""

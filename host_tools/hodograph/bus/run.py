@@ -23,7 +23,7 @@ from .goto import goto
 from .processes import SimulatedMachine
 from .sdo.controller import DISABLE, READY, STATISTICS, Controller, connect
 from .sdo.follow import Follower
-from .signals import unbroken
+from .signals import interrupts_ignored
 
 __all__ = [
     "BusRun",
@@ -91,7 +91,7 @@ def run_session(
         try:
             yield RunSession(controller, pace if rig is not None else None, rig, note)
         except BaseException:
-            with unbroken(), suppress(HodographError):
+            with interrupts_ignored(), suppress(HodographError):
                 controller.stop_and_wait()
             raise
         if rig is not None:
@@ -261,5 +261,5 @@ def rig_until_interrupted(
                     rig.check()
                     controller.clock.sleep(0.2)
             except KeyboardInterrupt:
-                with unbroken(), suppress(HodographError):
+                with interrupts_ignored(), suppress(HodographError):
                     controller.stop_and_wait()

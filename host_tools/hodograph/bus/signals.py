@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 
 
 @contextmanager
-def unbroken() -> Iterator[None]:
+def interrupts_ignored() -> Iterator[None]:
     """Ignores Ctrl-C, SIGTERM and SIGHUP while the axes are being stopped."""
     kept = {}
     with suppress(ValueError):  # only the main thread may

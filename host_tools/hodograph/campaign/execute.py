@@ -50,7 +50,7 @@ def build(source: Source, profile: str | None, feed_mm_s: float | None, number: 
         pipeline = source.pipeline(profile, feed_mm_s)
         return Built(number, pipeline.image, pipeline.program.ticks)
     except Exception as error:  # a program that cannot be is a result, whatever the reason
-        return Built(number, error=_told(error))
+        return Built(number, error=_error_text(error))
 
 
 def make_runs(design: Design, built: Built, numbers: Sequence[int]) -> list[Outcome]:
@@ -63,7 +63,7 @@ def _outcome(design: Design, program: NativeProgram, number: int) -> Outcome:
     try:
         return _simulated(design.run(number), program)
     except Exception as error:  # a run that fails is a row of the table
-        return Outcome(number, error=_told(error))
+        return Outcome(number, error=_error_text(error))
 
 
 def _simulated(run: Run, program: NativeProgram) -> Outcome:
@@ -82,7 +82,7 @@ def _simulated(run: Run, program: NativeProgram) -> Outcome:
     return Outcome(run.number, values, motion.encoders_sha256)
 
 
-def _told(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     """Errors of ours as they are, others with their kind: those are bugs."""
     text = one_line(error)
     return text if isinstance(error, HodographError) else f"{type(error).__name__}: {text}"

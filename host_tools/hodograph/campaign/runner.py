@@ -129,7 +129,7 @@ def _dask() -> Any:
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
     dask = _dask()
-    with _deaf_children():
+    with _interrupts_ignored_by_children():
         cluster = dask.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -141,7 +141,7 @@ def _local(workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _deaf_children() -> Iterator[None]:
+def _interrupts_ignored_by_children() -> Iterator[None]:
     """Processes begun inside take no notice of Ctrl-C, which terminals send to all: we end them ourselves.
 
     The signal is blocked for all threads and processes begun meanwhile; the resource tracker has to be there before,

@@ -22,7 +22,7 @@ from ..bus.sdo.controller import (
 )
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.objects import HOLD, MOVING, STOP
-from ..bus.signals import unbroken
+from ..bus.signals import interrupts_ignored
 from ..errors import BusyError, HodographError
 from .output import note
 from .targets import target
@@ -69,7 +69,7 @@ def stopping(controller: Controller) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        with unbroken(), suppress(HodographError):
+        with interrupts_ignored(), suppress(HodographError):
             controller.stop_and_wait()
         raise
 

@@ -36,7 +36,7 @@ def campaign(options: Namespace) -> None:
             ):
                 run_campaign(asked, made, somewhere, bar)
         _write(asked, made.results, folder)
-    _tell(asked, made.results, folder, json=options.json)
+    _print_results(asked, made.results, folder, json=options.json)
 
 
 def _write(asked: Campaign, results: Results, folder: Path) -> None:
@@ -48,7 +48,7 @@ def _write(asked: Campaign, results: Results, folder: Path) -> None:
     write_report(asked, results, folder)
 
 
-def _tell(asked: Campaign, results: Results, folder: Path, *, json: bool) -> None:
+def _print_results(asked: Campaign, results: Results, folder: Path, *, json: bool) -> None:
     found = groups(asked.design, results)
     if json:
         print_json(

@@ -8,9 +8,8 @@ from argparse import Namespace
 from ..bus.address import parse_address
 from ..data import EXAMPLES
 from ..errors import InputError, RunError
-from ..faults.campaign import run_campaign
+from ..faults.case_runner import Buses, run_campaign
 from ..faults.case_table import text
-from ..faults.run_case import Buses
 from ..faults.scenario import find_scenarios
 from .output import note, print_json, progress
 

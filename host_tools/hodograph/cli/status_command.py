@@ -116,7 +116,7 @@ def _watch(controller: Controller, meter: LoadMeter | None, to: Target, options:
     screen = _Screen(to.axis_names, options.json, controller.clock)
     try:
         with _own_screen():
-            if meter is not None:  # so that no later look has to wait for its load
+            if meter is not None:  # so that no later reading has to wait for its load
                 controller.clock.sleep(LEAST_LISTEN_S)
             while True:
                 begun = controller.clock.now_s()

@@ -71,7 +71,7 @@ def stream(options: Namespace) -> None:
     require_places(options.record)
     for file in options.files:
         _require_job_file(options, file)
-    gc.freeze()  # modules stay: planning would look through them time and again for what is no longer used
+    gc.freeze()  # modules stay: the collector would search them again and again
     if options.simulate:
         if options.record is not None:
             raise InputError("--record: --simulate has no bus to record")

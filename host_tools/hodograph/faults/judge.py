@@ -115,7 +115,7 @@ def judge(record: CaseRun) -> Verdict:
 
 def _reaction(record: CaseRun, evidence: CaseRecord) -> tuple[list[int], Times, Times]:
     """Fault codes, times from the injection to the fault and to rest."""
-    found = _told(record, evidence)
+    found = _reported_faults(record, evidence)
     rest: Times
     codes = sorted({e.code for e in found} | set(record.fault_codes))
     if not found:
@@ -130,7 +130,7 @@ def _reaction(record: CaseRun, evidence: CaseRecord) -> tuple[list[int], Times, 
     return codes, latency, rest
 
 
-def _told(record: CaseRun, evidence: CaseRecord) -> list[Emergency]:
+def _reported_faults(record: CaseRun, evidence: CaseRecord) -> list[Emergency]:
     """Faults since the injection: the controller's words, or, when it was killed, the drives'."""
     if record.case.scenario.action == CONTROLLER_KILLED:
         found = evidence.emergencies(evidence.drives, evidence.nodes)
@@ -189,7 +189,7 @@ def _not_seen_at_rest(record: CaseRun, evidence: CaseRecord, codes: list[int]) -
 
 def _not_on_path(record: CaseRun, evidence: CaseRecord) -> list[str]:
     """Where the stop has to be on the path: what was late, or was broken off by a quick stop."""
-    found = _told(record, evidence)
+    found = _reported_faults(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:
         return []
     most_ticks = ceil(record.clean_run.fault_stop_s / (record.clean_run.machine.period_us * 1e-6))

@@ -2,8 +2,7 @@
 """The plant of each axis from a recorded run, with confidence intervals: docs/guides/tuning.md, numerics.md
 section 18."""
 
-from .plant_fit import Estimate, Plant, identify_axis
-from .plant_text import plant_json, plant_text
+from .plant_fit import Estimate, Plant, identify_axis, plant_json, plant_text
 from .stretches import Stretch, stretches
 
 __all__ = [

@@ -8,7 +8,8 @@ constant and Coulomb friction are those with which positions and volts come out 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,3 +214,26 @@ def _standard_errors(model: _Model, figures: Float) -> Float:
         meat += weight * (both + both.T)
     together = np.diag(bread @ meat @ bread)
     return np.sqrt(np.maximum(together, np.diag(bread)))
+
+
+def plant_text(name: str, plant: Plant) -> str:
+    """The sections of a drive file that the fit found, with 95 % intervals."""
+    lines = [
+        f"# axis {name}: {plant.periods} periods; left over {plant.rms_um:.3f} um, {plant.rms_mv:.1f} mV rms; +- 95 %",
+        "[plant]",
+        _line("gain_rad_s_v", plant.gain_rad_s_v),
+        _line("time_constant_s", plant.time_constant_s),
+    ]
+    if plant.friction_volts is not None:
+        lines += ["", "[equipment]", _line("friction_volts", plant.friction_volts)]
+    return "\n".join(lines)
+
+
+def _line(key: str, estimate: Estimate) -> str:
+    text = f"{key} = {estimate.value:.6g}"
+    return f"{text:<32}# +- {estimate.within:.2g}"
+
+
+def plant_json(name: str, plant: Plant) -> dict[str, Any]:
+    """The keys that tools may rely on."""
+    return {"name": name, **asdict(plant)}

@@ -31,7 +31,7 @@ LATE_SYNCS = 100
 Flags = NDArray[np.bool_]
 
 
-def unbroken(frames: Frames) -> list[Frames]:
+def without_gaps(frames: Frames) -> list[Frames]:
     """The recording in parts of which no SYNC is missing, each but the first from a SYNC on; empty without SYNCs."""
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     counters = frames["data"][sync_at, 0].astype(np.int64)
@@ -93,7 +93,7 @@ def stretches(frames: Frames, node: int) -> list[Stretch]:
 
     Raises RunError: the drive does not report volts, or never moves.
     """
-    parts = unbroken(frames)
+    parts = without_gaps(frames)
     if not parts:
         raise RunError("no SYNCs in it: record while the controller runs")
     if not np.any(frames["id"] == TPDO2 + node):

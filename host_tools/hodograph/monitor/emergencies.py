@@ -11,7 +11,7 @@ from ..bus.capture.frames import Frames
 from ..bus.diagnostics.texts import fault_words
 
 WINDOW_S = 1.0
-MOST_TOLD = 10
+MOST_REPORTED = 10
 """Events in a window; of the same node and code one."""
 _EMCY, _NODES = 0x080, 0x7F
 _WINDOW_US = round(1e6 * WINDOW_S)
@@ -26,7 +26,7 @@ class Emergencies:
 
     def __init__(self) -> None:
         self._since_us: int | None = None
-        self._told: set[tuple[int, int]] = set()
+        self._reported: set[tuple[int, int]] = set()
         self._left_out = 0
 
     def feed(self, frames: Frames, now_us: int | None = None) -> list[dict[str, Any]]:
@@ -43,7 +43,7 @@ class Emergencies:
             since_us = found["time_us"] - self._since_us
             beyond = np.flatnonzero((since_us < 0) | (since_us >= _WINDOW_US))
             inside = int(beyond[0]) if beyond.size else found.size
-            events += self._tell(found[:inside])
+            events += self._report(found[:inside])
             found = found[inside:]
         if now_us is None and frames.size:
             now_us = int(frames["time_us"][-1])
@@ -55,22 +55,22 @@ class Emergencies:
             return []
         left_out = self._left_out
         self._since_us, self._left_out = None, 0
-        self._told.clear()
+        self._reported.clear()
         if not left_out:
             return []
         text = f"{left_out} more emergency frames in {WINDOW_S:.1f} s"
         return [{"type": "event", "text": text, "fault": True}]
 
-    def _tell(self, found: Frames) -> list[dict[str, Any]]:
+    def _report(self, found: Frames) -> list[dict[str, Any]]:
         events = []
         nodes = found["id"].astype(int) - _EMCY
         codes = found["data"][:, 0].astype(int) | found["data"][:, 1].astype(int) << 8
         for node, code in dict.fromkeys(zip(nodes.tolist(), codes.tolist(), strict=True)):
             count = int(((nodes == node) & (codes == code)).sum())
-            if (node, code) in self._told or len(self._told) >= MOST_TOLD:
+            if (node, code) in self._reported or len(self._reported) >= MOST_REPORTED:
                 self._left_out += count
                 continue
-            self._told.add((node, code))
+            self._reported.add((node, code))
             self._left_out += count - 1
             events.append(_event(node, code))
         return events

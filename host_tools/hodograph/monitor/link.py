@@ -99,7 +99,7 @@ class Link:
     def close(self) -> None:
         """Ends the thread; commands that wait fail."""
         self._ending.set()
-        self._stir()
+        self._wake_up()
         if self._thread.is_alive():
             self._thread.join()
         self._fail_commands(BusError("the monitor has ended"))
@@ -113,10 +113,10 @@ class Link:
         """Gives a command; the future has a HodographError when it was not taken."""
         done: Future[None] = Future()
         self._commands.put((command, done))
-        self._stir()
+        self._wake_up()
         return done
 
-    def _stir(self) -> None:
+    def _wake_up(self) -> None:
         """There is something to do for the thread."""
         self._wake.set()
         clock = self._clock
@@ -231,7 +231,7 @@ class Link:
             with suppress(RefusedError, BusError):
                 image = _fetch(controller, self._has_other_work)
             if image is None:
-                self._crc32 = None  # once more at the next look
+                self._crc32 = None  # once more at the next poll
             else:
                 self._show_program(image, "")
 

@@ -103,7 +103,7 @@ def rows_message(
     path_axes: int = 0,
     marks: Sequence[tuple[float, str]] = (),
 ) -> dict[str, Any]:
-    """The rows of one look, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
+    """The rows of one poll, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
     path, whose positions the points have; further axes of the `path_axes` have theirs with the arc length.
 
     marks  outputs whose places were passed, with the times

@@ -59,7 +59,7 @@ def _with_points(marks: tuple[OutputMark, ...], points: Floats) -> list[dict[str
 
 
 class PassedMarks:
-    """Follows the arc lengths of setpoints, look by look."""
+    """Follows the arc lengths of setpoints, poll by poll."""
 
     def __init__(self, marks: tuple[OutputMark, ...] = ()) -> None:
         self._marks = marks

@@ -166,7 +166,7 @@ class Pump:
             for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
             self._own_load.busy_s += time.thread_time() - begun_s
-            self._tell(taken)
+            self._publish_load(taken)
             if self._again.is_set():
                 self._again.clear()
                 self._publish({"type": "restart"})
@@ -248,7 +248,7 @@ class Pump:
             "arc_length_mm": None if path is None else path.arc_length_mm,
         }
 
-    def _tell(self, taken: Taken) -> None:
+    def _publish_load(self, taken: Taken) -> None:
         """Publishes the load of the pump, every second."""
         own, now_s = self._own_load, time.monotonic()
         self._own_load.dropped = taken.dropped

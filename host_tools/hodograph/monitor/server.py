@@ -41,15 +41,15 @@ Execute = Callable[[dict[str, Any]], Awaitable[str]]
 
 
 class Server:
-    """The web application; `greeting` is the first message to a page."""
+    """The web application; `hello` is the first message to a page."""
 
     def __init__(
-        self, guard: Guard, broadcaster: Broadcaster, greeting: dict[str, Any], execute: Execute
+        self, guard: Guard, broadcaster: Broadcaster, hello: dict[str, Any], execute: Execute
     ) -> None:
-        self._guard, self._broadcaster, self._greeting, self._execute = (
+        self._guard, self._broadcaster, self._hello, self._execute = (
             guard,
             broadcaster,
-            greeting,
+            hello,
             execute,
         )
         self._pages = _load_pages()
@@ -108,7 +108,7 @@ class Server:
         return socket
 
     async def _serve(self, socket: web.WebSocketResponse) -> None:
-        may_command = await self._welcome(socket)
+        may_command = await self._authorise(socket)
         if may_command is None:
             return
         too_many = self._slots.take_slot(socket, may_command=may_command)
@@ -116,9 +116,7 @@ class Server:
             await _close_full(socket)
             return
         self._send_away(too_many)
-        await socket.send_str(
-            encode({"type": "hello", "may_command": may_command, **self._greeting})
-        )
+        await socket.send_str(encode({"type": "hello", "may_command": may_command, **self._hello}))
         client = self._broadcaster.join()
         sender = asyncio.create_task(_send(socket, client))
         try:
@@ -138,7 +136,7 @@ class Server:
             self._closing.add(closing)
             closing.add_done_callback(self._closing.discard)
 
-    async def _welcome(self, socket: web.WebSocketResponse) -> bool | None:
+    async def _authorise(self, socket: web.WebSocketResponse) -> bool | None:
         """Whether a browser may command, from its hello message; None: it may not even watch."""
         with suppress(asyncio.TimeoutError, TypeError, ValueError):
             hello = _read(await socket.receive_str(timeout=_HELLO_S))

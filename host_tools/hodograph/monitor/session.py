@@ -31,7 +31,7 @@ class Usage:
         self._last = (time.monotonic(), sum(os.times()[:2]))
 
     def message(self, clients: int) -> dict[str, Any]:
-        """For the page's last line. `clients`: browsers that look on."""
+        """For the page's last line. `clients`: browsers that are connected."""
         now = (time.monotonic(), sum(os.times()[:2]))
         passed_s = max(now[0] - self._last[0], 1e-3)
         percent = 100 * (now[1] - self._last[1]) / passed_s
@@ -111,7 +111,7 @@ class LivePage:
         server = Server(
             Guard(self._place.host, self._place.token),
             broadcaster,
-            self._greeting(),
+            self._hello(),
             _execute(link, pump),
         )
         runner = server.runner()
@@ -167,7 +167,7 @@ class LivePage:
             given=self._image,
         )
 
-    def _greeting(self) -> dict[str, Any]:
+    def _hello(self) -> dict[str, Any]:
         what = self._what
         return {
             "version": __version__,

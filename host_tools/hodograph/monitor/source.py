@@ -28,7 +28,7 @@ MOST_FRAMES = 65536
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """What has come since the last look."""
+    """What has come since the last poll."""
 
     frames: Frames
     """`RECORD_DTYPE`, stamped by the clock of the bus: of a recording that of the machine."""
@@ -66,7 +66,7 @@ def open_source(address: BusAddress, bitrate: int) -> Source:
 class SocketSource:
     """SocketCAN, whose kernel keeps what waits, and counts what it has no room for; or a local bus.
 
-    It takes no part in virtual time: nobody waits for what is only looked at.
+    It takes no part in virtual time: nothing waits for a process that only receives.
     """
 
     def __init__(self, address: BusAddress) -> None:

@@ -21,7 +21,7 @@ class BrakeCheck:
 
     @property
     def looks(self) -> int:
-        """Stretches of brakes that the last proof has looked at: its cost."""
+        """Stretches of brakes that the last proof has followed: its cost."""
         return int(self._check.looks)
 
     def proves(self, piece: int, kind: int, codes: Sequence[int]) -> bool:

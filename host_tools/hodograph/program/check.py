@@ -359,7 +359,7 @@ def _starts_elsewhere(program: Program) -> bool:
 
 
 def _bound_faults(duration: Int, c: Int, limits: ProgramLimits | None) -> list[Rule]:
-    """Feed, acceleration and jerk beyond what is allowed; close cases are looked at more closely."""
+    """Feed, acceleration and jerk beyond what is allowed; close cases are evaluated more finely."""
     rules = _bound_masks(duration, c, limits, 4)
     suspects = np.flatnonzero(np.logical_or.reduce([mask for mask, _, _ in rules]))
     for first in range(0, suspects.size, 256):

@@ -49,21 +49,13 @@ def analyse(
         raise RunError(f"recording: holds {least} of {wanted} ticks: run again")
     points, expected = program.setpoints(kernel, counts_per_mm, 0, wanted)
     _compare(set_counts[:wanted], expected)
-    rows = np.zeros(wanted, dtype=ROW)
-    rows["arc_length_q40_mm"] = points["arc_length_q40_mm"]
-    rows["feed_q32_mm_s"] = points["feed_q32_mm_s"]
-    axes = program.axis_count
-    rows["cmd_q40_mm"][:, :axes] = points["position_q40"][:, :axes]
-    rows["set_counts"][:, :axes] = set_counts[:wanted]
-    rows["act_counts"][:, :axes] = act_counts[:wanted]
-    rows["volts_mv"][:, :axes] = volts_mv[:wanted]
-    rows["tick"] = np.arange(wanted)
-    rows["contour_error_um"] = Contour(program).errors_um(
-        rows["arc_length_q40_mm"], act_counts[:wanted], counts_per_mm
+    rows = _rows(
+        program, points, set_counts[:wanted], act_counts[:wanted], volts_mv[:wanted], counts_per_mm
     )
     if outputs is not None and latched is not None:
         _put_outputs(rows, program, outputs, latched)
-    totals = make_totals(program, counts_per_mm, tuple(names or AXES[:axes]), units)
+    names = tuple(names or AXES[: program.axis_count])
+    totals = make_totals(program, counts_per_mm, names, units)
     totals.add(rows)
     motion = totals.motion(
         kernel=kernel,
@@ -72,6 +64,32 @@ def analyse(
         rows=rows,
     )
     return replace(motion, outputs=outputs)
+
+
+def _rows(
+    program: NativeProgram,
+    points: NDArray[np.void],
+    set_counts: NDArray[np.int32],
+    act_counts: NDArray[np.int32],
+    volts_mv: NDArray[np.int16],
+    counts_per_mm: Counts,
+) -> NDArray[np.void]:
+    """A row (n,) for each tick: its point by the kernel, the setpoint, and what the drives reported, with the contour
+    error.
+    """
+    rows = np.zeros(len(points), dtype=ROW)
+    axes = program.axis_count
+    rows["tick"] = np.arange(len(points))
+    rows["arc_length_q40_mm"] = points["arc_length_q40_mm"]
+    rows["feed_q32_mm_s"] = points["feed_q32_mm_s"]
+    rows["cmd_q40_mm"][:, :axes] = points["position_q40"][:, :axes]
+    rows["set_counts"][:, :axes] = set_counts
+    rows["act_counts"][:, :axes] = act_counts
+    rows["volts_mv"][:, :axes] = volts_mv
+    rows["contour_error_um"] = Contour(program).errors_um(
+        rows["arc_length_q40_mm"], act_counts, counts_per_mm
+    )
+    return rows
 
 
 def _put_outputs(

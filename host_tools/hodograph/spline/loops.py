@@ -81,7 +81,7 @@ def without_loops(system: System, z: Complex, guide_turning: Real) -> Unlooped:
     return Unlooped(system, z, changes, iterations)
 
 
-def without_stubborn_loops(system: System, z: Complex, spans: Sequence[int]) -> Unlooped:
+def without_remaining_loops(system: System, z: Complex, spans: Sequence[int]) -> Unlooped:
     """The same at every joint within three spans of each of `spans`, one after the other."""
     changes = iterations = 0
     for span in spans:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from ..errors import PlanError
 from .bernstein import Complex
-from .loops import Unlooped, without_loops, without_stubborn_loops
+from .loops import Unlooped, without_loops, without_remaining_loops
 from .newton import solved
 from .quality import Shape
 from .system import System
@@ -54,7 +54,7 @@ def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
     for _ in range(_ROUNDS):
         if not verdict.problem:
             break
-        better = without_stubborn_loops(state.system, state.z, verdict.loops + verdict.cusps)
+        better = without_remaining_loops(state.system, state.z, verdict.loops + verdict.cusps)
         state = _polished(state, better)
         verdict = _judged(state, guide)
         if not better.changes:

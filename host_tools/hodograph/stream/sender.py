@@ -27,7 +27,7 @@ from ..bus.sdo.stream_channel import (
     send_chunk,
     stream_status,
 )
-from ..bus.signals import unbroken
+from ..bus.signals import interrupts_ignored
 from ..config import Machine
 from ..errors import HodographError, RunError
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
@@ -134,7 +134,7 @@ class Sender:
         try:
             return self._run()
         except BaseException:
-            with unbroken(), suppress(HodographError):
+            with interrupts_ignored(), suppress(HodographError):
                 self.at.controller.stop_and_wait()
             raise
 

@@ -38,7 +38,7 @@ _LEAST_REACH = 50
 
 _MOST_PASSES = 8
 _PASSED = 10_000
-"""Passes end when they have looked at so many visits."""
+"""Passes end when they have tried so many visits."""
 
 _LEAST_GAIN = 1e-9
 
@@ -356,18 +356,18 @@ def _nearest_first(
     contours: Contours, chains: Sequence[Chain], entries: Sequence[list[Entry]], start: Point
 ) -> list[Visit]:
     """From each place to the nearest chain that is left."""
-    doors: list[tuple[int, Visit]] = []
+    candidates: list[tuple[int, Visit]] = []
     for k, chain in enumerate(chains):
         if entries[k]:
-            doors += [(k, Visit(chain, entry=entry)) for entry in entries[k]]
+            candidates += [(k, Visit(chain, entry=entry)) for entry in entries[k]]
         else:
-            doors.append((k, Visit(chain)))
-            doors += [] if chain.is_closed else [(k, Visit(chain, is_backwards=True))]
-    first, last = terminals(contours, [visit for _, visit in doors])
+            candidates.append((k, Visit(chain)))
+            candidates += [] if chain.is_closed else [(k, Visit(chain, is_backwards=True))]
+    first, last = terminals(contours, [visit for _, visit in candidates])
     places, place_of = np.unique(first, axis=0, return_inverse=True)
     at_place: list[list[int]] = [[] for _ in places]
-    for door, place in enumerate(place_of.ravel().tolist()):
-        at_place[place].append(door)
+    for candidate, place in enumerate(place_of.ravel().tolist()):
+        at_place[place].append(candidate)
     for waiting in at_place:
         waiting.reverse()
     search = _Places(places)
@@ -376,16 +376,16 @@ def _nearest_first(
     here = np.array(start)
     while len(visits) < len(chains):
         place = search.nearest(here)
-        while at_place[place] and is_done[doors[at_place[place][-1]][0]]:
+        while at_place[place] and is_done[candidates[at_place[place][-1]][0]]:
             at_place[place].pop()
         if not at_place[place]:
             search.remove(place)
             continue
-        door = at_place[place].pop()
-        k, visit = doors[door]
+        candidate = at_place[place].pop()
+        k, visit = candidates[candidate]
         is_done[k] = True
         visits.append(visit)
-        here = last[door]
+        here = last[candidate]
     return visits
 
 

@@ -56,7 +56,7 @@ class PathResult:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """All of it; `tried` is how many loops the search for the least contour error looked at, 0 when none was made."""
+    """All of it; `tried` is how many loops the search for the least contour error tried, 0 when none was made."""
 
     machine: Machine
     poles: Poles

@@ -82,7 +82,7 @@ def test_a_little_beyond_is_told_and_kept(
 
 
 def test_a_given_image(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It is the image that is looked at: the file's own plan would keep this limit."""
+    """It is the image that is verified: the file's own plan would keep this limit."""
     image = tmp_path / "alpha.hdgp"
     assert main(["compile", str(EXAMPLES / "alpha.toml"), "-o", str(image)]) == 0
     capsys.readouterr()

@@ -39,7 +39,7 @@ def machine(**limits: float) -> Machine:
 
 
 class QuickStops(Pipeline):
-    """Stops are searched with few trials: limits of the motion are what is looked at."""
+    """Stops are searched with few trials: the test is about limits of the motion."""
 
     @property
     def stop_terms(self) -> StopTerms:

@@ -146,7 +146,7 @@ def test_every_profile_keeps_the_limits_with_their_reserve(seed: int) -> None:
 
 
 def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
-    """The controller's program time under random commands, looked at five times a tick; brakes are not looked at."""
+    """The controller's program time under random commands, checked five times a tick; brakes are not checked."""
     rng = np.random.default_rng([seed, 23])
     feed = FeedOverride(NativeProgram(encode(case.program)))
     period = 1e-6 * case.program.period_us

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hodograph.bus.capture.frames import RECORD_DTYPE, Frames
-from hodograph.monitor.emergencies import MOST_TOLD, Emergencies
+from hodograph.monitor.emergencies import MOST_REPORTED, Emergencies
 
 BEGIN_US = 946_684_800_000_000
 
@@ -77,6 +77,6 @@ def test_a_clock_that_was_set_back_begins_a_window() -> None:
 def test_many_codes_at_once_are_bounded() -> None:
     emergencies = Emergencies()
     found = emergencies.feed(frames(*[(0, 2, 0x1000 + i) for i in range(200)]))
-    assert len(found) == MOST_TOLD
+    assert len(found) == MOST_REPORTED
     (rest,) = emergencies.feed(frames((1.0, 0, 0)))
-    assert rest["text"] == f"{200 - MOST_TOLD} more emergency frames in 1.0 s"
+    assert rest["text"] == f"{200 - MOST_REPORTED} more emergency frames in 1.0 s"

@@ -68,7 +68,7 @@ def test_another_motion_has_none(job: list[Chunk]) -> None:
 
 
 def test_setpoints_of_a_job_in_space_are_on_its_path(tmp_path: Path) -> None:
-    """From chunks that the planner has made; each look has what came in 50 ms."""
+    """From chunks that the planner has made; each poll has what came in 50 ms."""
     machine = load_machine(MILL)
     part = tmp_path / "part.ngc"
     part.write_text("G64 P0.05\nF1200\nG1 X10\nG3 X20 Y10 Z-2 I0 J10\nG1 Y30\nG61\nG1 X0 Z0\nM2\n")

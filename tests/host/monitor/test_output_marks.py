@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outputs on the live page: places on the path, and the times at which setpoints passed them, look by look."""
+"""Outputs on the live page: places on the path, and the times at which setpoints passed them, poll by poll."""
 
 from __future__ import annotations
 

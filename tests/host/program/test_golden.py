@@ -61,7 +61,7 @@ def alike(image: bytes, other: bytes) -> bool:
 
 
 def test_the_files_are_what_the_script_makes() -> None:
-    """If not: run tests/data/make_golden.py, and look at what has changed."""
+    """If not: run tests/data/make_golden.py, and check what has changed."""
     script = DATA / "make_golden.py"
     spec = spec_from_file_location("make_golden", script)
     assert spec is not None

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 ALPHA = ROOT / "examples/alpha_optimal.toml"
 HEART = ROOT / "examples/heart_optimal.toml"
 BETWEEN = 0.01
-"""Share of a limit by which a motion may pass it between the instants that the search looks at (0.5 % seen)."""
+"""Share of a limit by which a motion may pass it between the instants that the search checks (0.5 % seen)."""
 
 
 def trials(pipeline: Pipeline, count: int, seed: int) -> StopTrials:
@@ -203,7 +203,7 @@ def test_random_commands_on_random_programs(tmp_path) -> None:
 
 @pytest.mark.long
 def test_100_000_random_commands(tmp_path) -> None:
-    """None over its bound, none late, and none over its limits by more than what lies between the places looked at."""
+    """None over its bound, none late, none over its limits by more than what lies between the places checked."""
     assert sum(check_random(tmp_path, seed, 1500) for seed in range(100, 190)) >= 100_000
 
 

@@ -105,7 +105,7 @@ HOOKS = """
 
 
 def test_a_bend_of_less_than_a_micrometre_is_passed_slowly(tmp_path: Path, mill: Machine) -> None:
-    """It is over between two places where a plan looks at its limits, and so leaves no room for an override."""
+    """It is over between two places where a plan checks its limits, and so leaves no room for an override."""
     points = [[int(value) / 1e4 for value in point.split()] for point in HOOKS.split(",")]
     moves = [f"X{x:.4f} Y{y:.4f} Z{z:.4f}" for x, y, z in points]
     text = ["F9000", f"G0 {moves[0]}", "G4 P0.1", *(f"G1 {move}" for move in moves[1:])]

@@ -100,7 +100,7 @@ class Step:
     found_counts: float
     aside_counts: float
     group: tuple[int, ...]
-    """All axes that the rule looked at; `axes` are those of them that followed."""
+    """All axes that the rule checked; `axes` are those of them that followed."""
 
     @property
     def needed(self) -> float:

@@ -132,7 +132,7 @@ _SINGLE = {
     ),
     0xFF07: (
         "the bus takes no frames from the controller",
-        "check CAN cable and termination: is any other node powered? look at the bus load",
+        "check CAN cable and termination: is any other node powered? check the bus load",
     ),
     0xFF08: (
         "the axis is not where its setpoints are, and its drive does not say why",
@@ -242,7 +242,7 @@ _CLASSES = (
         0xF000,
         0x9000,
         "external error",
-        "look at the inputs of the drive: emergency stop, external fault",
+        "check the inputs of the drive: emergency stop, external fault",
     ),
     (
         0xFF00,

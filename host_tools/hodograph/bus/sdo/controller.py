@@ -215,7 +215,7 @@ class Controller(Node):
     ) -> int:
         """Waits until the state is one of `states`; a fault meanwhile is a RunError, no progress a BusError.
 
-        `tick` is called at every look. `wait_s` infinite: as long as it takes.
+        `tick` is called at every poll. `wait_s` infinite: as long as it takes.
         """
         deadline = self.clock.now_s() + wait_s
         while True:

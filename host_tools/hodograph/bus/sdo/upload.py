@@ -43,7 +43,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
         raise _refusal(node, error, before) from error
     except (SdoCommunicationError, RuntimeError) as error:
         raise BusError(
-            f"upload to {node.who()} broke off: {one_line(error)}: {_fate(node, before)}; upload again"
+            f"upload to {node.who()} broke off: {one_line(error)}: {_consequence(node, before)}; upload again"
         ) from error
     finally:
         node.sdo.RESPONSE_TIMEOUT = patience
@@ -69,7 +69,7 @@ def _active(node: Node) -> tuple[int, int]:
     return node.read(PROGRAM, 2), node.read(PROGRAM, 5)
 
 
-def _fate(node: Node, before: tuple[int, int]) -> str:
+def _consequence(node: Node, before: tuple[int, int]) -> str:
     """What is known of the old program."""
     node.sdo.RESPONSE_TIMEOUT = _FATE_S
     try:
@@ -109,7 +109,7 @@ def _refusal(
             "wait until the axes stand, or hodograph stop"
         )
     if error.code != ABORT_VALUE_RANGE:
-        return BusError(f"upload to {node.who()} failed: {error}: {_fate(node, before)}")
+        return BusError(f"upload to {node.who()} failed: {error}: {_consequence(node, before)}")
     code, index = node.read(PROGRAM, 3), node.read(PROGRAM, 4)
     return RefusedError(
         f"{node.who()} refused the program: {program_fault_text(code, index)}; "
