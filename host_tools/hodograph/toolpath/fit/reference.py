@@ -94,7 +94,8 @@ class ReferenceBuilder:
             end = move.end[:3]
             before = self._points[-1]
             if end != before:
-                length = sqrt(sum((p - q) ** 2 for p, q in zip(end, before, strict=True)))
+                (x, y, z), (x0, y0, z0) = end, before
+                length = sqrt((x - x0) ** 2 + (y - y0) ** 2 + (z - z0) ** 2)
                 self.length_mm += length
                 self._points.append(end)
                 self._rows.append((move.line, feed_of(move.feed, length), 0.0))

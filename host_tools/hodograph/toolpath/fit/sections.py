@@ -176,10 +176,11 @@ class Divider:
         if not isinstance(move, StraightMove):
             return None
         here = self._place
+        turns = move.end[3:] != here[3:]
+        if not turns and self.stands_at is None:
+            return None
         length = float(np.linalg.norm(np.subtract(move.end[:3], here[:3])))
-        if length >= SHORTEST_MM or (
-            move.end[3:] == here[3:] and (length or self.stands_at is None)
-        ):
+        if length >= SHORTEST_MM or (not turns and length):
             return None
         feed = move.feed
         if feed is not None and feed.mode is not FeedMode.INVERSE_TIME:
@@ -214,6 +215,8 @@ class Divider:
         before = self.builder.position
         self.builder.add(move)
         self.moved = True
+        if self.blending is not Blending.EXACT_PATH:
+            return
         if isinstance(move, StraightMove):
             leg = np.subtract(move.end[:3], before[:3])
             length = float(np.linalg.norm(leg))
