@@ -68,7 +68,7 @@ class PythonTests:
         """Exit status and output; -9 where it had to be killed."""
         command = [sys.executable, "-m", "pytest", "-x", "--no-header", "--tb=no"]
         command += ["-p", "no:cacheprovider", "-p", "mutation.few_examples", "--hypothesis-seed=0"]
-        command += ["-m", "not bus and not serial", *words]
+        command += ["-m", "not bus and not serial and not long", *words]
         environment = os.environ | {
             "PYTHONPATH": f"{self.tree / 'host_tools'}:{self.tree / 'tools'}"
         }
