@@ -68,7 +68,7 @@ stm32g4_SRC := $(filter-out %/cpu.c %/vectors.c %/port_%.c,$(wildcard firmware/p
 od_SRC      := $(OD_C)
 
 BINS            := controller drive injector bridge hub
-controller_MAIN := $(wildcard firmware/app/main.c firmware/port/linux/main.c)
+controller_MAIN := firmware/app/main.c
 drive_MAIN      := $(wildcard sim/node/main.c)
 injector_MAIN   := $(wildcard sim/injector/main.c)
 bridge_MAIN     := $(wildcard sim/gateway/main.c)

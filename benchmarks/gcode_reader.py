@@ -2,7 +2,7 @@
 # bench: gcode
 """Reading G-code: lines for each second of processor time, beside a loop that only reads the lines.
 
-    .venv/bin/python benchmarks/gcode.py --json OUT
+    .venv/bin/python benchmarks/gcode_reader.py --json OUT
 
 The program is a flood of G1 lines as CAM systems write them. `plain` takes the short path, `general` does without it.
 """

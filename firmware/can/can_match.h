@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* can_match: which frames a node receives, as acceptance filters of CAN controllers and of the kernel have it. */
+/* can_match: which frames a node receives, in the form of acceptance filters. Used by the ports and SocketCAN. Pure. */
 #ifndef CAN_CAN_MATCH_H
 #define CAN_CAN_MATCH_H
 

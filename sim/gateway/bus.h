@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* bus: the CAN side of the gateway, its signals and its errors. */
+/* bus: the CAN side of the gateway, its signals and its errors. Used by both sides to the board, fifo and slcan. */
 #ifndef GATEWAY_BUS_H
 #define GATEWAY_BUS_H
 

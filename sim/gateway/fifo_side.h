@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). */
+/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by main of the gateway. */
 #ifndef GATEWAY_FIFO_SIDE_H
 #define GATEWAY_FIFO_SIDE_H
 

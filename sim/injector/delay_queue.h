@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* delay_queue: frames that go out later. Bounded, no heap. */
+/* delay_queue: keeps frames until they are due. Bounded, no heap. Used by the injector's forwarder. */
 #ifndef INJECTOR_DELAY_QUEUE_H
 #define INJECTOR_DELAY_QUEUE_H
 

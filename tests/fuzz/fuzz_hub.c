@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The hub with processes that say anything: members, participants and strangers come, send packets and go, in real and in
- * virtual time. It drops whoever it does not understand, and serves the next one.
+ * The hub with processes that send anything: members, participants and others connect, send packets and leave, in real
+ * and in virtual time. It closes connections that send what it does not understand, and serves the next one.
  *
  * Input: the kind of time, then who does what.
  */

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Passing TCP connections on: through the broker into user-mode Linux, or into a network namespace."""
+"""Forwards TCP connections to a port beside the bus: through the broker into user-mode Linux, or into a network
+namespace (`tools/with-vcan --forward`).
+"""
 
 from __future__ import annotations
 

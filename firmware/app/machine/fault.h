@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* fault: what stopped the machine (object 0x2003 subs 1 to 3). */
+/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of machine. */
 #ifndef APP_MACHINE_FAULT_H
 #define APP_MACHINE_FAULT_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* decimal: numbers for the console of a board without printf. */
+/* decimal: an integer as text, for the console of a board without printf. Used by ports. Pure. */
 #ifndef PORT_COMMON_DECIMAL_H
 #define PORT_COMMON_DECIMAL_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* end_signals: SIGTERM and SIGINT as something to wait for. */
+/* end_signals: SIGTERM and SIGINT as a descriptor that can be polled. Used by the programs of sim/. Main thread. */
 #ifndef PORT_LINUX_END_SIGNALS_H
 #define PORT_LINUX_END_SIGNALS_H
 

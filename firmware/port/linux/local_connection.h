@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* local_connection: opening a connection to the hub of a local bus (local_bus.h). */
+/* local_connection: opens a connection to the hub of a local bus (local_bus.h). Used by can_socket and clock. Main thread. */
 #ifndef PORT_LINUX_LOCAL_CONNECTION_H
 #define PORT_LINUX_LOCAL_CONNECTION_H
 

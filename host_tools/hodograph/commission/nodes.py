@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Nodes on a bus: finding them, and reading their objects."""
+"""Finds the nodes on a bus and reads their objects by SDO, where no controller sends SYNC. For `scan` and `check`."""
 
 from __future__ import annotations
 

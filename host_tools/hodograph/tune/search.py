@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The goal "least contour error on these paths", within margins that a real loop needs."""
+"""Searches the servo loop with the least contour error on given paths in the worst of fourteen plants, within margins
+that a real loop needs; docs/theory/numerics.md section 17.
+"""
 
 from __future__ import annotations
 
