@@ -8,7 +8,6 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -26,17 +25,10 @@ from .events import Events, no_events
 from .feed import FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
-from .pipeline import Judged, Pipeline, program_limits
+from .pipeline import THOROUGH_GAIN, Judged, Pipeline, program_limits
 from .program.compiler import Compilation
 from .program.geometry import quantise
 from .program.stop_planning import LongStopError, StopTerms
-from .program.stop_reserve import (
-    EVERYWHERE,
-    SPREADS,
-    late_too_often,
-    zones_at_places,
-)
-from .program.stops import FAULT
 from .simulate import Motion, simulate_on
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
@@ -75,9 +67,6 @@ _THOROUGH_CHORDS = 1000
 """Sections with at most so many chords, and so many feed pieces, are searched for stops with all trials where few do
 not suffice."""
 
-_THOROUGH_GAIN = 1.1
-"""About how many times as long the bounds of stops are that few trials find."""
-
 _TOOL_OFFSET = "tool offset (G43)"
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
@@ -95,15 +84,11 @@ _Q40 = 2.0**40
 class SectionPipeline(Pipeline):
     """A pipeline whose curve is that of a section.
 
-    thorough    whether stops are searched with all trials
-    only_fault  whether none are searched for holds: the program shows where fault stops may begin
-    shared      with equal sections of the job
+    shared  with equal sections of the job
     """
 
     fitted: FittedPath | None = None
     given_events: Events = field(default_factory=no_events)
-    thorough: bool = False
-    only_fault: bool = False
     shared: SharedPrograms = field(default_factory=SharedPrograms)
 
     @property
@@ -123,7 +108,7 @@ class SectionPipeline(Pipeline):
     @property
     def stop_terms(self) -> StopTerms:
         """What the stops of the program keep."""
-        return replace(super().stop_terms, quick=not self.thorough, only_fault=self.only_fault)
+        return replace(super().stop_terms, quick=True)
 
     @cached_property
     def _timed_plan(self) -> tuple[FeedPlan, float]:
@@ -187,62 +172,21 @@ class SectionPipeline(Pipeline):
             if least == 0 and low < high
         ]
 
-    def _compiled(self, plan: FeedPlan) -> Compilation:
-        """The program; of a plan made again with more reserve where a stop would have to wait too long to begin."""
-        try:
-            return self._with_stops(plan)
-        except LongStopError as error:
-            return self._with_places(plan.limits, error)
+    def _compiled_again(self, plan: FeedPlan) -> Compilation:
+        return self._with_stops(plan, self.stop_terms)
 
-    def _with_places(self, limits: Limits, late: LongStopError) -> Compilation:
-        """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
-        lower everywhere; one of these plans, where zones are not enough. Raises `late` where none has no late stops.
-        """
-        longest_s = self.machine.stop_time_ms * 1e-3
-        program, zones = late.program, limits.reserve_zones
-        whole: list[FeedPlan] = []
-        for share in EVERYWHERE:
-            if whole and late_too_often(program, longest_s):
-                break
-            lower = self._planned(replace(limits, machine=limits.machine.scaled(1.0 - share)))
-            try:
-                lowered = replace(self, only_fault=True)._with_stops(lower).program
-                whole.append(lower)
-            except LongStopError as error:
-                lowered = error.program
-                if late_too_often(lowered, longest_s):
-                    continue
-            for spread in SPREADS:
-                more = zones_at_places(program, lowered, longest_s, share, spread)
-                if not more:
-                    break
-                zones += tuple(more)
-                try:
-                    return self._with_stops(self._planned(replace(limits, reserve_zones=zones)))
-                except LongStopError as error:
-                    program = error.program
-        return self._first_in_time(whole, late)
-
-    def _first_in_time(self, plans: Sequence[FeedPlan], late: LongStopError) -> Compilation:
-        """The program of the first of some plans that has no late stops. Raises `late` where none is."""
-        for plan in plans:
-            with suppress(LongStopError):
-                return self._with_stops(plan)
-        raise late
-
-    def _with_stops(self, plan: FeedPlan) -> Compilation:
+    def _with_stops(self, plan: FeedPlan, terms: StopTerms) -> Compilation:
         """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
         all. Raises LongStopError.
         """
         try:
-            return super()._compiled(plan)
+            return super()._with_stops(plan, terms)
         except LongStopError as error:
-            longest_s = _THOROUGH_GAIN * self.machine.stop_time_ms * 1e-3
             assert self.fitted is not None
             few = max(self.fitted.reference.count, error.program.piece_count) <= _THOROUGH_CHORDS
-            if self.thorough or not few or error.program.stops.worst(FAULT).time_s > longest_s:
+            if not few or error.late_by > THOROUGH_GAIN:
                 raise
-            return replace(self, thorough=True)._with_stops(plan)
+            return super()._with_stops(plan, replace(terms, quick=False))
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:

@@ -58,6 +58,8 @@ from .program import (
     fit_plan,
 )
 from .program.codes import ProgramError
+from .program.late_stops import Replanning
+from .program.stop_planning import LongStopError
 from .program.stops import DECELERATION, FAULT, HOLD
 from .spline import PHSpline, SplineResult, from_control_polygon, through_points
 from .spline.spatial import (
@@ -223,6 +225,9 @@ def proved_limits(machine: Machine) -> str:
 
 _MORE_RESERVE = (0.002, 0.01)
 """Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
+THOROUGH_GAIN = 1.1
+"""About how many times as long the bounds of stops are that few trials find."""
+
 _PROVED = (
     ProgramError.AXIS_VELOCITY,
     ProgramError.AXIS_ACCELERATION,
@@ -382,7 +387,11 @@ class Pipeline:
     @cached_property
     def peaks(self) -> dict[str, Peak]:
         """Where every limited quantity of the plan comes nearest to its limit."""
-        plan, machine, limits = self.plan, self.machine_or_none, self.limits
+        return self.peaks_of(self.plan)
+
+    def peaks_of(self, plan: FeedPlan) -> dict[str, Peak]:
+        """The same of another plan of the path, such as `compilation.plan`."""
+        machine, limits = self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
         return plan_peaks(plan, self.curve, limits, controller, plants(machine, limits))
 
@@ -438,6 +447,36 @@ class Pipeline:
         return replan_optimal if self.feed.optimal else replan
 
     def _compiled(self, plan: FeedPlan) -> Compilation:
+        """The program of a plan; of one made again where a fault stop would come too late. Raises LongStopError where
+        that helps nowhere.
+        """
+        try:
+            return self._with_stops(plan, self.stop_terms)
+        except LongStopError as error:
+            again = Replanning(
+                self._planned,
+                self._replan,
+                self._compiled_again,
+                self._searched,
+                self.machine.stop_time_ms * 1e-3,
+            )
+            return again.in_time(plan, error)
+
+    def _compiled_again(self, plan: FeedPlan) -> Compilation:
+        """The program of a plan made again. Only where few trials find stops that are hardly late, all are made."""
+        try:
+            self._searched(plan)
+        except LongStopError as error:
+            if error.late_by > THOROUGH_GAIN:
+                raise
+        return self._with_stops(plan, self.stop_terms)
+
+    def _searched(self, plan: FeedPlan) -> Compilation:
+        """The program of a plan whose stops are searched with few trials, and fault stops only."""
+        return self._with_stops(plan, replace(self.stop_terms, quick=True, only_fault=True))
+
+    def _with_stops(self, plan: FeedPlan, terms: StopTerms) -> Compilation:
+        """The program of a plan. Raises LongStopError."""
         machine = self.machine
         limits = program_limits(machine)
         spline = self.curve
@@ -451,7 +490,7 @@ class Pipeline:
                     machine.offset_mm,
                     limits,
                     machine.period_us,
-                    self.stop_terms,
+                    terms,
                     events,
                     machine.first_axis,
                 ),

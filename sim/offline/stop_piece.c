@@ -101,6 +101,23 @@ static int add_instants(const struct stop_setting *setting, const double c[8], u
     return fits;
 }
 
+/* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by the
+ * reciprocals of their limits. They may turn by many degrees within a millimetre. */
+static double extra_axes_most(const struct stop_setting *setting, const struct stop_piece *piece,
+                              const double inverse[PROGRAM_AXES])
+{
+    double most = 0.0;
+    for (uint32_t i = 0; i < piece->count; i++) {
+        const double *by_mm = setting->road.bends[piece->row[i]].by_mm[0];
+        double used = 0.0; /* share of a limit, for 1 along the path */
+        for (uint32_t k = PROGRAM_SPACE; k < setting->road.axis_count; k++) {
+            used = stop_greater(used, fabs(by_mm[k]) * inverse[k]);
+        }
+        most = stop_greater(most, used > 0.0 ? 1.0 / used : HUGE_VAL);
+    }
+    return most;
+}
+
 /* The greatest codes of a piece: no less than a stop within LEAST_TICKS from its greatest speed needs, and beyond that only
  * what takes the path that is left after it in as many ticks. */
 static void piece_most(const struct stop_setting *setting, struct stop_piece *piece)
@@ -109,8 +126,12 @@ static void piece_most(const struct stop_setting *setting, struct stop_piece *pi
     const double left_mm = stop_greater(setting->length_mm - piece->at[piece->count - 1u].s, 0.0);
     const double acceleration =
         stop_greater(8.0 * stop_greater(piece->fastest.v, LEAST_MM_S), left_mm / span_s) / span_s;
+    const int extra = setting->road.axis_count > PROGRAM_SPACE;
     for (int k = 0; k < 3; k++) {
-        const double most = k == 1 ? acceleration : acceleration / (2.0 * span_s);
+        const double *inverse =
+            k == 1 ? setting->inverse.axis_acceleration : setting->inverse.axis_jerk;
+        const double most = fmin(k == 1 ? acceleration : acceleration / (2.0 * span_s),
+                                 extra ? extra_axes_most(setting, piece, inverse) : HUGE_VAL);
         piece->most[k] = setting->most[k];
         while (piece->most[k] > 1 && stop_number_of(k, piece->most[k]) > most) {
             piece->most[k]--;

@@ -336,6 +336,9 @@ class Plan:
     def program(self) -> Program:
         """The program for the plan's machine, as its controller accepts it.
 
+        Where a fault stop would take longer than `stop_time_ms` of the machine, the path is planned again with more
+        room for stops: the program then takes longer than the plan.
+
         Raises InputError without a machine, PlanError where a limit of the controller is not kept.
         """
         if self.machine is None:

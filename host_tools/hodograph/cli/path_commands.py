@@ -111,21 +111,21 @@ def print_notes(pipeline: Pipeline, plan: FeedPlan) -> None:
 def feed(options: Namespace) -> None:
     """hodograph feed."""
     pipeline = load_pipeline(options.file, options.machine, allow_space=True)
-    print_notes(pipeline, pipeline.plan)
     program = _program_of(pipeline)
+    plan = pipeline.plan if program is None else pipeline.compilation.plan
+    print_notes(pipeline, plan)
     at_s = None
     if options.at is not None:
-        at_s = _within("--at", options.at, pipeline.plan.duration_s, "s")
+        at_s = _within("--at", options.at, plan.duration_s, "s")
     if options.json:
-        print_json(_feed_document(pipeline, program, at_s))
+        print_json(_feed_document(pipeline, plan, program, at_s))
     else:
-        _print_feed(pipeline, program, at_s)
+        _print_feed(pipeline, plan, program, at_s)
 
 
 def _feed_document(
-    pipeline: Pipeline, program: Program | None, at_s: np.ndarray | None
+    pipeline: Pipeline, plan: FeedPlan, program: Program | None, at_s: np.ndarray | None
 ) -> dict[str, object]:
-    plan = pipeline.plan
     result: dict[str, object] = {
         "profile": plan.profile,
         "n_c": plan.n_c,
@@ -135,7 +135,7 @@ def _feed_document(
         "planning_s": pipeline.planning_s,
         "peak": {
             name: {"value": peak.value, "limit": peak.limit.given, "at_mm": peak.s_mm}
-            for name, peak in pipeline.peaks.items()
+            for name, peak in pipeline.peaks_of(plan).items()
         },
         "peak_acceleration_mm_s2": plan.peak_acceleration_mm_s2,
         "peak_jerk_mm_s3": plan.peak_jerk_mm_s3,
@@ -148,8 +148,10 @@ def _feed_document(
     return result
 
 
-def _print_feed(pipeline: Pipeline, program: Program | None, at_s: np.ndarray | None) -> None:
-    plan, unit = pipeline.plan, pipeline.unit
+def _print_feed(
+    pipeline: Pipeline, plan: FeedPlan, program: Program | None, at_s: np.ndarray | None
+) -> None:
+    unit = pipeline.unit
     slope = "" if plan.n_c is None else f", n_c {plan.n_c:.6g} ({plan.evaluations} evaluations)"
     ramps = [] if plan.ramp_time_s is None else [("ramps", f"{number(plan.ramp_time_s)} s")]
     print_rows(
@@ -167,7 +169,7 @@ def _print_feed(pipeline: Pipeline, program: Program | None, at_s: np.ndarray | 
         for line in stops_text(program.stops, program.piece_starts_mm, pipeline.unit):
             print(line)
     print(f"{'limited quantity':28} {'peak':>12} {'limit':>12} {'used %':>8} {f'at {unit}':>12}")
-    for name, peak in pipeline.peaks.items():
+    for name, peak in pipeline.peaks_of(plan).items():
         print(
             f"{name:28} {peak.value:12.6g} {peak.limit.given:12.6g} "
             f"{100.0 * peak.value / peak.limit.given:8.2f} {peak.s_mm:12.6g}"

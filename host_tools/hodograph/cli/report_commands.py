@@ -32,7 +32,7 @@ def report(options: Namespace) -> None:
     pipelines = [load_pipeline(file, options.machine, allow_space=True) for file in options.files]
     cases = []
     for pipeline in pipelines:
-        print_notes(pipeline, pipeline.plan)
+        print_notes(pipeline, pipeline.compilation.plan)
         cases.append((pipeline, simulate_pipeline(pipeline, options.kernel), None))
     print(write_report(cases, options.output))
 

@@ -190,9 +190,10 @@ def _verdict_document(machine: Machine | None, fault: NativeFault | None) -> dic
 
 
 def _planned(pipeline: Pipeline) -> NativeProgram:
-    print_notes(pipeline, pipeline.plan)
     if pipeline.machine_or_none is not None:
+        print_notes(pipeline, pipeline.compilation.plan)
         return pipeline.accepted
+    print_notes(pipeline, pipeline.plan)
     options = ProgramOptions(pipeline.file.name)
     return NativeProgram(encode(compile_program(pipeline.curve, pipeline.plan, options)))
 

@@ -47,11 +47,25 @@ FINE_WORTH_SHARE = 0.97
 
 
 class LongStopError(PlanError):
-    """A fault stop of `program` may take longer than the machine file allows."""
+    """A fault stop of `program` may take longer than the machine file allows.
 
-    def __init__(self, program: Program, text: str) -> None:
-        super().__init__(text)
+    reason   of the longest: how long, where, and the limit, in words
+    late_by  its time over the limit
+    """
+
+    def __init__(self, program: Program, stop_time_ms: int) -> None:
+        worst = program.stops.worst(FAULT)
+        place_mm = float(program.piece_starts_mm[worst.piece])
         self.program = program
+        self.late_by = worst.time_s / (stop_time_ms * 1e-3)
+        self.reason = (
+            f"a fault stop at arc length {place_mm:.6g} mm (piece {worst.piece}) may take {worst.time_s:.3g} s, "
+            f"longer than stop_time_ms = {stop_time_ms} of the machine file"
+        )
+        super().__init__(
+            f"stops: {self.reason}, and no plan was found with shorter stops: lower the feed there, or raise "
+            "stop_time_ms or the machine's acceleration and jerk"
+        )
 
 
 @dataclass(frozen=True)
@@ -436,15 +450,8 @@ def _late(program: Program, terms: StopTerms) -> bool:
 
 
 def _checked(program: Program, terms: StopTerms) -> Program:
-    worst = program.stops.worst(FAULT)
     if _late(program, terms):
-        place = float(program.pieces.start_q40[worst.piece]) * 2.0**-40
-        raise LongStopError(
-            program,
-            f"stops: a fault stop at arc length {place:.6g} mm (piece {worst.piece}) may take {worst.time_s:.3g} s, "
-            f"longer than stop_time_ms = {terms.stop_time_ms} of the machine file: "
-            "lower the feed there, or raise stop_time_ms or the machine's acceleration and jerk",
-        )
+        raise LongStopError(program, terms.stop_time_ms)
     return program
 
 

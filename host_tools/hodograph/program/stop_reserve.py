@@ -101,7 +101,7 @@ def zones_at_places(
     next_s, longest_s = float(own_time[-1]), _USED_SHARE * stop_time_s
     bound_s = 0.0
     while next_s > longest_s - bound_s:
-        room_s = longest_s - bound_s
+        room_s = max(longest_s - bound_s, 0.0)
         k = int(np.searchsorted(own.end_s, next_s - room_s))
         if k < own.end_s.size and own.begin_s[k] < next_s - _OWN_SHARE * room_s:
             next_s, bound_s = float(own.begin_s[k]), float(own.bound_s[k])

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""A path whose fault stops would come too late is planned again, and refused only where no plan helps."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hodograph.cli.main import main
+from hodograph.config import load_machine, load_path_file
+from hodograph.errors import PlanError
+from hodograph.pipeline import Pipeline, load_pipeline
+from hodograph.program import Program, stop_reserve
+from hodograph.program.stop_reserve import StopPlaces, zones_at_places
+from hodograph.program.stops import FAULT
+
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+FIVE_AXES = EXAMPLES / "machines/mill_five_axes.toml"
+OPTIMAL = 'profile = "optimal"\n'
+MINIMAX = 'profile = "minimax"\nnominal_mm_s = 60\nramp_time_s = 0.06\n'
+
+
+def five_axes_file(folder: Path, seed: int, feed: str, limits: str = "") -> Path:
+    """A short path of three to eight points; a and c turn by up to 12 degrees from one to the next."""
+    rng = np.random.default_rng([seed, 77])
+    count = int(rng.integers(3, 9))
+    legs = rng.uniform(1.0, 10.0, (count, 1))
+    along = np.cumsum(rng.uniform(-0.9, 0.9, (count, 3)), axis=0) + np.array([1.0, 0.0, 0.0])
+    drawn = np.cumsum(legs * along / np.linalg.norm(along, axis=1)[:, None], axis=0)
+    turned = np.cumsum(rng.uniform(-12, 12, (count, 2)), axis=0)
+    points = np.concatenate((drawn, turned), axis=1).round(4).tolist()
+    file = folder / f"five{seed}.toml"
+    file.write_text(
+        f'[path]\nclosed = false\nthrough = {points}\n[feed]\n{feed}{limits}[machine]\nfile = "{FIVE_AXES}"\n',
+        encoding="utf-8",
+    )
+    return file
+
+
+def on_machine(name: str, stop_time_ms: int, **limits: str) -> Pipeline:
+    file = load_path_file(EXAMPLES / f"{name}.toml")
+    assert file.machine_file is not None
+    machine = replace(load_machine(file.machine_file), stop_time_ms=stop_time_ms)
+    return Pipeline(replace(file, limits=replace(file.limits, **limits)), machine)
+
+
+@pytest.mark.parametrize("seed", [0, 6, 10])
+def test_a_short_path_of_five_axes_is_planned_again(tmp_path: Path, seed: int) -> None:
+    made = load_pipeline(five_axes_file(tmp_path, seed, OPTIMAL), allow_space=True)
+    program = made.program
+    assert made.accepted.check() is None
+    assert program.stops.worst(FAULT).time_s <= 0.25
+    assert made.plan.duration_s < program.duration_s < 1.25 * made.plan.duration_s
+    assert "planned again with more room for stops" in made.compilation.notes[-1]
+    assert "stop_time_ms = 250" in made.compilation.notes[-1]
+
+
+def test_a_plan_that_is_in_time_is_not_planned_again(tmp_path: Path) -> None:
+    made = load_pipeline(five_axes_file(tmp_path, 3, OPTIMAL), allow_space=True)
+    assert made.compilation.plan is made.plan
+
+
+def test_stops_are_found_where_axes_turn_by_many_degrees_within_a_millimetre(
+    tmp_path: Path,
+) -> None:
+    """Such a place needs codes far below those that the limits along the path allow."""
+    made = load_pipeline(five_axes_file(tmp_path, 6, MINIMAX), allow_space=True)
+    assert made.program.stops.worst(FAULT).time_s <= 0.25
+    assert made.compilation.plan is made.plan
+
+
+@pytest.mark.parametrize("policy", ["respect", "report"])
+@pytest.mark.parametrize(("name", "stop_time_ms"), [("alpha", 60), ("alpha_optimal", 60)])
+def test_the_feed_is_lowered_where_room_is_not_enough(
+    name: str, stop_time_ms: int, policy: str
+) -> None:
+    made = on_machine(name, stop_time_ms, policy=policy)
+    assert made.program.stops.worst(FAULT).time_s <= stop_time_ms * 1e-3
+    assert made.accepted.check() is None
+    assert made.compilation.plan.feed_mm_s < made.plan.feed_mm_s
+    (note,) = (line for line in made.compilation.notes if "stop_time_ms = 60" in line)
+    assert note.startswith(("feed lowered from", "feed capped:"))
+
+
+def test_where_no_plan_helps_the_refusal_has_the_place_and_what_to_do() -> None:
+    made = on_machine("alpha", 3)
+    with pytest.raises(PlanError) as refused:
+        _ = made.program
+    text = str(refused.value)
+    assert "fault stop at arc length 34.9805 mm" in text
+    assert "stop_time_ms = 3" in text
+    assert "no plan was found" in text
+    assert "raise stop_time_ms" in text
+
+
+def test_commands_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """`feed`, `compile` and `simulate` have the same motion, and the same note."""
+    file = five_axes_file(tmp_path, 0, OPTIMAL)
+    duration_s = load_pipeline(file, allow_space=True).program.duration_s
+    words = {
+        "feed": ["feed", str(file), "--json"],
+        "compile": ["compile", str(file), "--json", "--output", str(tmp_path / "five.hdgp")],
+        "simulate": ["simulate", str(file), "--json", "--fault-at", "0.2"],
+    }
+    for name, command in words.items():
+        assert main(command) == 0
+        out, err = capsys.readouterr()
+        assert "planned again with more room for stops" in err, name
+        found = json.loads(out)
+        if name == "feed":
+            assert found["duration_s"] == pytest.approx(duration_s, abs=1e-6)
+        if name == "simulate":
+            (stop,) = found["stops"]
+            assert stop["rest_after_s"] <= stop["bound_s"] <= 0.25
+
+
+def place(program: Program, begin_s: float, end_s: float, bound_s: float) -> StopPlaces:
+    """One place, at a constant feed."""
+    mm_s = program.length_q40 * 2.0**-40 / program.duration_s
+    each = (begin_s, end_s, begin_s * mm_s, end_s * mm_s, bound_s)
+    return StopPlaces(*(np.array([value]) for value in each))
+
+
+def test_the_search_of_places_ends_where_stops_from_them_are_late(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From a place whose stop is late the search goes on to an earlier one, not back to a later one."""
+    program = on_machine("alpha", 250).program
+    lowered = replace(program)
+    places = {
+        id(program): place(program, 0.5, 0.7, 0.05),
+        id(lowered): place(program, 0.45, 0.46, 0.3),
+    }
+    monkeypatch.setattr(stop_reserve, "stop_places", lambda given: places[id(given)])
+    assert len(zones_at_places(program, lowered, 0.1, 0.16, 1.0)) == 1
