@@ -328,7 +328,7 @@ def _stream(command: Command) -> None:
         metavar="FILE",
         type=Path,
         nargs="*",
-        help=f"{options.TOOLPATH}; several are one job",
+        help=f"{options.TOOLPATH}, or a path file with several paths; several FILEs run one after the other",
     )
     stream.add_argument(
         "--continue",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph stream: toolpaths of any length, as one job, through a controller with little memory."""
+"""hodograph stream: toolpaths of any length, and lists of paths, through a controller with little memory."""
 
 from __future__ import annotations
 
