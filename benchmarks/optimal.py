@@ -190,9 +190,9 @@ def optimum(task: Task, intervals: int) -> dict[str, Any]:
     }
 
 
-def planned(case: Case, reserve: float, folder: Path) -> dict[str, Any] | None:
+def planned(case: Case, folder: Path) -> dict[str, Any] | None:
     """The planner's own time, peaks and wall time; None where it cannot."""
-    pipeline = chain_of(case, 'profile = "optimal"\n', reserve, folder)
+    pipeline = chain_of(case, 'profile = "optimal"\n', Limits.reserve, folder)
     spline = pipeline.curve  # not to be timed
     begin = time.perf_counter()
     try:
@@ -250,16 +250,15 @@ def measure(case: Case, intervals: int, folder: Path) -> dict[str, Any]:
     lower = bound(task.spline, task.limits)
     out |= {"toppra_s": lower.duration_s, "toppra_axis_jerk_mm_s3": lower.axis_jerk_mm_s3}
     out["papers_kind"] = of_the_papers_kind(case, folder)
-    for name, reserve in (("optimal", Limits.reserve), ("optimal_least_reserve", LEAST_RESERVE)):
-        out[name] = found = planned(case, reserve, folder)
-        if found is not None and out["collocation_s"] is not None:
-            found["of_best"] = found["duration_s"] / out["collocation_s"]
+    out["optimal"] = found = planned(case, folder)
+    if found is not None and out["collocation_s"] is not None:
+        found["of_best"] = found["duration_s"] / out["collocation_s"]
     return out
 
 
 HEADER = (
-    f"{'case':<16} {'best known':>10} {'change %':>8} {'optimal':>9} {'/ best':>8} {'least res.':>10} "
-    f"{'/ best':>8} {'TOPP-RA':>8} {'/ best':>7} {'its jerk':>9} {'our jerk':>9} {'paper kind':>10} {'saved %':>8}"
+    f"{'case':<16} {'best known':>10} {'change %':>8} {'optimal':>9} {'/ best':>8} "
+    f"{'TOPP-RA':>8} {'/ best':>7} {'its jerk':>9} {'our jerk':>9} {'paper kind':>10} {'saved %':>8}"
 )
 
 
@@ -273,15 +272,15 @@ def row(name: str, found: dict[str, Any]) -> str:
     def seconds(value: float | None) -> str:
         return "-" if value is None else f"{value:.4f}"
 
-    own, least, paper = found["optimal"], found["optimal_least_reserve"], found["papers_kind"]
-    own_s, least_s = own and own["duration_s"], least and least["duration_s"]
+    own, paper = found["optimal"], found["papers_kind"]
+    own_s = own and own["duration_s"]
     paper_s = paper and paper["duration_s"]
     saved = "-" if own_s is None or paper_s is None else f"{100 * (1 - own_s / paper_s):.1f}"
     change = found.get("collocation_last_change_percent")
     jerk = "-" if own is None else f"{own['axis_jerk_mm_s3']:.3g}"
     return (
         f"{name:<16} {seconds(found['collocation_s']):>10} {'-' if change is None else f'{change:.3f}':>8} "
-        f"{seconds(own_s):>9} {over(own_s):>8} {seconds(least_s):>10} {over(least_s):>8} "
+        f"{seconds(own_s):>9} {over(own_s):>8} "
         f"{seconds(found['toppra_s']):>8} {over(found['toppra_s']):>7} "
         f"{found['toppra_axis_jerk_mm_s3']:>9.3g} {jerk:>9} {seconds(paper_s):>10} {saved:>8}"
     )

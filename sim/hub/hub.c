@@ -39,6 +39,24 @@ static uint64_t clock_of(clockid_t clock)
 
 /* --- Connections --- */
 
+/* Whether a path is the socket of a hub that was killed: nobody accepts connections there any more. */
+static bool is_left_over(const char *path, const struct stat *found)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    if (!S_ISSOCK(found->st_mode)) {
+        return false;
+    }
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    if (fd < 0) {
+        return false;
+    }
+    const bool refused = connect(fd, (const struct sockaddr *)&address, sizeof address) != 0 &&
+                         errno == ECONNREFUSED;
+    (void)close(fd);
+    return refused;
+}
+
 /* The path is there when it is served, not before. */
 static int listen_at(const char *path)
 {
@@ -48,7 +66,7 @@ static int listen_at(const char *path)
     if (length < 0 || (size_t)length >= sizeof address.sun_path) {
         return -ENAMETOOLONG;
     }
-    if (lstat(path, &found) == 0) {
+    if (lstat(path, &found) == 0 && !is_left_over(path, &found)) {
         return -EADDRINUSE;
     }
     const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);

@@ -132,6 +132,26 @@ def test_the_hub_ends_with_the_command(
     assert str(address) in capsys.readouterr().out
 
 
+def test_a_bus_whose_hub_was_killed_is_served_again(tmp_path: Path) -> None:
+    """Its socket file stays; one that is served is left alone, and so is a file that is no socket."""
+    path, file = tmp_path / "bus", tmp_path / "file"
+    with LocalHub(paths=[path]) as hub:
+        assert hub.child is not None
+        hub.child.kill()
+        hub.child.wait()
+    assert path.is_socket()
+    assert not is_served(path)
+    with LocalHub(paths=[path]):
+        assert is_served(path)
+        with pytest.raises(BusError), LocalHub(paths=[path]):
+            pass
+        assert is_served(path)
+    file.write_text("not a bus")
+    with pytest.raises(BusError), LocalHub(paths=[file]):
+        pass
+    assert file.read_text() == "not a bus"
+
+
 def test_demo(environment: Mapping[str, str], tmp_path: Path) -> None:
     """Live page, run and report, with the setpoints of `simulate`."""
     demo = hodograph(

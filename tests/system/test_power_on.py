@@ -179,6 +179,46 @@ def test_what_is_forgotten_does_not_come_back(bench: PowerBench, say: Say) -> No
     assert look(say)["configuration"]["state"] == "none"
 
 
+@pytest.mark.parametrize(
+    ("steps", "runs", "says"),
+    [
+        (0, False, "hodograph configure FILE"),
+        (1, False, "no program"),
+        (2, True, "restored"),
+        (3, True, "restored"),
+        (4, False, "not within the limits"),
+        (5, True, "restored"),
+        (6, False, "hodograph configure FILE"),
+    ],
+)
+def test_a_power_cycle_between_any_two_steps(
+    bench: PowerBench, say: Say, tmp_path: Path, steps: int, runs: bool, says: str
+) -> None:
+    """What runs afterwards is a program within the limits that hold, or nothing."""
+    slow = tmp_path / "slow.toml"
+    slow.write_text(
+        machine_file(tmp_path).read_text().replace("feed_mm_s = 500 ", "feed_mm_s = 50 ")
+    )
+    each = (
+        ("configure", ALPHA, "--store"),
+        ("upload", ALPHA),
+        ("configure", str(slow)),
+        ("configure", str(slow), "--store"),
+        ("upload", ALPHA, "--machine", str(slow)),
+        ("configure", "--forget"),
+    )
+    for words in each[:steps]:
+        say(*words)
+    bench.off("controller")
+    bench.controller_on()
+    bench.until_off()
+    if not runs:
+        assert says in say("start", status=REFUSED)
+        return
+    assert look(say)["configuration"]["state"] == says
+    assert say("start", "--follow") == "done\n"
+
+
 def test_stored_with_the_drives_off_only(bench: PowerBench, say: Say) -> None:
     say("configure", ALPHA)
     with bench.controller() as controller:

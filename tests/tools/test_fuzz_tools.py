@@ -115,6 +115,14 @@ def test_some_cases(tmp_path: Path, target: str) -> None:
     assert found == [None] * 10
 
 
+@pytest.mark.parametrize("case", [572, 1223])
+def test_a_bound_that_only_rounding_makes_too_short_is_no_finding(
+    tmp_path: Path, case: int
+) -> None:
+    """The controller's bounds of stops are rounded up, by 3 and 2 us in these images."""
+    assert run_case("image", 1124, case, tmp_path) is None
+
+
 def test_each_harness_has_a_corpus() -> None:
     corpora = sorted(folder.name for folder in (ROOT / "tests/data/fuzz").iterdir())
     assert harnesses.names(ROOT) == corpora

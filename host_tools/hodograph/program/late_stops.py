@@ -20,10 +20,10 @@ from .stop_planning import LongStopError
 from .stop_reserve import EVERYWHERE, SPREADS, late_too_often, zones_at_places
 from .stops import FAULT
 
-LEAST_STEP, GREATEST_STEP = 0.7, 0.95
+LEAST_STEP, GREATEST_STEP = 0.3, 0.95
 """Factors of the feed from one plan to the next: in proportion to how late stops are, but within these."""
 
-MOST_STEPS = 16
+MOST_STEPS = 8
 """How many times the feed is lowered."""
 
 

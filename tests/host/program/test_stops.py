@@ -119,10 +119,10 @@ def test_inspection_has_the_worst_stops(program) -> None:
 
 def test_a_fault_stop_that_takes_too_long_is_refused_with_its_place(tmp_path) -> None:
     text = (ROOT / "examples/machines/paper_alpha.toml").read_text(encoding="utf-8")
-    text = text.replace("[work]", "stop_time_ms = 60\n[work]", 1)
+    text = text.replace("[work]", "stop_time_ms = 10\n[work]", 1)
     text = text.replace("../drives", str(ROOT / "examples/drives"))
     machine = tmp_path / "machine.toml"
     machine.write_text(text, encoding="utf-8")
     pipeline = load_pipeline(ROOT / "examples/alpha_optimal.toml", machine)
-    with pytest.raises(PlanError, match=r"fault stop at arc length .* stop_time_ms = 60"):
+    with pytest.raises(PlanError, match=r"fault stop at arc length .* stop_time_ms = 10"):
         _ = pipeline.program
