@@ -12,6 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
+from ..errors import PlanError
 from ..feed import FeedPlan, FeedZone, Limits, Replan
 from ..feed.request import LEAST_FEED_MM_S
 from .compiler import Compilation
@@ -99,7 +100,10 @@ class Replanning:
                 zones = [FeedZone(0.0, plan.length_mm, step * plan.feed_mm_s)]
             if min(zone.feed_mm_s for zone in zones) < LEAST_FEED_MM_S:
                 break
-            plan = self.slower(plan, zones, late.reason)
+            try:
+                plan = self.slower(plan, zones, late.reason)
+            except PlanError:  # the planner finds nothing at so low a feed
+                break
             try:
                 self.search(plan)
                 return self.compile(plan)

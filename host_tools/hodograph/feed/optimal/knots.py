@@ -144,7 +144,9 @@ def _samples(spline: Curve, limits: PlanLimits, low: float, high: float) -> Real
     end = (np.arange(1, _END_SAMPLES) / _END_SAMPLES) ** 3
     s = np.concatenate((s, s[0] + (s[1] - s[0]) * end, s[-1] - (s[-1] - s[-2]) * end, edges))
     s = np.unique(s)
-    return np.asarray(s[np.append(True, np.diff(s) > 1e-12 * (high - low))])
+    s = s[np.append(True, np.diff(s) > 1e-12 * (high - low))]
+    s[-1] = high  # a zone may end a little before it
+    return np.asarray(s)
 
 
 def zone_ends(limits: PlanLimits, low: float, high: float) -> Real:
