@@ -52,7 +52,15 @@ PATHS: dict[str, tuple[str, ...]] = {
 OVER_AXES = {"interpolator_point_copy_rest": 2, "path_counts_rest": 3}
 
 SPATIAL = ("3", "6")
-SPATIAL_GOALS = {("an386", "float", "3"): 720, ("an386", "float", "6"): 950}
+SPATIAL_GOALS = {
+    ("an386", "float", "3"): 720,
+    ("an386", "float", "6"): 950,
+    # As the goals of the plane, in proportion: times 720/600 and 950/600.
+    ("an385", "fixed", "3"): 1800,
+    ("an385", "fixed", "6"): 2375,
+    ("microbit", "fixed", "3"): 4800,
+    ("microbit", "fixed", "6"): 6333,
+}
 
 
 def motion_part(

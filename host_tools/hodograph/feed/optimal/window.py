@@ -101,6 +101,14 @@ class Solution:
             squared_feed(self.grid, self.q, self.slope, s), _LEAST_Q * float(self.q.max())
         )
 
+    def estimate(self, s: Real) -> Real:
+        """The same for further programs to begin with: where q falls below 0 between two knots, which an early round
+        may leave, it is a share of that at the knots. Programs about a q near 0 take tens of rounds to leave it.
+        """
+        interval = np.clip(np.searchsorted(self.grid.s, s, side="right") - 1, 0, self.grid.size - 1)
+        beside = np.minimum(self.q[interval], self.q[interval + 1])
+        return np.maximum(self.squared_feed(s), _LEAST_FALL * beside)
+
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
@@ -165,7 +173,7 @@ def plan_window(
         best = _Rounds(setting, about).run(None if last else even, gain)
         if best is None or last or even(best):
             break
-        about = best.squared_feed
+        about = best.estimate
         guess = _refined(guess, best)
         s, t, step = _retimed(best, guess, period_s)
     return best if best is None else _without_brief(spline, best, before_s, period_s, gain)
@@ -257,7 +265,7 @@ def _retimed(found: Solution, guess: FirstEstimate, period_s: float) -> tuple[Re
     s = grid.sigma(interval, np.tile(u, grid.size))[0]
     s = np.concatenate((grid.s[:1], s))
     s[-1] = grid.s[-1]
-    feed = np.sqrt(found.squared_feed(s))
+    feed = np.sqrt(found.estimate(s))
     part = 2.0 * np.diff(s) / (feed[1:] + feed[:-1])
     part = part.reshape(grid.size, u.size)
     part *= (found.times / part.sum(axis=1))[:, None]
