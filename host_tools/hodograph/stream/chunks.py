@@ -19,14 +19,13 @@ from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
 from ..program.check import REACH_Q40, brief_pairs
 from ..program.codes import ProgramError
-from ..program.image import Program, encode, segment_size
+from ..program.image import COMPACT_PIECE_BYTES, Program, encode, segment_size
 from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
 from .windows import (
     JOINTS,
-    PIECE_BYTES,
     SectionFeed,
     Spacing,
     Stretch,
@@ -364,7 +363,8 @@ class SectionChunks:
         joint_q40 = window.joint_q40(joint)
         segments = path.segment_at(joint_q40) + 1 - first
         events = len(path.events_on(int(path.start_q40[first]), joint_q40))
-        size = HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
+        size = HEADER_SIZE + len(pieces) * COMPACT_PIECE_BYTES
+        size += segments * segment_size(path.curve.axes, compact=True)
         return size + EVENT.itemsize * events
 
     def _require_room(self, program: Program, line: int) -> None:
@@ -473,6 +473,7 @@ class SectionChunks:
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=int(pieces.start_q40[0]) != self._feed.begin_q40,
+            compact=True,
             first_axis=machine.first_axis,
         )
         return with_bounds(program)
