@@ -141,6 +141,7 @@ class Concatenation:
             pieces=pieces,
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=False,
+            compact=False,
             events=np.concatenate(self._events),
         )
         return with_bounds(whole)
@@ -152,7 +153,8 @@ def concatenated(chunks: Iterable[Chunk]) -> Program:
     before: Chunk | None = None
     for chunk in chunks:
         if before is not None:
-            whole.add(before, chunk.header.piece_shift + chunk.header.shared_pieces)
+            joint = chunk.header.piece_shift + chunk.header.shared_pieces
+            whole.add(before, joint if chunk.header.rest is None else None)
         before = chunk
     assert before is not None
     whole.add(before, None)

@@ -201,6 +201,11 @@ class SectionFeed:
                 self._advance(window)
             self._drop()
 
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether the present window does."""
+        return self._moving is None
+
     def at_end(self, window: Window) -> bool:
         """Whether a window ends where the section does."""
         return self.path.complete and window.stretch.end_q40 == int(self.path.start_q40[-1])
