@@ -68,8 +68,9 @@ _COMPACT_PLANAR = np.dtype([("start", *_I56), ("point", "u1", (2, 7)), ("a", _I4
 _COMPACT_SPATIAL = [("start", *_I56), ("point", "u1", (3, 7)), ("a", _I48, (3, 4))]
 _COMPACT_EXTRA = np.dtype([("start", *_I56), ("b", _I48, 5)])
 _COMPACT_STOP = np.dtype([("codes", "u1", (2, 3)), ("bound_us", "u1", (2, 3))])
-COMPACT_PIECE_BYTES = _COMPACT_PIECE.itemsize + _COMPACT_STOP.itemsize
-"""Of a compact piece and its stop."""
+COMPACT_PIECE_SIZE, COMPACT_STOP_SIZE = _COMPACT_PIECE.itemsize, _COMPACT_STOP.itemsize
+COMPACT_PIECE_BYTES = COMPACT_PIECE_SIZE + COMPACT_STOP_SIZE
+"""Of a compact piece with its stop."""
 
 
 @dataclass(frozen=True, eq=False)

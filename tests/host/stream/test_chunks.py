@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -104,21 +105,32 @@ def _verify(
         before = chunk
     assert before is not None
     assert before.header.last
-    whole = concatenated(chunks)
-    assert check(whole, replace(program_limits(machine), stop_time_ms=0)) is None
-    program = NativeProgram(encode(whole))
-    # Its fault stops may take longer than those of chunks, whose ends are near: only pieces and joints count here.
-    assert program.check(replace(_limits(machine), chunk=0, stop_time_ms=0)) is None
+    programs = []
+    for part in _from_rest_to_rest(chunks):
+        whole = concatenated(part)
+        assert check(whole, replace(program_limits(machine), stop_time_ms=0)) is None
+        program = NativeProgram(encode(whole))
+        # Its fault stops may take longer than those of chunks, whose ends are near: only pieces and joints count here.
+        assert program.check(replace(_limits(machine), chunk=0, stop_time_ms=0)) is None
+        programs.append(program)
     run = simulate_chunks(chunks, _limits(machine), "fixed", machine.counts_per_mm)
-    _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
     assert sum(run.takeovers) == len(chunks) - 1
     if rests and run.takeovers[1]:
-        assert run.ticks >= program.ticks
+        assert run.ticks >= sum(program.ticks for program in programs)
         return
+    (program,) = programs
+    _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
     # A chunk that shares little may be shorter than a slice of the simulation, which takes it over at its rest.
     assert shared is not None or run.takeovers == (len(chunks) - 1, 0)
     assert run.ticks == program.ticks
     assert run.setpoints_sha256 == hashlib.sha256(setpoints.tobytes()).hexdigest()
+
+
+def _from_rest_to_rest(chunks: list[Chunk]) -> Iterator[list[Chunk]]:
+    """The chunks in parts, each of which begins with one that shares nothing."""
+    begins = [k for k, one in enumerate(chunks) if one.header.rest is not None]
+    for first, end in pairwise((0, *begins, len(chunks))):
+        yield chunks[first:end]
 
 
 @pytest.mark.parametrize(
