@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,8 +93,8 @@ def simulate_chunks(
 
 
 class Concatenation:
-    """The pieces of chunks, without tails and repetitions, as one program: it takes the memory of the whole section. The
-    first chunk begins at rest.
+    """The pieces of chunks, the first of which begins at rest, without tails and repetitions, as one program: it takes
+    the memory of the whole section.
     """
 
     def __init__(self) -> None:
@@ -152,6 +152,18 @@ class Concatenation:
             events=np.concatenate(self._events),
         )
         return with_bounds(whole)
+
+
+def from_rest_to_rest(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
+    """The chunks of a job in parts, each of which begins with one that shares nothing."""
+    part: list[Chunk] = []
+    for chunk in chunks:
+        if part and chunk.header.rest is not None:
+            yield part
+            part = []
+        part.append(chunk)
+    if part:
+        yield part
 
 
 def concatenated(chunks: Iterable[Chunk]) -> Program:

@@ -16,7 +16,7 @@ from hodograph.native.program import NativeLimits, NativeProgram
 from hodograph.program import Program, ProgramLimits, decode, encode
 from hodograph.program.check import check_image
 from hodograph.program.codes import ProgramError
-from hodograph.program.image import FLAG_COMPACT, MOST_AXES, with_crc
+from hodograph.program.image import FLAG_COMPACT, with_crc
 
 PROGRAMS = Path(__file__).parents[2] / "data" / "programs"
 NAMES = ("heart_exponential", "alpha_events", "space3", "space6")

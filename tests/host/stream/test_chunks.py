@@ -9,7 +9,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +32,7 @@ from hodograph.stream.chunks import FEWEST_SHARED_PIECES, RAMP_S, SectionChunks
 from hodograph.stream.geometry import Block, StreamPath, blocks_from, with_joints
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlanRests
 from hodograph.stream.reading import StreamReader
-from hodograph.stream.simulation import concatenated, simulate_chunks
+from hodograph.stream.simulation import concatenated, from_rest_to_rest, simulate_chunks
 from hodograph.stream.windows import SectionFeed
 from hodograph.toolpath.files import ReadOptions
 
@@ -106,7 +105,7 @@ def _verify(
     assert before is not None
     assert before.header.last
     programs = []
-    for part in _from_rest_to_rest(chunks):
+    for part in from_rest_to_rest(chunks):
         whole = concatenated(part)
         assert check(whole, replace(program_limits(machine), stop_time_ms=0)) is None
         program = NativeProgram(encode(whole))
@@ -124,13 +123,6 @@ def _verify(
     assert shared is not None or run.takeovers == (len(chunks) - 1, 0)
     assert run.ticks == program.ticks
     assert run.setpoints_sha256 == hashlib.sha256(setpoints.tobytes()).hexdigest()
-
-
-def _from_rest_to_rest(chunks: list[Chunk]) -> Iterator[list[Chunk]]:
-    """The chunks in parts, each of which begins with one that shares nothing."""
-    begins = [k for k, one in enumerate(chunks) if one.header.rest is not None]
-    for first, end in pairwise((0, *begins, len(chunks))):
-        yield chunks[first:end]
 
 
 @pytest.mark.parametrize(
