@@ -91,7 +91,8 @@ def _kills(clock: VirtualClock, seed: int) -> Iterator[float]:
 def _ended(command: Command, clock: VirtualClock, after_s: float) -> bool:
     """Kills it after this time, if it is still there."""
     if after_s == inf:
-        return command.wait(LIMIT_S) == 0
+        assert command.wait(LIMIT_S) == 0, command.err
+        return True
     end_s = clock.now_s() + after_s
     while clock.now_s() < end_s and command.child.poll() is None:
         clock.sleep(0.01)

@@ -268,7 +268,7 @@ class SectionChunks:
     def _begin_alone(self, window: Window) -> bool:
         """Lets the next chunk begin at rest and share nothing, where the window begins at rest. Then it needs no bytes
         for what is before, and a short segment there does not limit the feed behind it. False: it does so already, or
-        window begins in motion.
+        the window begins in motion.
         """
         begin_q40, last = int(window.stretch.pieces.start_q40[0]), self._last
         if last is None or self._kept.pieces is None or not self._feed.begins_at_rest:
