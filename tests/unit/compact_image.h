@@ -5,8 +5,8 @@
 
 #include <stdint.h>
 
-/* Writes the compact image to `out`, which has room for as many bytes as `image`, a whole one whose numbers fit. Returns
- * its size. */
+/* Writes the compact image to `out`, which has room for as many bytes as `image`, a whole one. Returns its size; 0: a
+ * number does not fit. */
 uint32_t compact_image(uint8_t *out, const uint8_t *image);
 
 #endif

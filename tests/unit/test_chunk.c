@@ -6,9 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "canopen/cob.h"
 #include "chunked.h"
-#include "compact_image.h"
 #include "core/feed_override.h"
 #include "golden.h"
 #include "unity.h"
@@ -187,27 +185,12 @@ static void test_the_shared_part_is_compared_bit_for_bit(void)
     TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
 }
 
-/* Chunk `number` with compact records. */
-static void make_compact(uint32_t number)
-{
-    uint8_t *out = malloc(chain.sizes[number]);
-    memcpy(out, chain.bytes[number], CHUNK_HEADER_SIZE);
-    const uint32_t size =
-        CHUNK_HEADER_SIZE +
-        compact_image(out + CHUNK_HEADER_SIZE, chain.bytes[number] + CHUNK_HEADER_SIZE);
-    cob_put(out + 8, size, 4);
-    chunked_seal(out, size);
-    free(chain.bytes[number]);
-    chain.bytes[number] = out;
-    chain.sizes[number] = size;
-}
-
 /* Each byte of the shared part of a compact chunk is compared, whether its predecessor is compact or not. */
 static void test_compact_chunks_are_compared_too(void)
 {
     struct program_fault fault;
     cut_in_two();
-    make_compact(1);
+    TEST_ASSERT_TRUE(chunked_make_compact(&chain, 1));
     for (int both = 0; both <= 1; both++) {
         TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
         TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
@@ -226,7 +209,7 @@ static void test_compact_chunks_are_compared_too(void)
             TEST_ASSERT_EQUAL_UINT32(at / PROGRAM_COMPACT_PIECE_SIZE, fault.index);
         }
         if (both == 0) {
-            make_compact(0);
+            TEST_ASSERT_TRUE(chunked_make_compact(&chain, 0));
         }
     }
 }
