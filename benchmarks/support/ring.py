@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from hodograph.config import Machine, load_machine
-from hodograph.program.image import segment_size
+from hodograph.program.image import COMPACT_PIECE_BYTES, segment_size
 from hodograph.program.stops import HOLD
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.spline.spatial import SpatialPHSpline, spatial_through_points
@@ -22,7 +22,6 @@ from hodograph.stream.chunk import Chunk, largest_chunk
 from hodograph.stream.chunks import SectionChunks
 from hodograph.stream.geometry import Block
 from hodograph.stream.reading import StreamReader
-from hodograph.stream.windows import PIECE_BYTES
 from hodograph.toolpath.files import ReadOptions
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -126,7 +125,7 @@ def gathered(name: str, section: SectionChunks) -> Streamed:
 def parts(job: Streamed) -> dict[str, float]:
     """Bytes of a chunk on the mean, by PARTS."""
     out = dict.fromkeys(PARTS, 0.0)
-    segment = segment_size(job.axes)
+    segment = segment_size(job.axes, compact=True)
     nexts = [*job.chunks[1:], None]
     for chunk, after in zip(job.chunks, nexts, strict=True):
         own, header = chunk.program, chunk.header
@@ -139,7 +138,7 @@ def parts(job: Streamed) -> dict[str, float]:
         )
         pieces = (header.shared_pieces, kept - header.shared_pieces, own.piece_count - kept)
         segments = (shared, joint - shared, own.segment_count - joint)
-        sizes = [n * PIECE_BYTES for n in pieces] + [n * segment for n in segments]
+        sizes = [n * COMPACT_PIECE_BYTES for n in pieces] + [n * segment for n in segments]
         for part, size in zip(PARTS, (chunk.size - sum(sizes), *sizes), strict=True):
             out[part] += size / len(job.chunks)
     return out

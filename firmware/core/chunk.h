@@ -24,7 +24,7 @@
 #include "core/program_rules.h"
 
 #define CHUNK_HEADER_SIZE   80u
-#define CHUNK_VERSION       1u
+#define CHUNK_VERSION       2u
 #define CHUNK_FLAG_FIRST    1u /* the job begins with it, at rest */
 #define CHUNK_FLAG_LAST     2u /* the job ends with it: its end is no tail */
 #define CHUNK_FLAG_REST     4u /* it begins at rest where its predecessor ends */

@@ -15,6 +15,11 @@ static inline uint32_t read_u32(const uint8_t *b)
     return read_u16(b) | read_u16(b + 2) << 16;
 }
 
+static inline uint32_t read_u24(const uint8_t *b)
+{
+    return read_u16(b) | (uint32_t)b[2] << 16;
+}
+
 static inline uint64_t read_u64(const uint8_t *b)
 {
     return (uint64_t)read_u32(b) | (uint64_t)read_u32(b + 4) << 32;
@@ -28,6 +33,11 @@ static inline int64_t read_i64(const uint8_t *b)
 static inline int64_t read_i48(const uint8_t *b)
 {
     return (int64_t)((uint64_t)read_u32(b) << 16 | (uint64_t)read_u16(b + 4) << 48) >> 16;
+}
+
+static inline int64_t read_i56(const uint8_t *b)
+{
+    return (int64_t)((uint64_t)read_u32(b) << 8 | (uint64_t)read_u24(b + 4) << 40) >> 8;
 }
 
 #endif

@@ -11,6 +11,14 @@
 
 #define CRC_FROM 16u /* the CRC covers everything after itself */
 
+/* Where fields of compact records begin, protocol.md 1.7.1. */
+#define COMPACT_POINT    7u /* of a segment */
+#define COMPACT_BESIDE   7u /* of an extra axis: its coefficients */
+#define COMPACT_START    4u /* of a piece */
+#define COMPACT_POWERS   11u
+#define COMPACT_OVERRIDE 53u
+#define COMPACT_BOUNDS   6u /* of a stop */
+
 static void read_header(struct program_header *h, const uint8_t *b)
 {
     h->version = (uint16_t)read_u16(b + 4);
@@ -60,15 +68,44 @@ uint32_t program_segment_size(uint32_t axis_count)
                : PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * (axis_count - PROGRAM_SPACE);
 }
 
+uint32_t program_compact_segment_size(uint32_t axis_count)
+{
+    return axis_count == PROGRAM_PLANE
+               ? PROGRAM_COMPACT_SEGMENT_SIZE
+               : PROGRAM_COMPACT_SPACE_SIZE +
+                     PROGRAM_COMPACT_EXTRA_SIZE * (axis_count - PROGRAM_SPACE);
+}
+
+static int is_compact(const struct program_header *h)
+{
+    return (h->flags & PROGRAM_FLAG_COMPACT) != 0u;
+}
+
+/* Bytes of a record. */
+static uint32_t segment_size(const struct program_header *h)
+{
+    return is_compact(h) ? program_compact_segment_size(h->axis_count)
+                         : program_segment_size(h->axis_count);
+}
+
+static uint32_t piece_size(const struct program_header *h)
+{
+    return is_compact(h) ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE;
+}
+
+static uint32_t stop_size(const struct program_header *h)
+{
+    return is_compact(h) ? PROGRAM_COMPACT_STOP_SIZE : PROGRAM_STOP_SIZE;
+}
+
 /* Counts that cannot fit are refused before they are multiplied, so nothing wraps. */
 static int check_size(const struct program_header *h, uint32_t size)
 {
     if (h->image_size > size || h->image_size < h->header_size) {
         return PROGRAM_ERR_SIZE;
     }
-    uint64_t need = h->header_size +
-                    (uint64_t)h->segment_count * program_segment_size(h->axis_count) +
-                    (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
+    uint64_t need = h->header_size + (uint64_t)h->segment_count * segment_size(h) +
+                    (uint64_t)h->piece_count * (piece_size(h) + stop_size(h)) +
                     (uint64_t)h->event_count * PROGRAM_EVENT_SIZE;
     if (need != h->image_size) {
         return PROGRAM_ERR_SIZE;
@@ -112,18 +149,17 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size)
 
 static const uint8_t *segment_bytes(const struct program *p, uint32_t i)
 {
-    return p->image + p->header.header_size +
-           (size_t)i * program_segment_size(p->header.axis_count);
+    return p->image + p->header.header_size + (size_t)i * segment_size(&p->header);
 }
 
 static const uint8_t *piece_bytes(const struct program *p, uint32_t i)
 {
-    return segment_bytes(p, p->header.segment_count) + (size_t)i * PROGRAM_PIECE_SIZE;
+    return segment_bytes(p, p->header.segment_count) + (size_t)i * piece_size(&p->header);
 }
 
 static const uint8_t *stop_bytes(const struct program *p, uint32_t i)
 {
-    return piece_bytes(p, p->header.piece_count) + (size_t)i * PROGRAM_STOP_SIZE;
+    return piece_bytes(p, p->header.piece_count) + (size_t)i * stop_size(&p->header);
 }
 
 void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kind kind,
@@ -134,6 +170,12 @@ void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kin
     out->jerk_down = codes[0];
     out->deceleration = codes[1];
     out->jerk_up = codes[2];
+    if (is_compact(&p->header)) {
+        const uint8_t *bounds = b + COMPACT_BOUNDS;
+        out->reserved = 0;
+        out->bound_us = read_u24(kind == PROGRAM_STOP_FAULT ? bounds + 3 : bounds);
+        return;
+    }
     out->reserved = (uint16_t)read_u16(b + 6);
     out->bound_us = read_u32(kind == PROGRAM_STOP_FAULT ? b + 12 : b + 8);
 }
@@ -175,43 +217,68 @@ uint32_t program_first_event_from(const struct program *p, int64_t arc_length_q4
 
 int64_t program_segment_start(const struct program *p, uint32_t i)
 {
-    return read_i64(segment_bytes(p, i));
+    const uint8_t *b = segment_bytes(p, i);
+    return is_compact(&p->header) ? read_i56(b) : read_i64(b);
 }
 
 uint64_t program_piece_duration(const struct program *p, uint32_t i)
 {
-    return read_u64(piece_bytes(p, i));
+    const uint8_t *b = piece_bytes(p, i);
+    return is_compact(&p->header) ? read_u32(b) : read_u64(b);
 }
 
 int64_t program_piece_start(const struct program *p, uint32_t i)
 {
-    return read_i64(piece_bytes(p, i) + 8);
+    const uint8_t *b = piece_bytes(p, i);
+    return is_compact(&p->header) ? read_i56(b + COMPACT_START) : read_i64(b + 8);
+}
+
+static int same(const int64_t *a, const int64_t *b, uint32_t count)
+{
+    int out = 1;
+    for (uint32_t i = 0; i < count; i++) {
+        out = out && a[i] == b[i];
+    }
+    return out;
 }
 
 int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k)
 {
-    const size_t behind_start = 8;
-    return memcmp(segment_bytes(a, i) + behind_start, segment_bytes(b, k) + behind_start,
-                  program_segment_size(a->header.axis_count) - behind_start) == 0;
+    struct program_segment one;
+    struct program_segment other;
+    program_segment_get(a, i, &one);
+    program_segment_get(b, k, &other);
+    int out = same(one.point_q40_mm, other.point_q40_mm, PROGRAM_SPACE);
+    for (uint32_t component = 0; component < PROGRAM_COMPONENTS; component++) {
+        out = out && same(one.a_q44[component], other.a_q44[component], 3u);
+    }
+    for (uint32_t axis = 0; axis < program_extra_axes(a->header.axis_count); axis++) {
+        out = out && one.extra[axis].start_q40 == other.extra[axis].start_q40 &&
+              same(one.extra[axis].b_q40, other.extra[axis].b_q40, 5u);
+    }
+    return out;
 }
 
 int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k)
 {
-    const size_t start = 8;
-    const size_t behind_start = 16;
-    const uint8_t *one = piece_bytes(a, i);
-    const uint8_t *other = piece_bytes(b, k);
-    return memcmp(one, other, start) == 0 &&
-           memcmp(one + behind_start, other + behind_start, PROGRAM_PIECE_SIZE - behind_start) == 0;
+    struct program_piece one;
+    struct program_piece other;
+    program_piece_get(a, i, &one);
+    program_piece_get(b, k, &other);
+    const struct program_override *x = &one.override;
+    const struct program_override *y = &other.override;
+    return one.duration_q32_s == other.duration_q32_s && same(one.c_q40_mm, other.c_q40_mm, 7u) &&
+           x->factor_q14 == y->factor_q14 && memcmp(x->rate, y->rate, sizeof x->rate) == 0 &&
+           memcmp(x->second, y->second, sizeof x->second) == 0;
 }
 
 void program_piece_override(const struct program *p, uint32_t i, struct program_override *out)
 {
-    const uint8_t *b = piece_bytes(p, i);
-    out->factor_q14 = (uint16_t)read_u16(b + 72);
+    const uint8_t *b = piece_bytes(p, i) + (is_compact(&p->header) ? COMPACT_OVERRIDE : 72u);
+    out->factor_q14 = (uint16_t)read_u16(b);
     for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
-        out->rate[k] = b[74u + k];
-        out->second[k] = b[81u + k];
+        out->rate[k] = b[2u + k];
+        out->second[k] = b[9u + k];
     }
 }
 
@@ -236,11 +303,24 @@ static void read_planar(const uint8_t *b, struct program_segment *out)
     }
 }
 
-static void read_extra(const uint8_t *b, struct program_extra *out)
+/* Those with 48 bits: of a segment in space, and of a compact one. */
+static void read_preimage(const uint8_t *b, uint32_t axis_count, struct program_segment *out)
 {
-    out->start_q40 = read_i64(b);
+    const uint32_t step = program_component_step(axis_count);
+    for (size_t k = 0; k < 3; k++) {
+        for (uint32_t component = 0; component < PROGRAM_COMPONENTS; component++) {
+            const int is_there = component % step == 0u;
+            out->a_q44[component][k] = is_there ? read_i48(b) : 0;
+            b += is_there ? 6 : 0;
+        }
+    }
+}
+
+static void read_extra(const uint8_t *b, int64_t start_q40, struct program_extra *out)
+{
+    out->start_q40 = start_q40;
     for (int k = 0; k < 5; k++) {
-        out->b_q40[k] = read_i48(b + 8 + 6 * k);
+        out->b_q40[k] = read_i48(b + 6 * k);
     }
 }
 
@@ -249,23 +329,37 @@ static void read_spatial(const uint8_t *b, struct program_segment *out)
     for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
         out->point_q40_mm[axis] = read_i64(b + 8 + 8 * (size_t)axis);
     }
-    for (size_t k = 0; k < 3; k++) {
-        for (size_t component = 0; component < PROGRAM_COMPONENTS; component++) {
-            out->a_q44[component][k] = read_i48(b + 32 + 24 * k + 6 * component);
-        }
-    }
+    read_preimage(b + 32, out->axis_count, out);
     for (uint32_t k = PROGRAM_SPACE; k < out->axis_count; k++) {
         const size_t extra = k - PROGRAM_SPACE;
-        read_extra(b + PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * extra, &out->extra[extra]);
+        const uint8_t *at = b + PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * extra;
+        read_extra(at + 8, read_i64(at), &out->extra[extra]);
+    }
+}
+
+static void read_compact(const uint8_t *b, struct program_segment *out)
+{
+    const uint32_t curve_axes = program_curve_axes(out->axis_count);
+    out->point_q40_mm[PROGRAM_PLANE] = 0;
+    for (uint32_t axis = 0; axis < curve_axes; axis++) {
+        out->point_q40_mm[axis] = read_i56(b + COMPACT_POINT + 7u * (size_t)axis);
+    }
+    read_preimage(b + COMPACT_POINT + 7u * (size_t)curve_axes, out->axis_count, out);
+    for (uint32_t k = PROGRAM_SPACE; k < out->axis_count; k++) {
+        const size_t extra = k - PROGRAM_SPACE;
+        const uint8_t *at = b + PROGRAM_COMPACT_SPACE_SIZE + PROGRAM_COMPACT_EXTRA_SIZE * extra;
+        read_extra(at + COMPACT_BESIDE, read_i56(at), &out->extra[extra]);
     }
 }
 
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out)
 {
     const uint8_t *b = segment_bytes(p, i);
-    out->start_q40_mm = read_i64(b);
+    out->start_q40_mm = program_segment_start(p, i);
     out->axis_count = p->header.axis_count;
-    if (out->axis_count == PROGRAM_PLANE) {
+    if (is_compact(&p->header)) {
+        read_compact(b, out);
+    } else if (out->axis_count == PROGRAM_PLANE) {
         read_planar(b, out);
     } else {
         read_spatial(b, out);
@@ -275,10 +369,12 @@ void program_segment_get(const struct program *p, uint32_t i, struct program_seg
 void program_piece_get(const struct program *p, uint32_t i, struct program_piece *out)
 {
     const uint8_t *b = piece_bytes(p, i);
-    out->duration_q32_s = read_u64(b);
-    out->start_q40_mm = read_i64(b + 8);
+    const int compact = is_compact(&p->header);
+    out->duration_q32_s = program_piece_duration(p, i);
+    out->start_q40_mm = program_piece_start(p, i);
     for (int k = 0; k < 7; k++) {
-        out->c_q40_mm[k] = read_i64(b + 16 + 8 * k);
+        out->c_q40_mm[k] =
+            compact ? read_i48(b + COMPACT_POWERS + 6 * k) : read_i64(b + 16 + 8 * k);
     }
     program_piece_override(p, i, &out->override);
     out->override_factor_q24 = (uint32_t)out->override.factor_q14 << 10;

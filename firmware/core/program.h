@@ -20,20 +20,26 @@ struct kernel; /* core/kernel.h */
 
 #define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
 #define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
-#define PROGRAM_EXTRAS        (PROGRAM_AXES - PROGRAM_SPACE)
-#define PROGRAM_HEADER_SIZE   128u /* and 8 for each path axis behind y */
-#define PROGRAM_SEGMENT_SIZE  72u  /* of a planar program */
-#define PROGRAM_SPACE_SIZE    104u /* of a segment of a spatial one, */
-#define PROGRAM_EXTRA_SIZE    38u  /* and for each extra axis */
-#define PROGRAM_PIECE_SIZE    88u
-#define PROGRAM_STOP_SIZE     16u
-#define PROGRAM_EVENT_SIZE    16u
-#define PROGRAM_VERSION       2u
-#define PROGRAM_FLAG_CLOSED   1u
-#define PROGRAM_FLAG_MOVING   2u  /* begins in motion: only in a chunk (core/chunk.h) */
-#define PROGRAM_DIGITALS      16u /* outputs that events can switch: digital ones, */
-#define PROGRAM_ANALOGUES     3u  /* and analogue ones, so that all fit in one PDO */
-#define PROGRAM_EVENTS_A_TICK 16u /* that a tick can pass at most */
+#define PROGRAM_EXTRAS               (PROGRAM_AXES - PROGRAM_SPACE)
+#define PROGRAM_HEADER_SIZE          128u /* and 8 for each path axis behind y */
+#define PROGRAM_SEGMENT_SIZE         72u  /* of a planar program */
+#define PROGRAM_SPACE_SIZE           104u /* of a segment of a spatial one, */
+#define PROGRAM_EXTRA_SIZE           38u  /* and for each extra axis */
+#define PROGRAM_PIECE_SIZE           88u
+#define PROGRAM_STOP_SIZE            16u
+#define PROGRAM_EVENT_SIZE           16u
+#define PROGRAM_COMPACT_SEGMENT_SIZE 57u  /* of a compact planar program, */
+#define PROGRAM_COMPACT_SPACE_SIZE   100u /* of a compact spatial one, */
+#define PROGRAM_COMPACT_EXTRA_SIZE   37u  /* and for each extra axis */
+#define PROGRAM_COMPACT_PIECE_SIZE   69u
+#define PROGRAM_COMPACT_STOP_SIZE    12u
+#define PROGRAM_VERSION              2u
+#define PROGRAM_FLAG_CLOSED          1u
+#define PROGRAM_FLAG_MOVING          2u  /* begins in motion: only in a chunk (core/chunk.h) */
+#define PROGRAM_FLAG_COMPACT         4u  /* its records have fewer bytes: only in a chunk */
+#define PROGRAM_DIGITALS             16u /* outputs that events can switch: digital ones, */
+#define PROGRAM_ANALOGUES            3u  /* and analogue ones, so that all fit in one PDO */
+#define PROGRAM_EVENTS_A_TICK        16u /* that a tick can pass at most */
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
 struct program_header {
@@ -170,6 +176,8 @@ int program_open(struct program *p, const uint8_t *image, uint32_t size);
 /* Bytes of the header, and of each segment, of a program with so many path axes. */
 uint32_t program_header_size(uint32_t axis_count);
 uint32_t program_segment_size(uint32_t axis_count);
+/* The same of a segment with PROGRAM_FLAG_COMPACT. */
+uint32_t program_compact_segment_size(uint32_t axis_count);
 
 /* Reads segment or piece number i; i must be below the count of the header. Constant time. */
 void program_segment_get(const struct program *p, uint32_t i, struct program_segment *out);
@@ -191,8 +199,8 @@ int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
-/* Whether segment or piece i of one program is number k of the other, bit for bit, but for the arc length of its start.
- * Of programs with the same number of path axes. */
+/* Whether segment or piece i of one program has the numbers of number k of the other, but for the arc length of its start.
+ * Of programs with the same number of path axes; one may be compact and the other not. */
 int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 

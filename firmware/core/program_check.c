@@ -11,8 +11,9 @@
 #include "core/segment_length_check.h"
 #include "core/stop_check.h"
 
-#define NAME_FROM 80u
-#define NAME_SIZE 32u
+#define NAME_FROM   80u
+#define NAME_SIZE   32u
+#define CHUNK_FLAGS (PROGRAM_FLAG_MOVING | PROGRAM_FLAG_COMPACT) /* of a chunk only */
 
 static int bytes_are_zero(const uint8_t *b, uint32_t size)
 {
@@ -48,8 +49,8 @@ static int check_header(const struct program *p, const struct program_limits *li
     if (code != 0) {
         return code;
     }
-    const uint32_t flags = PROGRAM_FLAG_CLOSED | FIRST_AXIS_FLAGS |
-                           (limits->chunk != 0 ? (uint32_t)PROGRAM_FLAG_MOVING : 0u);
+    const uint32_t flags =
+        PROGRAM_FLAG_CLOSED | FIRST_AXIS_FLAGS | (limits->chunk != 0 ? CHUNK_FLAGS : 0u);
     if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }

@@ -9,7 +9,7 @@
  * shows: program_open
  * mutant: core/program.c: h->image_size > size || =>
  * mutant: core/program.c: NULL || size < PROGRAM_HEADER_SIZE => NULL || size < 64
- * mutant: core/program.c: (uint64_t)h->segment_count * program_segment_size => h->segment_count * program_segment_size
+ * mutant: core/program.c: (uint64_t)h->segment_count * segment_size(h) => h->segment_count * segment_size(h)
  */
 #include <stdlib.h>
 
@@ -66,11 +66,14 @@ void harness(void)
         prove(p.size == h->image_size && p.size <= size);
         prove(h->axis_count >= PROGRAM_PLANE && h->axis_count <= PROGRAM_AXES);
         uint32_t extras = h->axis_count > 3u ? h->axis_count - 3u : 0u;
-        uint32_t segment = program_segment_size(h->axis_count);
-        prove(segment == (h->axis_count == 2u ? 72u : 104u + 38u * extras));
+        int compact = (h->flags & PROGRAM_FLAG_COMPACT) != 0u;
+        uint32_t segment = segment_size(h);
+        uint32_t piece = compact ? 69u + 12u : 88u + 16u;
+        prove(compact || segment == (h->axis_count == 2u ? 72u : 104u + 38u * extras));
+        prove(!compact || segment == (h->axis_count == 2u ? 57u : 100u + 37u * extras));
         prove(h->header_size == 112u + 8u * h->axis_count);
         prove(p.size == h->header_size + (uint64_t)h->segment_count * segment +
-                            (uint64_t)h->piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE) +
+                            (uint64_t)h->piece_count * piece +
                             (uint64_t)h->event_count * PROGRAM_EVENT_SIZE);
         reached();
     }

@@ -9,10 +9,12 @@
  * replaces: segment_bytes:some_segment piece_bytes:some_piece event_bytes:some_event
  * shows: read_u16 read_u32 read_u64 segment_bytes piece_bytes event_bytes
  * mutant: core/program.c: out->value = (int32_t)read_u32(b + 12) => out->value = (int32_t)read_u32(b + 13)
- * mutant: core/program.c: b[81u + k] => b[82u + k]
+ * mutant: core/program.c: b[9u + k] => b[10u + k]
  * mutant: core/program.c: b + 32 + 16 * k => b + 40 + 16 * k
- * mutant: core/program.c: b + 32 + 24 * k + 6 * component => b + 40 + 24 * k + 6 * component
- * mutant: core/program.c: b + 8 + 6 * k => b + 14 + 6 * k
+ * mutant: core/program.c: read_preimage(b + 32, => read_preimage(b + 40,
+ * mutant: core/program.c: read_extra(at + 8, => read_extra(at + 14,
+ * mutant: core/program.c: read_extra(at + COMPACT_BESIDE, => read_extra(at + 8,
+ * mutant: core/program.c: b + COMPACT_POWERS + 6 * k => b + COMPACT_POWERS + 11 * k
  * mutant: core/program.c: need != h->image_size => need < h->image_size
  */
 #include "core/program.c"
@@ -28,14 +30,13 @@ uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 const uint8_t *some_segment(const struct program *p, uint32_t i)
 {
     (void)i;
-    return __CPROVER_allocate(program_segment_size(p->header.axis_count), 0);
+    return __CPROVER_allocate(segment_size(&p->header), 0);
 }
 
 const uint8_t *some_piece(const struct program *p, uint32_t i)
 {
-    (void)p;
     (void)i;
-    return __CPROVER_allocate(PROGRAM_PIECE_SIZE, 0);
+    return __CPROVER_allocate(piece_size(&p->header), 0);
 }
 
 const uint8_t *some_event(const struct program *p, uint32_t i)
@@ -68,7 +69,6 @@ static void places(uint32_t axis_count)
 {
     struct program_header h;
     uint32_t size = nondet_uint32();
-    uint32_t segment_size = program_segment_size(axis_count);
     uint32_t i = nondet_uint32();
     __CPROVER_assume(size <= 1u << 18);
     h.axis_count = (uint16_t)axis_count;
@@ -77,18 +77,21 @@ static void places(uint32_t axis_count)
     h.segment_count = nondet_uint32();
     h.piece_count = nondet_uint32();
     h.event_count = nondet_uint32();
+    h.flags = 0; /* compact ones: cbmc_compact.c */
+    uint32_t segment = segment_size(&h);
+    uint32_t piece = piece_size(&h);
     if (check_size(&h, size) != 0) {
         return;
     }
-    uint64_t pieces = h.header_size + (uint64_t)h.segment_count * segment_size;
+    uint64_t pieces = h.header_size + (uint64_t)h.segment_count * segment;
     if (i < h.segment_count) {
-        prove(h.header_size + (uint64_t)i * segment_size + segment_size <= size);
+        prove(h.header_size + (uint64_t)i * segment + segment <= size);
     }
     if (i < h.piece_count) {
-        prove(pieces + (uint64_t)i * PROGRAM_PIECE_SIZE + PROGRAM_PIECE_SIZE <= size);
+        prove(pieces + (uint64_t)i * piece + piece <= size);
         reached();
     }
-    uint64_t events = pieces + (uint64_t)h.piece_count * (PROGRAM_PIECE_SIZE + PROGRAM_STOP_SIZE);
+    uint64_t events = pieces + (uint64_t)h.piece_count * (piece + stop_size(&h));
     if (i < h.event_count) {
         prove(events + (uint64_t)i * PROGRAM_EVENT_SIZE + PROGRAM_EVENT_SIZE <= size);
     }

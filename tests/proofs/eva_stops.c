@@ -8,7 +8,7 @@
  * options: -eva-slevel 0 -warn-unsigned-overflow
  * assumes: qmath_clz64 qmath_div_u64 qmath_root stop_curve feed_bounds_parts program_piece_get program_piece_duration program_piece_start program_piece_override
  * shows: stop_check_all
- * mutant: core/program.c: (size_t)i * PROGRAM_STOP_SIZE => (size_t)(i + 1u) * PROGRAM_STOP_SIZE
+ * mutant: core/program.c: (size_t)i * stop_size => (size_t)(i + 1u) * stop_size
  * mutant: core/stop_check.c: stop_walk_back(&walk, i - 1u) => stop_walk_back(&walk, i)
  * mutant: core/stop_check.c: walk->count < STOP_WINDOW ? 1u => walk->count <= STOP_WINDOW ? 1u
  * mutant: core/stop_check.c: value >= (int64_t)1 << 52 ? => value >= (int64_t)1 << 56 ?

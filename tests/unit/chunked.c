@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "compact_image.h"
 #include "core/crc32.h"
 #include "core/little_endian.h"
 #include "golden.h"
@@ -503,6 +504,25 @@ int chunked_random(struct chunked *out, const struct override_program *whole, ui
     }
     (void)add_cut(out, first, pieces);
     write_all(out);
+    return 1;
+}
+
+int chunked_make_compact(struct chunked *c, uint32_t number)
+{
+    uint8_t *wide = c->bytes[number];
+    uint8_t *out = malloc(c->sizes[number]);
+    TEST_ASSERT_NOT_NULL(out);
+    memcpy(out, wide, CHUNK_HEADER_SIZE);
+    const uint32_t image = compact_image(out + CHUNK_HEADER_SIZE, wide + CHUNK_HEADER_SIZE);
+    if (image == 0u) {
+        free(out);
+        return 0;
+    }
+    c->sizes[number] = CHUNK_HEADER_SIZE + image;
+    put(out + 8, c->sizes[number], 4);
+    chunked_seal(out, c->sizes[number]);
+    c->bytes[number] = out;
+    free(wide);
     return 1;
 }
 

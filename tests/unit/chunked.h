@@ -49,6 +49,9 @@ int chunked_make(struct chunked *out, const struct override_program *whole, cons
 /* Cuts at random: two chunks at least, where there are tails. 0: there are none. */
 int chunked_random(struct chunked *out, const struct override_program *whole, uint64_t *random);
 
+/* Chunk `number` gets compact records. 0: its numbers do not fit them, and it stays. */
+int chunked_make_compact(struct chunked *c, uint32_t number);
+
 void chunked_close(struct chunked *c);
 
 /* Writes the CRCs that a changed chunk should have: of the image, and of the whole. */

@@ -96,7 +96,7 @@ static void test_headers_are_refused_with_their_codes(void)
     TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
     TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(0, 'h', 1));
-    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(4, 2, 2));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(4, CHUNK_VERSION + 1u, 2));
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(6, 16, 2));
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(72, 1, 1));
     TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_FORMAT, code_with(76, 1, 1));
@@ -183,6 +183,35 @@ static void test_the_shared_part_is_compared_bit_for_bit(void)
     }
     fault = fault_with_bit(piece_at(pieces) + 17); /* behind the joint: the rules of a program */
     TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
+}
+
+/* Each byte of the shared part of a compact chunk is compared, whether its predecessor is compact or not. */
+static void test_compact_chunks_are_compared_too(void)
+{
+    struct program_fault fault;
+    cut_in_two();
+    TEST_ASSERT_TRUE(chunked_make_compact(&chain, 1));
+    for (int both = 0; both <= 1; both++) {
+        TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+        TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
+        const uint32_t pieces_at =
+            CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE +
+            chunks[1].program.header.segment_count * PROGRAM_COMPACT_SEGMENT_SIZE;
+        const uint32_t end = chunks[1].shared_segments * PROGRAM_COMPACT_SEGMENT_SIZE;
+        for (uint32_t at = 0; at < end; at++) {
+            fault = fault_with_bit(CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE + at);
+            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEGMENT, fault.code);
+            TEST_ASSERT_EQUAL_UINT32(at / PROGRAM_COMPACT_SEGMENT_SIZE, fault.index);
+        }
+        for (uint32_t at = 0; at < chunks[1].shared_pieces * PROGRAM_COMPACT_PIECE_SIZE; at++) {
+            fault = fault_with_bit(pieces_at + at);
+            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PIECE, fault.code);
+            TEST_ASSERT_EQUAL_UINT32(at / PROGRAM_COMPACT_PIECE_SIZE, fault.index);
+        }
+        if (both == 0) {
+            TEST_ASSERT_TRUE(chunked_make_compact(&chain, 0));
+        }
+    }
 }
 
 /* --- Events --- */
@@ -693,6 +722,7 @@ int main(void)
     RUN_TEST(test_headers_are_refused_with_their_codes);
     RUN_TEST(test_damage_is_refused);
     RUN_TEST(test_the_shared_part_is_compared_bit_for_bit);
+    RUN_TEST(test_compact_chunks_are_compared_too);
     RUN_TEST(test_events_of_the_shared_part_are_the_predecessors);
     RUN_TEST(test_one_event_more_or_less_is_refused);
     RUN_TEST(test_a_program_in_motion_is_accepted_in_a_chunk_only);

@@ -2,6 +2,10 @@
 /* Tests of core/program.h: reading header, segments, feed pieces and stops of a program image. */
 #include "core/program.h"
 
+#include <stdlib.h>
+#include <string.h>
+
+#include "compact_image.h"
 #include "core/counts.h"
 #include "core/crc32.h"
 #include "golden.h"
@@ -61,6 +65,74 @@ static void test_pieces_sum_up(void)
     TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s, sum);
 }
 
+static void segments_are_alike(const struct program *compact)
+{
+    for (uint32_t i = 0; i < p.header.segment_count; i++) {
+        struct program_segment one;
+        struct program_segment other;
+        memset(&one, 0, sizeof one);
+        memset(&other, 0, sizeof other);
+        program_segment_get(&p, i, &one);
+        program_segment_get(compact, i, &other);
+        TEST_ASSERT_EQUAL_MEMORY(&one, &other, sizeof one);
+        TEST_ASSERT_EQUAL_INT64(program_segment_start(&p, i), program_segment_start(compact, i));
+        TEST_ASSERT_TRUE(program_segment_alike(&p, i, compact, i));
+        TEST_ASSERT_TRUE(i == 0u || !program_segment_alike(&p, i - 1u, compact, i));
+    }
+}
+
+static void pieces_are_alike(const struct program *compact)
+{
+    for (uint32_t i = 0; i < p.header.piece_count; i++) {
+        struct program_piece one;
+        struct program_piece other;
+        memset(&one, 0, sizeof one);
+        memset(&other, 0, sizeof other);
+        program_piece_get(&p, i, &one);
+        program_piece_get(compact, i, &other);
+        TEST_ASSERT_EQUAL_MEMORY(&one, &other, sizeof one);
+        TEST_ASSERT_EQUAL_UINT64(program_piece_duration(&p, i), program_piece_duration(compact, i));
+        TEST_ASSERT_EQUAL_INT64(program_piece_start(&p, i), program_piece_start(compact, i));
+        TEST_ASSERT_TRUE(program_piece_alike(&p, i, compact, i));
+        for (int kind = PROGRAM_STOP_HOLD; kind <= PROGRAM_STOP_FAULT; kind++) {
+            struct program_stop stop;
+            struct program_stop same;
+            program_stop_get(&p, i, (enum program_stop_kind)kind, &stop);
+            program_stop_get(compact, i, (enum program_stop_kind)kind, &same);
+            TEST_ASSERT_EQUAL_UINT8(stop.jerk_down, same.jerk_down);
+            TEST_ASSERT_EQUAL_UINT8(stop.deceleration, same.deceleration);
+            TEST_ASSERT_EQUAL_UINT8(stop.jerk_up, same.jerk_up);
+            TEST_ASSERT_EQUAL_UINT32(stop.bound_us, same.bound_us);
+            TEST_ASSERT_EQUAL_UINT16(0, same.reserved);
+        }
+    }
+}
+
+/* In the plane, with events, in space, and with extra axes. */
+static void test_compact_records_have_the_same_numbers(void)
+{
+    static const char *const names[] = {"heart_exponential.hdgp", "alpha_events.hdgp",
+                                        "space3.hdgp", "space6.hdgp"};
+    for (size_t k = 0; k < sizeof names / sizeof names[0]; k++) {
+        struct program compact;
+        struct program_fault fault;
+        struct program_limits limits = golden_no_limits();
+        golden_close(&p);
+        golden_open(&p, names[k]);
+        uint8_t *image = malloc(p.size);
+        const uint32_t size = compact_image(image, p.image);
+        TEST_ASSERT_LESS_THAN_UINT32(p.size, size);
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIZE, program_open(&compact, image, size - 1u));
+        TEST_ASSERT_EQUAL_INT(0, program_open(&compact, image, size));
+        segments_are_alike(&compact);
+        pieces_are_alike(&compact);
+        TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_FLAGS, program_check(&compact, &limits, &fault));
+        limits.chunk = 1;
+        TEST_ASSERT_EQUAL_INT(0, program_check(&compact, &limits, &fault));
+        free(image);
+    }
+}
+
 static void test_ticks(void)
 {
     p.header.period_us = 8000;
@@ -111,6 +183,7 @@ int main(void)
     RUN_TEST(test_header_is_read);
     RUN_TEST(test_segment_is_read);
     RUN_TEST(test_pieces_sum_up);
+    RUN_TEST(test_compact_records_have_the_same_numbers);
     RUN_TEST(test_ticks);
     RUN_TEST(test_exponent);
     RUN_TEST(test_counts);

@@ -89,7 +89,8 @@ static uint64_t cache_memory[CACHE_MOST / 8u];
 
 static struct {
     uint64_t ticks;
-    unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited, windows;
+    unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited, windows,
+        compact;
     double jerk;
 } seen;
 
@@ -189,6 +190,15 @@ static void note_begins(struct chain *c)
     }
 }
 
+/* Every other chunk gets compact records, where its numbers fit: such a one follows another one, and is followed by
+ * one. */
+static void some_compact(struct chain *c, uint32_t from)
+{
+    for (uint32_t i = from % 2u; i < c->cuts.count; i += 2u) {
+        seen.compact += (uint32_t)chunked_make_compact(&c->cuts, i);
+    }
+}
+
 static void make_whole(uint32_t w, uint64_t *random)
 {
     struct override_program *p = &wholes[w].program;
@@ -205,6 +215,7 @@ static void make_whole(uint32_t w, uint64_t *random)
     for (uint32_t i = 0; i < 4u * CHAINS && wholes[w].chain_count < CHAINS; i++) {
         struct chain *c = &wholes[w].chains[wholes[w].chain_count];
         if (chunked_random(&c->cuts, p, random)) {
+            some_compact(c, wholes[w].chain_count);
             accept(c);
             note_begins(c);
             wholes[w].chain_count++;
@@ -527,6 +538,7 @@ static void test_cuts_at_any_instant(void)
     for (uint32_t w = 0; w < WHOLES + IN_SPACE; w++) {
         make_whole(w, &random);
     }
+    TEST_ASSERT_TRUE(seen.compact > WHOLES);
     for (unsigned i = setting("HODOGRAPH_FIRST", 0); i < cases; i++) {
         now.number = i;
         run_case(seed * 0x100000001u + i, 0, WHOLES);
@@ -538,9 +550,10 @@ static void test_cuts_at_any_instant(void)
     run_case(seed * 0x100000001u + HOLD_IN_A_RISE, 0, WHOLES);
     printf("%u cuts, %.3g ticks: %u takeovers in motion, %u at rest, %u chunks refused, %u rests "
            "at the end of a tail; ended %u, stopped %u, held %u, waits %u; %u setpoints beside "
-           "the whole; %u windows of records; jerk %.4f of the limit\n",
+           "the whole; %u windows of records; %u compact chunks; jerk %.4f of the limit\n",
            cases, (double)seen.ticks, seen.moving, seen.resting, seen.refused, seen.underruns,
-           seen.ended, seen.stopped, seen.held, seen.waited, seen.same, seen.windows, seen.jerk);
+           seen.ended, seen.stopped, seen.held, seen.waited, seen.same, seen.windows, seen.compact,
+           seen.jerk);
     if (cases >= 1000u) {
         TEST_ASSERT_TRUE(seen.moving > cases / 8u && seen.resting > cases / 64u);
         TEST_ASSERT_TRUE(seen.refused > 0 && seen.underruns > cases / 8u && seen.same > cases);

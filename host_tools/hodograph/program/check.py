@@ -562,7 +562,7 @@ def _header_fault(
         return ProgramError.PERIOD
     if limits is not None and limits.period_us not in (0, program.period_us):
         return ProgramError.PERIOD_USED
-    if not reserved.flags or (program.moving and not chunk):
+    if not reserved.flags or ((program.moving or program.compact) and not chunk):
         return ProgramError.FLAGS
     served = 0 if limits is None else limits.axis_count
     if program.first_axis + program.axis_count > len(AXES) or (

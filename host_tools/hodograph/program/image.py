@@ -9,7 +9,9 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +31,7 @@ VERSION = 2
 HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
 """Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
 PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
-FLAG_CLOSED, FLAG_MOVING = 1, 2
+FLAG_CLOSED, FLAG_MOVING, FLAG_COMPACT = 1, 2, 4
 _FIRST_AXIS_FLAGS = 7 << FIRST_AXIS_SHIFT
 NAME_SIZE = 32
 
@@ -51,6 +53,25 @@ _SPATIAL_SEGMENT = [("start", "<i8"), ("point", "<i8", 3), ("a", _I48, (3, 4))]
 _EXTRA_AXIS = np.dtype([("start", "<i8"), ("b", _I48, 5)])
 _STOP = np.dtype([("codes", "u1", (2, 3)), ("reserved", "<u2"), ("bound_us", "<u4", 2)])
 
+_I56, _U24 = ("u1", 7), ("u1", 3)
+_COMPACT_PIECE = np.dtype(
+    [
+        ("duration", "<u4"),
+        ("start", *_I56),
+        ("c", _I48, 7),
+        ("factor", "<u2"),
+        ("rate", "u1", LEVELS),
+        ("second", "u1", LEVELS),
+    ]
+)
+_COMPACT_PLANAR = np.dtype([("start", *_I56), ("point", "u1", (2, 7)), ("a", _I48, (3, 2))])
+_COMPACT_SPATIAL = [("start", *_I56), ("point", "u1", (3, 7)), ("a", _I48, (3, 4))]
+_COMPACT_EXTRA = np.dtype([("start", *_I56), ("b", _I48, 5)])
+_COMPACT_STOP = np.dtype([("codes", "u1", (2, 3)), ("bound_us", "u1", (2, 3))])
+COMPACT_PIECE_SIZE, COMPACT_STOP_SIZE = _COMPACT_PIECE.itemsize, _COMPACT_STOP.itemsize
+COMPACT_PIECE_BYTES = COMPACT_PIECE_SIZE + COMPACT_STOP_SIZE
+"""Of a compact piece with its stop."""
+
 
 @dataclass(frozen=True, eq=False)
 class Program:
@@ -64,6 +85,7 @@ class Program:
     offset_q40 work offset of each axis, already contained
     pieces     the M feed pieces, and `stops` for each of them
     moving     it begins in motion: only in a chunk of a stream
+    compact    its image has compact records, if its numbers fit them: only in a chunk of a stream
     events     outputs that switch on the path, by place
     first_axis the axis of the machine that the program's first one is
     Limits of 0 mean none.
@@ -85,6 +107,7 @@ class Program:
     stops: Stops
     extra_q40: Int = field(default_factory=lambda: np.zeros((0, 0, 5), dtype=np.int64))
     moving: bool = False
+    compact: bool = False
     events: Events = field(default_factory=no_events)
     first_axis: int = 0
 
@@ -111,7 +134,16 @@ class Program:
     @property
     def image_size(self) -> int:
         """Bytes of the image."""
-        return _size(self.axis_count, self.segment_count, self.piece_count, len(self.events))
+        return self._layout.size(self.segment_count, self.piece_count, len(self.events))
+
+    @cached_property
+    def has_compact_image(self) -> bool:
+        """Whether its image has compact records."""
+        return self.compact and _fits_compact(self)
+
+    @property
+    def _layout(self) -> _Layout:
+        return _Layout(self.axis_count, self.has_compact_image)
 
     @property
     def ticks(self) -> int:
@@ -145,14 +177,17 @@ def encode(program: Program) -> bytes:
     """The image. Writes what it is given, right or wrong (`check` judges); raises InputError for
     values that the fields cannot hold.
     """
-    segments = _segments(program)
-    pieces = np.zeros(program.piece_count, dtype=_PIECE)
-    own = program.pieces
-    pieces["duration"], pieces["start"], pieces["c"] = own.duration_q32_s, own.start_q40, own.c_q40
+    layout, own = program._layout, program.pieces
+    pieces = np.zeros(program.piece_count, dtype=layout.piece)
+    _put(pieces["duration"], own.duration_q32_s)
+    _put(pieces["start"], own.start_q40)
+    _put(pieces["c"], own.c_q40)
     pieces["factor"], pieces["rate"] = own.override_factor_q14, own.override_rate_codes
     pieces["second"] = own.override_second_codes
-    stops = np.zeros(program.piece_count, dtype=_STOP)
-    stops["codes"], stops["bound_us"] = program.stops.codes, program.stops.bound_us
+    stops = np.zeros(program.piece_count, dtype=layout.stop)
+    stops["codes"] = program.stops.codes
+    _put(stops["bound_us"], program.stops.bound_us)
+    segments = _segments(program)
     body = segments.tobytes() + pieces.tobytes() + stops.tobytes() + program.events.tobytes()
     name = program.name.encode()
     if len(name) > NAME_SIZE:
@@ -171,6 +206,7 @@ def encode(program: Program) -> bytes:
             program.piece_count,
             FLAG_CLOSED * program.closed
             | FLAG_MOVING * program.moving
+            | FLAG_COMPACT * program.has_compact_image
             | program.first_axis << FIRST_AXIS_SHIFT,
             program.axis_count,
             program.duration_q32_s,
@@ -206,18 +242,19 @@ def decode(image: bytes) -> Program:
         raise InputError(f"program image: {fault.text} ({fault.name}): compile it again")
     head = _HEADER.unpack_from(image)
     segment_count, piece_count, axes = head[6], head[7], head[9]
-    begin = header_size(axes)
-    after = begin + segment_size(axes) * segment_count
-    segments = np.frombuffer(image, _segment_type(axes), segment_count, begin)
+    begin, layout = header_size(axes), _Layout(axes, bool(head[8] & FLAG_COMPACT))
+    after = begin + layout.segment.itemsize * segment_count
+    segments = np.frombuffer(image, layout.segment, segment_count, begin)
     extra = [segments[f"extra{k}"] for k in range(axes - SPACE_AXES)]
-    points = [segments["point"].T, *(one["start"][None] for one in extra)]
-    a = segments["a"] if axes == PLANE_AXES else _from_i48(segments["a"])
-    stops_end = after + (PIECE_SIZE + STOP_SIZE) * piece_count
+    points = [_taken(segments["point"]).T, *(_taken(one["start"])[None] for one in extra)]
+    stops_at = after + layout.piece.itemsize * piece_count
+    stops_end = stops_at + layout.stop.itemsize * piece_count
     return Program(
         name=head[18].rstrip(b"\0").decode(errors="replace"),
         period_us=head[5],
         closed=bool(head[8] & FLAG_CLOSED),
         moving=bool(head[8] & FLAG_MOVING),
+        compact=bool(head[8] & FLAG_COMPACT),
         first_axis=(head[8] & _FIRST_AXIS_FLAGS) >> FIRST_AXIS_SHIFT,
         duration_q32_s=head[10],
         length_q40=head[11],
@@ -228,38 +265,34 @@ def decode(image: bytes) -> Program:
         feed_limit_um_s=head[14],
         acceleration_limit_um_s2=head[15],
         jerk_limit_mm_s3=head[16],
-        start_q40=segments["start"].astype(np.int64),
-        point_q40=np.concatenate(points).astype(np.int64),
-        a_q44=np.ascontiguousarray(np.moveaxis(a, 2, 0), dtype=np.int64),
-        pieces=_decode_pieces(image, after, piece_count),
-        stops=_decode_stops(image, after + PIECE_SIZE * piece_count, piece_count),
-        extra_q40=np.array([_from_i48(one["b"]) for one in extra], dtype=np.int64).reshape(
+        start_q40=_taken(segments["start"]),
+        point_q40=np.concatenate(points),
+        a_q44=np.ascontiguousarray(np.moveaxis(_taken(segments["a"]), 2, 0)),
+        pieces=_decode_pieces(np.frombuffer(image, layout.piece, piece_count, after)),
+        stops=_decode_stops(image, np.frombuffer(image, layout.stop, piece_count, stops_at)),
+        extra_q40=np.array([_taken(one["b"]) for one in extra], dtype=np.int64).reshape(
             max(axes - SPACE_AXES, 0), segment_count, 5
         ),
         events=np.frombuffer(image, EVENT, head[17], stops_end).copy(),
     )
 
 
-def _decode_pieces(image: bytes, at: int, count: int) -> FeedPieces:
-    """The feed pieces, which begin at byte `at`."""
-    raw = np.frombuffer(image, _PIECE, count, at)
+def _decode_pieces(raw: NDArray[np.void]) -> FeedPieces:
     return FeedPieces(
-        raw["duration"].astype(np.int64),
-        raw["start"].astype(np.int64),
-        raw["c"].astype(np.int64),
+        _taken(raw["duration"]),
+        _taken(raw["start"]),
+        _taken(raw["c"]),
         raw["factor"].astype(np.uint32),
         raw["rate"].copy(),
         raw["second"].copy(),
     )
 
 
-def _decode_stops(image: bytes, at: int, count: int) -> Stops:
-    """The stop table, which begins at byte `at`."""
-    table = np.frombuffer(image, _STOP, count, at)
+def _decode_stops(image: bytes, table: NDArray[np.void]) -> Stops:
     head = _HEADER.unpack_from(image)
     return Stops(
         table["codes"].copy(),
-        table["bound_us"].astype(np.uint32),
+        _taken(table["bound_us"], signed=False).astype(np.uint32),
         (head[19], head[21]),
         (head[20], head[22]),
     )
@@ -270,47 +303,100 @@ def header_size(axes: int) -> int:
     return HEADER_SIZE + 8 * (axes - PLANE_AXES)
 
 
-def segment_size(axes: int) -> int:
+def segment_size(axes: int, *, compact: bool = False) -> int:
     """Bytes of one of its segments."""
-    return _segment_type(axes).itemsize
+    return _Layout(axes, compact).segment.itemsize
 
 
-def _segment_type(axes: int) -> np.dtype[np.void]:
-    if axes == PLANE_AXES:
-        return _PLANAR_SEGMENT
-    extra = [(f"extra{k}", _EXTRA_AXIS) for k in range(axes - SPACE_AXES)]
-    return np.dtype([*_SPATIAL_SEGMENT, *extra])
+@dataclass(frozen=True)
+class _Layout:
+    """The records of an image whose program so many axes follow."""
+
+    axes: int
+    compact: bool
+
+    @property
+    def segment(self) -> np.dtype[np.void]:
+        """Of a segment."""
+        if self.axes == PLANE_AXES:
+            return _COMPACT_PLANAR if self.compact else _PLANAR_SEGMENT
+        curve = _COMPACT_SPATIAL if self.compact else _SPATIAL_SEGMENT
+        one = _COMPACT_EXTRA if self.compact else _EXTRA_AXIS
+        return np.dtype([*curve, *((f"extra{k}", one) for k in range(self.axes - SPACE_AXES))])
+
+    @property
+    def piece(self) -> np.dtype[np.void]:
+        """Of a feed piece."""
+        return _COMPACT_PIECE if self.compact else _PIECE
+
+    @property
+    def stop(self) -> np.dtype[np.void]:
+        """Of a stop."""
+        return _COMPACT_STOP if self.compact else _STOP
+
+    def size(self, segments: int, pieces: int, events: int) -> int:
+        """Bytes of the image."""
+        body = self.segment.itemsize * segments
+        body += (self.piece.itemsize + self.stop.itemsize) * pieces
+        return header_size(self.axes) + body + EVENT.itemsize * events
+
+
+def _fits_compact(program: Program) -> bool:
+    """Whether all numbers fit compact records: below 1 s, 128 mm, 32 m, and bounds below 16 s; protocol.md 1.7.1."""
+    pieces = program.pieces
+    powers = (pieces.c_q40, program.a_q44, program.extra_q40)
+    return bool(
+        pieces.duration_q32_s.max(initial=0) < 1 << 32
+        and all(_within(one, 1 << 47) for one in powers)
+        and program.length_q40 < 1 << 55
+        and _within(program.point_q40, 1 << 55)
+        and program.stops.bound_us.max(initial=0) < 1 << 24
+    )
+
+
+def _within(values: Int, limit: int) -> bool:
+    return bool(values.min(initial=0) >= -limit and values.max(initial=0) < limit)
 
 
 def _segments(program: Program) -> NDArray[np.void]:
     """As the image has them."""
     axes = program.axis_count
-    out = np.zeros(program.segment_count, dtype=_segment_type(axes))
+    out = np.zeros(program.segment_count, dtype=program._layout.segment)
     drawn = PLANE_AXES if axes == PLANE_AXES else SPACE_AXES
-    out["start"], out["point"] = program.start_q40, program.point_q40[:drawn].T
-    a = np.moveaxis(program.a_q44, 0, 2)
-    out["a"] = a if axes == PLANE_AXES else _to_i48(a)
+    _put(out["start"], program.start_q40)
+    _put(out["point"], program.point_q40[:drawn].T)
+    _put(out["a"], np.moveaxis(program.a_q44, 0, 2))
     for k in range(axes - SPACE_AXES):
-        out[f"extra{k}"]["start"] = program.point_q40[SPACE_AXES + k]
-        out[f"extra{k}"]["b"] = _to_i48(program.extra_q40[k])
+        _put(out[f"extra{k}"]["start"], program.point_q40[SPACE_AXES + k])
+        _put(out[f"extra{k}"]["b"], program.extra_q40[k])
     return out
 
 
-def _to_i48(values: Int) -> NDArray[np.void]:
-    if np.abs(values).max(initial=0) >= 1 << 47:
-        raise InputError("program: a coefficient does not fit the 48 bits of the format")
-    out = np.empty(values.shape, dtype=_I48)
-    out["low"], out["high"] = values & 0xFFFFFFFF, values >> 32
-    return out
+def _put(field: NDArray[Any], values: NDArray[Any]) -> None:
+    """Writes integers to a field of records: of 4 or 8 bytes, as _I48, or as bytes."""
+    if field.dtype == _I48:
+        if not _within(values, 1 << 47):
+            raise InputError("program: a coefficient does not fit the 48 bits of the format")
+        field["low"], field["high"] = values & 0xFFFFFFFF, values >> 32
+    elif field.ndim == values.ndim:
+        field[...] = values
+    else:
+        whole = np.ascontiguousarray(values, dtype="<i8").view(np.uint8)
+        field[...] = whole.reshape(*values.shape, 8)[..., : field.shape[-1]]
 
 
-def _from_i48(values: NDArray[np.void]) -> Int:
-    return np.asarray((values["high"].astype(np.int64) << 32) | values["low"].astype(np.int64))
-
-
-def _size(axes: int, segments: int, pieces: int, events: int) -> int:
-    body = segment_size(axes) * segments + (PIECE_SIZE + STOP_SIZE) * pieces
-    return header_size(axes) + body + EVENT.itemsize * events
+def _taken(field: NDArray[Any], *, signed: bool = True) -> Int:
+    """The integers of such a field."""
+    if field.dtype == _I48:
+        low, high = field["low"].astype(np.int64), field["high"].astype(np.int64)
+        return np.asarray((high << 32) | low)
+    if field.dtype != np.uint8:
+        return field.astype(np.int64)
+    width = field.shape[-1]
+    whole = np.zeros((*field.shape[:-1], 8), dtype=np.uint8)
+    whole[..., 8 - width :] = field
+    shifted = whole.view("<i8" if signed else "<u8")[..., 0]
+    return np.asarray(shifted >> shifted.dtype.type(8 * (8 - width))).astype(np.int64)
 
 
 def open_fault(image: bytes) -> ProgramError | None:
@@ -327,7 +413,7 @@ def open_fault(image: bytes) -> ProgramError | None:
         return ProgramError.AXES
     if head[2] != header_size(axes):
         return ProgramError.VERSION
-    size = _size(axes, head[6], head[7], head[17])
+    size = _Layout(axes, bool(head[8] & FLAG_COMPACT)).size(head[6], head[7], head[17])
     if head[3] != size or len(image) < size:
         return ProgramError.SIZE
     if head[6] == 0 or head[7] == 0:
@@ -352,12 +438,15 @@ def reserved_fields(image: bytes) -> ReservedFields:
     """The same of an image that opens."""
     head = _HEADER.unpack_from(image)
     name = head[18]
-    after = header_size(head[9]) + segment_size(head[9]) * head[6]
-    stops = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])["reserved"]
+    compact, stops = bool(head[8] & FLAG_COMPACT), None
+    if not compact:
+        after = header_size(head[9]) + segment_size(head[9]) * head[6]
+        table = np.frombuffer(image, _STOP, head[7], after + PIECE_SIZE * head[7])
+        stops = table["reserved"] != 0
     return ReservedFields(
-        flags=not head[8] & ~(FLAG_CLOSED | FLAG_MOVING | _FIRST_AXIS_FLAGS),
+        flags=not head[8] & ~(FLAG_CLOSED | FLAG_MOVING | FLAG_COMPACT | _FIRST_AXIS_FLAGS),
         name=not any(name[name.find(b"\0") :]) if b"\0" in name else True,
-        stops=stops != 0,
+        stops=stops,
     )
 
 

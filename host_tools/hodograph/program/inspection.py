@@ -13,6 +13,8 @@ from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import arc_to_q40, segment_arcs
 from .image import (
+    COMPACT_PIECE_SIZE,
+    COMPACT_STOP_SIZE,
     PIECE_SIZE,
     RECORD_BYTES,
     STOP_SIZE,
@@ -75,6 +77,11 @@ def _bytes(program: Program) -> dict[str, Any]:
         "segment": segment_size(program.axis_count),
         "piece": PIECE_SIZE,
         "stop": STOP_SIZE,
+        "compact": {
+            "segment": segment_size(program.axis_count, compact=True),
+            "piece": COMPACT_PIECE_SIZE,
+            "stop": COMPACT_STOP_SIZE,
+        },
         "coefficients": {kernel: _coefficients(program, kernel) for kernel in RECORD_BYTES},
         "image_per_s": program.image_size / program.duration_s,
         "ring": RING_BYTES,
@@ -90,11 +97,14 @@ def _coefficients(program: Program, kernel: str) -> dict[str, int]:
 
 
 def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
-    """Segments, pieces and seconds that fill so many bytes where they are densest.
+    """Segments, pieces and seconds that fill so many bytes as compact records, where they are densest.
 
     Of a program that is smaller: so many of its mean density.
     """
-    size = segment_size(program.axis_count), PIECE_SIZE + STOP_SIZE
+    size = (
+        segment_size(program.axis_count, compact=True),
+        COMPACT_PIECE_SIZE + COMPACT_STOP_SIZE,
+    )
     starts = np.append(program.pieces.start_q40, program.length_q40)
     times = np.concatenate((np.zeros(1), np.cumsum(program.pieces.duration_q32_s) * 2.0**-32))
     # of the segments, those that begin before the end of each piece
@@ -117,6 +127,7 @@ def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
 
 
 def _bytes_text(found: dict[str, Any]) -> str:
+    compact = found["compact"]
     coefficients = "; ".join(
         f"{kernel} {one['segment']} and {one['piece']}"
         for kernel, one in found["coefficients"].items()
@@ -124,6 +135,7 @@ def _bytes_text(found: dict[str, Any]) -> str:
     return (
         f"bytes     header {found['header']}, segment {found['segment']}, piece {found['piece']} with stop "
         f"{found['stop']}; {found['image_per_s']:.0f} a second of motion\n"
+        f"          in chunks: segment {compact['segment']}, piece {compact['piece']} with stop {compact['stop']}\n"
         f"          coefficients of a segment and a piece: {coefficients}\n"
         f"ring      {found['ring'] // 1024} KiB hold {found['segments_in_ring']} segments and "
         f"{found['pieces_in_ring']} pieces, {found['seconds_in_ring']:.3g} s, where they are densest"

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..program.image import Program, decode, encode
 
 MAGIC = b"HDGC"
-VERSION = 1
+VERSION = 2
 HEADER_SIZE = 80
 FLAG_FIRST, FLAG_LAST, FLAG_REST, FLAG_JOINED = 1, 2, 4, 8
 _FLAGS = FLAG_FIRST | FLAG_LAST | FLAG_REST | FLAG_JOINED

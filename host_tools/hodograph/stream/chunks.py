@@ -19,14 +19,13 @@ from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..pipeline import program_limits, stop_terms
 from ..program.check import REACH_Q40, brief_pairs
 from ..program.codes import ProgramError
-from ..program.image import Program, encode, segment_size
+from ..program.image import COMPACT_PIECE_BYTES, Program, encode, segment_size
 from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
 from .windows import (
     JOINTS,
-    PIECE_BYTES,
     SectionFeed,
     Spacing,
     Stretch,
@@ -46,7 +45,7 @@ CHUNK_S = 1.0
 CHUNK_BYTES = 24 * 1024 - 64
 """The largest chunk, where a third of the ring is more."""
 
-_NEW_SHARE = 0.35
+_NEW_SHARE = 0.4
 """Of these bytes, for what is new. The rest is for the repeated part and the tail, and a ring that is full has room
 sooner for a smaller chunk.
 """
@@ -235,6 +234,7 @@ class SectionChunks:
         )
         self._most = most_bytes
         self._kept = _Kept()
+        self._alone_q40: int | None = None
         self._last: _Made | None = None
         self._searched: _Searched | None = None
         self._tail_bytes = 0
@@ -252,6 +252,8 @@ class SectionChunks:
                     planned, used = self._next(window, first, joints[:JOINTS])
                 except _RefusedPartError:
                     self._kept = before
+                    if first == 0 and self._begin_alone(window):
+                        continue
                     if not self._rest() and not self._feed.halve(window):
                         raise
                     break
@@ -262,6 +264,19 @@ class SectionChunks:
                     self.rest_lines.append(self._feed.path.line_at(window.stretch.end_q40))
             if self._last is not None:
                 self._feed.forget(self._last.first_segment)
+
+    def _begin_alone(self, window: Window) -> bool:
+        """Lets the next chunk begin at rest and share nothing, where the window begins at rest. Then it needs no bytes
+        for what is before, and a short segment there does not limit the feed behind it. False: it does so already, or
+        the window begins in motion.
+        """
+        begin_q40, last = int(window.stretch.pieces.start_q40[0]), self._last
+        if last is None or self._kept.pieces is None or not self._feed.begins_at_rest:
+            return False
+        if last.end_q40 != begin_q40:
+            return False
+        self._kept, self._alone_q40 = _Kept(), begin_q40
+        return True
 
     def _rest(self) -> bool:
         """Lets the axes rest at the end of the newest chunk, whose tail is then kept: no chunk goes on in motion. False
@@ -306,7 +321,7 @@ class SectionChunks:
                 break
         assert program is not None
         header = self._header(window, joint, program)
-        if self._last is not None:
+        if self._last is not None and header.rest is None:
             # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
             shared = min(len(kept.codes), self._last.pieces - piece_shift - 1)
             header = replace(
@@ -351,7 +366,7 @@ class SectionChunks:
         return replace(
             header,
             first=False,
-            rest=place.rest if header.first else None,
+            rest=place.rest if header.first else header.rest,
             sequence=header.sequence + place.sequence,
             job_start_q40=header.job_start_q40 + place.arc_q40,
         )
@@ -364,7 +379,8 @@ class SectionChunks:
         joint_q40 = window.joint_q40(joint)
         segments = path.segment_at(joint_q40) + 1 - first
         events = len(path.events_on(int(path.start_q40[first]), joint_q40))
-        size = HEADER_SIZE + len(pieces) * PIECE_BYTES + segments * segment_size(path.curve.axes)
+        size = HEADER_SIZE + len(pieces) * COMPACT_PIECE_BYTES
+        size += segments * segment_size(path.curve.axes, compact=True)
         return size + EVENT.itemsize * events
 
     def _require_room(self, program: Program, line: int) -> None:
@@ -388,8 +404,9 @@ class SectionChunks:
             sequence=0 if last is None else last.header.sequence + 1,
             job_start_q40=int(path.start_q40[segment]),
             line=path.line_at(begin_q40),
+            rest=None if last is None or begin_q40 != last.end_q40 else Rest(),
         )
-        if last is None:
+        if last is None or header.rest is not None:
             return header
         number = path.passed + segment
         return replace(
@@ -448,7 +465,10 @@ class SectionChunks:
         """The program of a chunk: `_program` with the events of its path."""
         program = self._program(stretch, codes)
         base_q40 = stretch.end_q40 - program.length_q40
-        return replace(program, events=self._feed.path.events_on(base_q40, stretch.end_q40))
+        events = self._feed.path.events_on(base_q40, stretch.end_q40)
+        if base_q40 == self._alone_q40:  # those at its start are at the end of the chunk before
+            events = events[events["place"] > 0]
+        return replace(program, events=events)
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
         """A program of pieces from inside the path in memory to an end of a segment."""
@@ -472,7 +492,8 @@ class SectionChunks:
             extra_q40=path.extra_q40[:, first:end],
             pieces=replace(pieces, start_q40=pieces.start_q40 - base),
             stops=replace(no_stops(len(pieces)), codes=codes),
-            moving=int(pieces.start_q40[0]) != self._feed.begin_q40,
+            moving=int(pieces.start_q40[0]) not in (self._feed.begin_q40, self._alone_q40),
+            compact=True,
             first_axis=machine.first_axis,
         )
         return with_bounds(program)

@@ -20,7 +20,7 @@ from ..spline import PHSpline
 from ..spline.build import FoundSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from ..toolpath.moves import Command, Dwell, ProgramStop
-from .chunk import Chunk, ChunkHeader, Rest
+from .chunk import Chunk, ChunkHeader, Rest, make
 from .chunks import JobPlace, zones_behind
 from .geometry import LEAST_REST_MM, curve_behind
 
@@ -149,7 +149,7 @@ class PathsJob:
             rest=None if place is None else (rest if self.stops else Rest(listed.dwell_ms)),
             joined=not last,
         )
-        chunk = Chunk(header, pipeline.image)
+        chunk = make(header, replace(program, compact=True))
         if chunk.size > self.most_bytes:
             raise PlanError(
                 f"{self.file}: path {number + 1} takes {chunk.size} bytes with its header, and the controller takes "

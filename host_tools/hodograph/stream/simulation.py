@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -93,7 +93,9 @@ def simulate_chunks(
 
 
 class Concatenation:
-    """The pieces of chunks, without tails and repetitions, as one program: it takes the memory of the whole section."""
+    """The pieces of chunks, the first of which begins at rest, without tails and repetitions, as one program: it takes
+    the memory of the whole section.
+    """
 
     def __init__(self) -> None:
         self._pieces: list[FeedPieces] = []
@@ -104,36 +106,41 @@ class Concatenation:
         self._codes: list[np.ndarray] = []
         self._events: list[np.ndarray] = []
         self._end_q40 = -1
+        self._base_q40: int | None = None
         self._before: tuple[Chunk, Program] | None = None
 
     def add(self, chunk: Chunk, next_shared_end: int | None) -> None:
         """The next chunk; `next_shared_end`: how many of its pieces are before its joint, None: all (the last one)."""
         own, header = chunk.program, chunk.header
+        if self._base_q40 is None:
+            self._base_q40 = header.job_start_q40
+        begin_q40 = header.job_start_q40 - self._base_q40
         new = slice(header.shared_pieces, next_shared_end)
         part = taken(own.pieces, new)
-        self._pieces.append(replace(part, start_q40=part.start_q40 + header.job_start_q40))
+        self._pieces.append(replace(part, start_q40=part.start_q40 + begin_q40))
         self._codes.append(own.stops.codes[new])
         fresh = slice(header.shared_segments, None)
-        self._starts.append(own.start_q40[fresh] + header.job_start_q40)
+        self._starts.append(own.start_q40[fresh] + begin_q40)
         self._points.append(own.point_q40[:, fresh])
         self._a.append(own.a_q44[:, fresh])
         self._extra.append(own.extra_q40[:, fresh])
         events = own.events.copy()
-        events["place"] += header.job_start_q40
+        events["place"] += begin_q40
         self._events.append(events[events["place"] > self._end_q40])
-        self._end_q40 = header.job_start_q40 + own.length_q40
+        self._end_q40 = begin_q40 + own.length_q40
         self._before = (chunk, own)
 
     def program(self) -> Program:
         """The whole."""
         assert self._before is not None
+        assert self._base_q40 is not None
         chunk, own = self._before
         pieces = chained(self._pieces)
         codes = np.concatenate(self._codes)
         whole = replace(
             own,
             duration_q32_s=pieces.total_q32_s,
-            length_q40=own.length_q40 + chunk.header.job_start_q40,
+            length_q40=own.length_q40 + chunk.header.job_start_q40 - self._base_q40,
             start_q40=np.concatenate(self._starts),
             point_q40=np.concatenate(self._points, axis=1),
             a_q44=np.concatenate(self._a, axis=1),
@@ -141,18 +148,32 @@ class Concatenation:
             pieces=pieces,
             stops=replace(no_stops(len(pieces)), codes=codes),
             moving=False,
+            compact=False,
             events=np.concatenate(self._events),
         )
         return with_bounds(whole)
 
 
+def from_rest_to_rest(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
+    """The chunks of a job in parts, each of which begins with one that shares nothing."""
+    part: list[Chunk] = []
+    for chunk in chunks:
+        if part and chunk.header.rest is not None:
+            yield part
+            part = []
+        part.append(chunk)
+    if part:
+        yield part
+
+
 def concatenated(chunks: Iterable[Chunk]) -> Program:
-    """The pieces of the chunks of a section as one program."""
+    """The pieces of the chunks of a section as one program; of a part of it that begins at rest, too."""
     whole = Concatenation()
     before: Chunk | None = None
     for chunk in chunks:
         if before is not None:
-            whole.add(before, chunk.header.piece_shift + chunk.header.shared_pieces)
+            joint = chunk.header.piece_shift + chunk.header.shared_pieces
+            whole.add(before, joint if chunk.header.rest is None else None)
         before = chunk
     assert before is not None
     whole.add(before, None)

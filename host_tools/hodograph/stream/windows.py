@@ -35,7 +35,7 @@ from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.plan import FeedCurve
 from ..feed.request import LONGEST_S, OPTIMAL
 from ..pipeline import axis_limits, controller_limits, plants
-from ..program.image import PIECE_SIZE, STOP_SIZE, segment_size
+from ..program.image import COMPACT_PIECE_BYTES, segment_size
 from .geometry import Block, StreamPath
 
 Real = NDArray[np.float64]
@@ -88,7 +88,6 @@ _SAME_MM = 1e-9
 JOINTS = 4
 """Places for a joint in what is new in a chunk: the last one is taken where there is room."""
 
-PIECE_BYTES = PIECE_SIZE + STOP_SIZE
 _SLIGHTLY_MORE = 0.25
 """A chunk may have this share more of what is new than is wanted, rather than that there is one more."""
 
@@ -167,7 +166,9 @@ class SectionFeed:
         self._joint = joint
         self._effort = replace(
             _EFFORT,
-            fewest=int(np.clip(joint.bytes // PIECE_BYTES, _TAIL_EFFORT.fewest, _EFFORT.fewest)),
+            fewest=int(
+                np.clip(joint.bytes // COMPACT_PIECE_BYTES, _TAIL_EFFORT.fewest, _EFFORT.fewest)
+            ),
         )
         self._exceeded = exceeded
         self._period_s = 1e-6 * machine.period_us
@@ -199,6 +200,11 @@ class SectionFeed:
             else:
                 self._advance(window)
             self._drop()
+
+    @property
+    def begins_at_rest(self) -> bool:
+        """Whether the present window does."""
+        return self._moving is None
 
     def at_end(self, window: Window) -> bool:
         """Whether a window ends where the section does."""
@@ -446,7 +452,9 @@ class SectionFeed:
         part = slice(first, first + count + 1)
         t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[part]
         segments = np.searchsorted(self.path.curve.segment_starts_mm, found.grid.s[part])
-        own = np.arange(count + 1) * PIECE_BYTES + segments * segment_size(self.path.curve.axes)
+        own = np.arange(count + 1) * COMPACT_PIECE_BYTES + segments * segment_size(
+            self.path.curve.axes, compact=True
+        )
         own = own + EVENT.itemsize * self.path.events_before(found.grid.s[part])
         share = np.maximum((t - t[0]) / self._joint.time_s, (own - own[0]) / self._joint.bytes)
         parts = JOINTS * max(1, ceil(float(share[-1]) - _SLIGHTLY_MORE))

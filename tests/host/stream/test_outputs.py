@@ -40,7 +40,7 @@ from hodograph.stream.simulation import concatenated, simulate_chunks
 from hodograph.toolpath.files import ReadOptions
 
 ROOT = Path(__file__).resolve().parents[3]
-SIZES = (12 * 1024, 16 * 1024, 24 * 1024)
+SIZES = (6 * 1024, 9 * 1024, 16 * 1024)
 HEAD = "G21 G17 G90 G94 G64 P0.02\nF6000\n"
 
 
