@@ -54,9 +54,7 @@ def random_case(seed: int, folder: Path) -> Pipeline:
     if profile != "optimal":
         feed += f"nominal_mm_s = {rng.uniform(20, 300):.2f}\nramp_time_s = {rng.uniform(0.03, 0.3):.3f}\n"
     file = folder / "case.toml"
-    file.write_text(
-        f"[path]\nclosed = false\nthrough = {listed}\n[feed]\n{feed}", encoding="utf-8"
-    )
+    file.write_text(f"[path]\nclosed = false\nthrough = {listed}\n[feed]\n{feed}", encoding="utf-8")
     machine = load_machine(ROOT / f"examples/machines/{MACHINES[axes]}.toml")
     shares = rng.uniform(0.2, 1.0, (len(machine.axes), 3))
     limited = tuple(

@@ -39,7 +39,8 @@ _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
 _PAIR_BESIDE_MM = REACH_Q40 * 2.0**-40 + 1e-6
-"""How far the zone of short segments reaches beyond them: the controller counts pieces that end this near as on them."""
+"""How far the zone of short segments reaches beyond them: the controller counts pieces that end this near as on
+them."""
 
 _BESIDE_MM = 1e-6
 LEAST_REST_MM = 0.002
