@@ -54,9 +54,7 @@ def random_case(seed: int, folder: Path) -> Pipeline:
     if profile != "optimal":
         feed += f"nominal_mm_s = {rng.uniform(20, 300):.2f}\nramp_time_s = {rng.uniform(0.03, 0.3):.3f}\n"
     file = folder / "case.toml"
-    file.write_text(
-        f"[path]\nclosed = false\nthrough = {listed}\n[feed]\n{feed}", encoding="utf-8"
-    )
+    file.write_text(f"[path]\nclosed = false\nthrough = {listed}\n[feed]\n{feed}", encoding="utf-8")
     machine = load_machine(ROOT / f"examples/machines/{MACHINES[axes]}.toml")
     shares = rng.uniform(0.2, 1.0, (len(machine.axes), 3))
     limited = tuple(
@@ -81,7 +79,7 @@ def accepted(program: NativeProgram, machine: Machine, share: float) -> bool:
     return program.check(NativeLimits(**asdict(replace(limits, **scaled)))) is None
 
 
-def measure(seeds: range, folder: Path) -> dict[str, int]:
+def measure(seeds: range, folder: Path) -> dict[str, float]:
     """Counts: plans, those that no feed keeps or the compiler refuses, and those accepted at either room."""
     counts: Counter[str] = Counter()
     for done, seed in enumerate(seeds, 1):
@@ -104,7 +102,8 @@ def measure(seeds: range, folder: Path) -> dict[str, int]:
             print(f"  seed {seed}: not accepted with 0.5 %", flush=True)
         if done % 1000 == 0:
             print(f"  {done}: {dict(counts)}", flush=True)
-    return dict(counts)
+    share = 100.0 * counts["accepted_half_percent"] / counts["plans"]
+    return {**counts, "accepted_half_percent_of_plans": share}
 
 
 def _quick(pipeline: Pipeline) -> StopTerms:
