@@ -79,7 +79,7 @@ def accepted(program: NativeProgram, machine: Machine, share: float) -> bool:
     return program.check(NativeLimits(**asdict(replace(limits, **scaled)))) is None
 
 
-def measure(seeds: range, folder: Path) -> dict[str, int]:
+def measure(seeds: range, folder: Path) -> dict[str, float]:
     """Counts: plans, those that no feed keeps or the compiler refuses, and those accepted at either room."""
     counts: Counter[str] = Counter()
     for done, seed in enumerate(seeds, 1):
@@ -102,7 +102,8 @@ def measure(seeds: range, folder: Path) -> dict[str, int]:
             print(f"  seed {seed}: not accepted with 0.5 %", flush=True)
         if done % 1000 == 0:
             print(f"  {done}: {dict(counts)}", flush=True)
-    return dict(counts)
+    share = 100.0 * counts["accepted_half_percent"] / counts["plans"]
+    return {**counts, "accepted_half_percent_of_plans": share}
 
 
 def _quick(pipeline: Pipeline) -> StopTerms:

@@ -46,7 +46,7 @@ def on_machine(name: str, stop_time_ms: int, **limits: str) -> Pipeline:
     return Pipeline(replace(file, limits=replace(file.limits, **limits)), machine)
 
 
-@pytest.mark.parametrize("seed", [0, 6, 10])
+@pytest.mark.parametrize("seed", [4, 10])
 def test_a_short_path_of_five_axes_is_planned_again(tmp_path: Path, seed: int) -> None:
     made = load_pipeline(five_axes_file(tmp_path, seed, OPTIMAL), allow_space=True)
     program = made.program
@@ -97,7 +97,7 @@ def test_where_no_plan_helps_the_refusal_has_the_place_and_what_to_do() -> None:
 
 def test_commands_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """`feed`, `compile` and `simulate` have the same motion, and the same note."""
-    file = five_axes_file(tmp_path, 0, OPTIMAL)
+    file = five_axes_file(tmp_path, 4, OPTIMAL)
     duration_s = load_pipeline(file, allow_space=True).program.duration_s
     words = {
         "feed": ["feed", str(file), "--json"],
