@@ -58,9 +58,11 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def monitored(bus: BusAddress, clock: VirtualClock, browser: Browser) -> Iterator[Live]:
+def monitored(
+    bus: BusAddress, clock: VirtualClock, browser: Browser, machine: str = MACHINE
+) -> Iterator[Live]:
     port = free_port()
-    words = ("monitor", "--machine", MACHINE, "--bus", str(bus), "--port", str(port))
+    words = ("monitor", "--machine", machine, "--bus", str(bus), "--port", str(port))
     with running(clock, *words, "--token", TOKEN, name="monitor") as monitor:
         url = f"http://127.0.0.1:{port}/#token={TOKEN}"
         assert url in monitor.err
@@ -80,8 +82,8 @@ def live(hub: LocalHub, clock: VirtualClock, browser: Browser) -> Iterator[Live]
 
 
 @contextlib.contextmanager
-def rig(live: Live) -> Iterator[None]:
-    with running(live.clock, "rig", MACHINE, "--bus", str(live.bus), name="rig") as process:
+def rig(live: Live, machine: str = MACHINE) -> Iterator[None]:
+    with running(live.clock, "rig", machine, "--bus", str(live.bus), name="rig") as process:
         process.await_text("Ctrl-C ends them")
         yield
         process.signal(signal.SIGINT)

@@ -102,11 +102,13 @@ def rows_message(
     drawn: int = 2,
     path_axes: int = 0,
     marks: Sequence[tuple[float, str]] = (),
+    program: int | None = None,
 ) -> dict[str, Any]:
     """The rows of one poll, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
     path, whose positions the points have; further axes of the `path_axes` have theirs with the arc length.
 
-    marks  outputs whose places were passed, with the times
+    marks    outputs whose places were passed, with the times
+    program  CRC-32 of the program along which the arc lengths are; None: of a job
     """
     starts = group_starts(rows.count, round(GROUP_S / period_s), MOST_GROUPS)
     message: dict[str, Any] = {
@@ -125,6 +127,7 @@ def rows_message(
     if marks:
         message["marks"] = [[round(t_s, 4), text] for t_s, text in marks]
     if path_axes > drawn:
+        message["program"] = program
         message["arc"] = numbers(rows.arc_mm[points], 3)
         message["extra"] = [
             [numbers(column, 4) for column in values[points, drawn:path_axes].T]

@@ -191,6 +191,7 @@ class Pump:
                     self._layout.drawn,
                     self._layout.path_axes,
                     self._passed.feed(rows.t_s, rows.arc_mm),
+                    None if self._path is None else self._path.crc32,
                 )
             )
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):

@@ -19,6 +19,7 @@ export class AxisCurves {
     this.names = names;
     this.units = units;
     this.path = { arc: [], extra: [] };
+    this.program = null;
     this.points = new Ring(POINTS, ["s", ...names.flatMap((_, k) => [`c${k}`, `a${k}`])]);
     this.parent.replaceChildren();
     this.curves = names.map((name, k) => {
@@ -41,18 +42,20 @@ export class AxisCurves {
     });
   }
 
-  /** The program's curves; without arguments there is none. */
-  setPath(arc, extra) {
+  /** The program's curves and its CRC-32; without arguments there is none. */
+  setPath(arc, extra, program = null) {
     this.path = { arc: arc ?? [], extra: extra ?? [] };
+    if (program !== this.program) this.clear();
+    this.program = program;
   }
 
   clear() {
     this.points.clear();
   }
 
-  /** Takes a message of type rows. */
-  add({ arc, extra }) {
-    if (!arc || !this.names.length) return;
+  /** Takes a message of type rows. Arc lengths along another program, as a move to the start, have no place here. */
+  add({ arc, extra, program }) {
+    if (!arc || !this.names.length || program !== this.program) return;
     const [cmd, act] = extra;
     arc.forEach((s, i) => {
       const row = { s: s ?? NaN };

@@ -109,7 +109,7 @@ const handlers = {
   restart: () => { store.clear(); axisCurves.clear(); },
   path(message) {
     plane.setPath(message.x, message.y, message.z, message.marks);
-    axisCurves.setPath(message.arc, message.extra);
+    axisCurves.setPath(message.arc, message.extra, message.crc32);
     panel.name = message.name;
     panel.lengthMm = message.length_mm;
     $("path-note").textContent = message.note;

@@ -108,7 +108,7 @@ export class Plane {
     else this.curve(context, px, py, colours);
     this.trail(context, points, "c", 1, px, py, colours.cmd, 1);
     this.trail(context, points, "a", this.magnify, px, py, colours.act, 1.8);
-    this.outputs(context, px, py, colours);
+    this.outputs(context, px, py, width, colours);
     this.tool(context, points, px, py, colours);
     const found = this.toolpath ? this.placed(points, px, py) : -1;
     this.place = found < 0 ? "" : this.toolpath.describe(found);
@@ -173,10 +173,9 @@ export class Plane {
     context.lineWidth = 1;
   }
 
-  /** A triangle at each place where outputs switch, and what switches. */
-  outputs(context, px, py, colours) {
+  /** A triangle at each place where outputs switch, and what switches: beside it, to the right where there is room. */
+  outputs(context, px, py, width, colours) {
     context.font = "11px system-ui, sans-serif";
-    context.textAlign = "left";
     context.textBaseline = "middle";
     context.fillStyle = colours.second;
     for (const { x, y, z, text } of this.marks) {
@@ -187,7 +186,10 @@ export class Plane {
       context.lineTo(left - 5, top - 9);
       context.lineTo(left + 5, top - 9);
       context.fill();
-      text.split("\n").forEach((line, k) => context.fillText(line, left + 9, top - 6 + 12 * k));
+      const lines = text.split("\n");
+      const fits = left + 9 + Math.max(...lines.map((line) => context.measureText(line).width)) <= width;
+      context.textAlign = fits ? "left" : "right";
+      lines.forEach((line, k) => context.fillText(line, fits ? left + 9 : left - 9, top - 6 + 12 * k));
     }
   }
 

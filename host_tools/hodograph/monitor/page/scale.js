@@ -9,7 +9,9 @@ export function roundUp(value) {
 
 /** A number with so many digits, or a dash. */
 export function text(value, digits) {
-  return value === null || value === undefined || Number.isNaN(value) ? "–" : value.toFixed(digits);
+  if (value === null || value === undefined || Number.isNaN(value)) return "–";
+  const shown = value.toFixed(digits);
+  return Number(shown) === 0 ? (0).toFixed(digits) : shown; // not -0
 }
 
 /** Digits behind the point that steps of this size need. */
