@@ -72,7 +72,7 @@ def random_case(seed: int, folder: Path) -> Pipeline:
 def accepted(program: NativeProgram, machine: Machine, share: float) -> bool:
     """By a controller whose axes have this share of the limits of the machine."""
     limits = program_limits(machine)
-    scaled = {
+    scaled: dict[str, Any] = {
         name: tuple(round(share * value) for value in getattr(limits, name))
         for name in ("axis_velocity_um_s", "axis_acceleration_um_s2", "axis_jerk_mm_s3")
     }

@@ -159,8 +159,9 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("errors", "names", "events", "config", "spline", "feed", "program", "native"),
         "path_outputs",
     },
+    "equal_sections": {"feed", "native", "pipeline", "program", "toolpath"},
     "job": {
-        *("errors", "events", "config", "spline", "feed", "program", "native", "simulate"),
+        *("errors", "equal_sections", "events", "config", "spline", "feed", "program", "native", "simulate"),
         *("pipeline", "job_outputs"),
         "toolpath",
     },

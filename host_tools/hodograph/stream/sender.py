@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from ..errors import HodographError, RunError
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native import NativeProgram
 from ..pipeline import program_start_counts
+from ..program import encode
 from .chunk import Chunk
 from .journal import Journal
 from .plan import JobPlan, PlannedSection, PlanRests
@@ -206,9 +207,8 @@ class Sender:
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
-        start = program_start_counts(
-            NativeProgram(chunk.image), self.machine, self.kernel, section.standing_mm
-        )
+        program = NativeProgram(encode(replace(chunk.program, compact=False)))
+        start = program_start_counts(program, self.machine, self.kernel, section.standing_mm)
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:
             close_stream(self.at.controller)
