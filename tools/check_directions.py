@@ -161,7 +161,17 @@ PYTHON_RULES: dict[str, set[str]] = {
     },
     "equal_sections": {"feed", "native", "pipeline", "program", "toolpath"},
     "job": {
-        *("errors", "equal_sections", "events", "config", "spline", "feed", "program", "native", "simulate"),
+        *(
+            "errors",
+            "equal_sections",
+            "events",
+            "config",
+            "spline",
+            "feed",
+            "program",
+            "native",
+            "simulate",
+        ),
         *("pipeline", "job_outputs"),
         "toolpath",
     },
