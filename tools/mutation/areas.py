@@ -51,10 +51,12 @@ AREAS = (
     # Not what has a process of its own, and not files of minutes.
     _python(
         "stream",
+        "tests/host/stream/test_bus_chunks.py",
         "tests/host/stream/test_chunks.py",
         "tests/host/stream/test_outputs.py",
         "tests/host/stream/test_paths.py",
         "tests/host/stream/test_reading.py",
+        "tests/host/stream/test_rests.py",
         "tests/host/stream/test_resuming.py",
         "tests/host/stream/test_sending.py",
         "tests/host/stream/test_store.py",
