@@ -17,7 +17,6 @@ import tempfile
 from collections import Counter
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -72,12 +71,10 @@ def random_case(seed: int, folder: Path) -> Pipeline:
 
 def accepted(program: NativeProgram, machine: Machine, share: float) -> bool:
     """By a controller whose axes have this share of the limits of the machine."""
-    limits = program_limits(machine)
-    scaled: dict[str, Any] = {
-        name: tuple(round(share * value) for value in getattr(limits, name))
-        for name in ("axis_velocity_um_s", "axis_acceleration_um_s2", "axis_jerk_mm_s3")
-    }
-    return program.check(NativeLimits(**asdict(replace(limits, **scaled)))) is None
+    fields = asdict(program_limits(machine))
+    for name in ("axis_velocity_um_s", "axis_acceleration_um_s2", "axis_jerk_mm_s3"):
+        fields[name] = tuple(round(share * value) for value in fields[name])
+    return program.check(NativeLimits(**fields)) is None
 
 
 def measure(seeds: range, folder: Path) -> dict[str, float]:
