@@ -159,9 +159,10 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("errors", "names", "events", "config", "spline", "feed", "program", "native"),
         "path_outputs",
     },
+    "equal_sections": {"feed", "program", "native", "pipeline", "toolpath"},
     "job": {
         *("errors", "events", "config", "spline", "feed", "program", "native", "simulate"),
-        *("pipeline", "job_outputs"),
+        *("pipeline", "job_outputs", "equal_sections"),
         "toolpath",
     },
     "job_view": {"job", "toolpath"},

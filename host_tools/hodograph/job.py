@@ -637,9 +637,7 @@ class SectionMaker:
                 line = lines[max(int(np.argmax(angles[:, k] != 0.0)) - 1, 0)]
                 raise no_such_axis(self.file, int(line), name, self.machine)
 
-    def _section(
-        self, section: Section, fitted: FittedPath, shared: SharedPrograms
-    ) -> JobSection:
+    def _section(self, section: Section, fitted: FittedPath, shared: SharedPrograms) -> JobSection:
         machine = self._moving(section)
         fitted = self._turned(section, fitted)
         nominal, zones = _feeds(fitted)
