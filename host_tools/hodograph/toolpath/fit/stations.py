@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
-_THIN_SHARE = 0.06
+_THIN_SHARE = 0.04
 """Of the tolerance: how far a point that is left out may lie from the leg that passes it."""
 
 _LINE_SHARE = 0.25
@@ -34,7 +34,7 @@ _NEAREST = 11.0
 """In tolerances: how near vertices of smoothed stretches may be that are not needed to keep `_LINE_SHARE`."""
 
 _THIN_ROUNDS = 12
-_GRADES = np.array([0.4, 1.0, 2.4, 6.0, 15.0])
+_GRADES = np.array([0.25, 0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0, 9.0, 15.0])
 """Stations beside a vertex, in multiples of the room that its corner curve would take."""
 
 _MIDDLE = 0.2
