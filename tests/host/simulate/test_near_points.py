@@ -48,7 +48,7 @@ def test_axes_that_turn_between_near_points(tmp_path: Path, apart_mm: float) -> 
     assert pipeline.plan.duration_s < 0.85
 
 
-@pytest.mark.parametrize("apart_mm", [1e-8, 1e-5])
+@pytest.mark.parametrize("apart_mm", [1e-7, 1e-5])
 def test_points_at_which_the_rounding_of_extra_axes_counts(tmp_path: Path, apart_mm: float) -> None:
     pipeline = with_near(tmp_path, apart_mm, 0.0)
     assert pipeline.accepted.check() is None

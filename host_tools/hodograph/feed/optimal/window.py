@@ -35,6 +35,7 @@ _LEAST_Q = 1e-14
 _LEAST_TYPICAL = 1e-12
 _LEAST_P = 1e-300
 _LEAST_FALL = 0.1
+_LEAST_DIP = 1e-3
 _MOST_TRIALS = 3
 _TRUSTED = 2
 _TOLERABLE = 5e-3
@@ -107,7 +108,7 @@ class Solution:
         """
         interval = np.clip(np.searchsorted(self.grid.s, s, side="right") - 1, 0, self.grid.size - 1)
         beside = np.minimum(self.q[interval], self.q[interval + 1])
-        return np.maximum(self.squared_feed(s), _LEAST_FALL * beside)
+        return np.maximum(self.squared_feed(s), _LEAST_DIP * beside)
 
 
 @dataclass(frozen=True, eq=False)

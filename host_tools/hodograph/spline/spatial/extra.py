@@ -17,6 +17,7 @@ _MOST_SLOPE, _MOST_BEND = 1.5, 4.0
 
 _REPEATED = 1e-9
 
+_SHORT_MM = 1e-4
 _PER_UNIT = 2.0**40
 """Steps of a coefficient of a program (docs/reference/protocol.md 1.2.2) in a mm or degree."""
 
@@ -40,13 +41,16 @@ def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, ben
     """Bezier coefficients (N, E, 6) of axes with values, slopes and second derivatives (N + 1, E) by arc length at the
     joints of a curve.
 
-    They are rounded as a program has them. In a span of 10 nm that alone makes a third derivative of 10^5 deg/mm^3,
-    which a feed plan has to know.
+    In spans below _SHORT_MM they are rounded as a program has them: in a span of 10 nm that alone makes a third
+    derivative of 10^5 deg/mm^3, which a feed plan has to know.
     """
     c = curve.speed_coefficients
     begin = _by_parameter(slope[:-1], bend[:-1], c[:, 0], 4.0 * (c[:, 1] - c[:, 0]))
     end = _by_parameter(slope[1:], bend[1:], c[:, 4], 4.0 * (c[:, 4] - c[:, 3]))
-    return np.rint(_hermite(value[:-1], value[1:], begin, end) * _PER_UNIT) / _PER_UNIT
+    extra = _hermite(value[:-1], value[1:], begin, end)
+    short = np.diff(curve.segment_starts_mm) < _SHORT_MM
+    extra[short] = np.rint(extra[short] * _PER_UNIT) / _PER_UNIT
+    return extra
 
 
 def with_standing_axes(curve: SpatialPHSpline, count: int) -> SpatialPHSpline:
