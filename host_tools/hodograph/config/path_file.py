@@ -184,8 +184,13 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
             "output", "applies to files with one [path]: put [[path.output]] behind its [[path]]"
         )
     found = tuple(_listed(root, table, i) for i, table in enumerate(tables, 1))
-    if len({type(one.file.given_path) for one in found}) > 1:
-        raise root.error("path", "has points [x, y] and points [x, y, z]: give all of one kind")
+    kinds = [type(one.file.given_path) for one in found]
+    other = next((number for number, kind in enumerate(kinds, 1) if kind is not kinds[0]), None)
+    if other is not None:
+        raise root.error(
+            "path",
+            f"has points [x, y] and points [x, y, z]: [path {other}] differs from [path 1], give all of one kind",
+        )
     for key in _RESTS:
         if tables[0].has(key):
             raise tables[0].error(
