@@ -1,23 +1,24 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The feed override: what the plan of a program and the commands make of the next tick. Feed hold, resume, override 0 to
- * 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never leaves the curve.
+ * The feed override: which point of the path the next tick gets, by the feed plan of the program and the commands: feed
+ * hold, resume, override 0 to 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never
+ * leaves the curve.
  *
  * Override and resume change the override (core/override_plan) along jerk-limited ramps inside the override bounds of
- * every feed piece that they touch. Hold, stop and fault stop leave the plan instead: they brake along the path
- * (core/path_brake) from the speed and acceleration of the last setpoint, with the numbers that the stop table has for the
- * piece. Where a brake may not begin the plan goes on for another tick, and where the program ends before a brake would,
- * it ends. So a stop takes at most the bound of the piece in which it was requested (docs/reference/protocol.md 1.4). A hold or stop
- * that is requested while the override rises first ends the rise. If the plan is in another piece by then, the bound of that one
- * counts from there.
+ * every feed piece that they touch. Hold, stop and fault stop leave the nominal motion: they are path stops
+ * (core/path_brake) from the speed and acceleration of the last setpoint, with the stop parameters of the piece. Where a
+ * path stop may not begin, the nominal motion continues for another tick. If the program would end before a path stop
+ * would, it ends without one. So a stop takes at most the bound of the piece in which it was requested
+ * (docs/reference/protocol.md 1.4). A hold or stop that is requested while the override rises first ends the rise. If the
+ * program is in another piece by then, the bound of that piece counts from that instant.
  *
- * At rest of a hold the program time of the place is looked for, a step in each tick; a resume goes on from there. It is
- * found to 2^-42 s of program time.
+ * At standstill of a hold the program time of the place is searched, a step in each tick; a resume goes on from there. It
+ * is found to 2^-42 s of program time.
  *
- * Of a job in chunks (core/chunk.h) the program under way is taken for the next one by feed_override_take_over. At the end
- * of a tail the motion rests and waits for that: it is still running, held or stopped.
+ * In a job in chunks (core/chunk.h) feed_override_take_over replaces the program under way by the next one. At the end of
+ * a tail the motion rests and waits for the takeover. Its state is still running, held or stopped.
  *
- * Integers only, the same on every target. One owner: commands called from elsewhere than the tick need the tick held off.
+ * Integers only, the same on every target. One owner: no tick may run while a command is called from elsewhere.
  */
 #ifndef HODOGRAPH_CORE_FEED_OVERRIDE_H
 #define HODOGRAPH_CORE_FEED_OVERRIDE_H

@@ -34,7 +34,7 @@
  * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section
  * 1). program.header.axis_count says how many; positions, limits and offsets are arrays of PROGRAM_AXES, of which the
  * first axis_count count. A controller that serves another number says so in program_limits.axis_count, and
- * program_check refuses the program, and every one that moves the machine's axes from another one than the first
+ * program_check refuses the program, and each program whose first axis is not the machine's first axis
  * (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to look at first_axis().
  *
  * ## Cost

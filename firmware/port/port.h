@@ -14,8 +14,8 @@
  * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
  * `receive`.) On Linux one thread stands for both interrupts.
  *
- * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Functions may be called
- * from any context unless their comment says otherwise; none from before port_begin().
+ * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Unless its
+ * comment says otherwise, a function may be called from any context. Call none before port_begin().
  */
 #ifndef PORT_PORT_H
 #define PORT_PORT_H

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A job in chunks without a bus: what the controller makes of chunks that come when they come (docs/reference/protocol.md
- * 1.7). Chunks are opened, checked and taken over by the code of the controller, one try before each tick; commands are
- * those of the feed override. Dwells between chunks take their ticks, program stops no time. Gives setpoints as the controller
- * would, bit for bit, from records of what is near the motion only, as there (core/coefficient_cache.h); they are made before
- * each tick.
+ * A job in chunks without a bus: how the controller handles chunks, whenever they come (docs/reference/protocol.md 1.7).
+ * Used by the host tools' native module and by tests. Chunks are opened, checked and taken over by the code of the
+ * controller, one try before each tick; commands are those of the feed override. Dwells between chunks take their ticks,
+ * program stops no time. Setpoints are those of the controller, bit for bit. Records exist only near the motion, as in the
+ * controller (core/coefficient_cache.h); they are made before each tick.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
- * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of each
- * chunk. They have to stay as long as the stream. Main loop only.
+ * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of
+ * each chunk. They have to stay as long as the stream. Not reentrant: one thread for each stream.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H

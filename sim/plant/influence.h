@@ -2,8 +2,8 @@
 /* What acts on an axis beside its setpoints: offsets of a feedforward, load, friction, brake, a weak
  * supply, a faulty encoder. docs/theory/numerics.md section 13.
  *
- * An axis without any of it is computed by drive.h alone; with all figures neutral
- * influence_period gives the same bits. Pure functions but for the drive that is given.
+ * drive.h alone computes an axis without any of these. With all figures neutral influence_period
+ * gives the same bits. The functions change nothing but the structs that they are given.
  */
 #ifndef HODOGRAPH_PLANT_INFLUENCE_H
 #define HODOGRAPH_PLANT_INFLUENCE_H

@@ -21,12 +21,12 @@ from ..errors import InputError
 VERSION = 3
 
 _BESIDE_Q40 = 1 << 20
-"""2^-20 mm: so near before the start of a section the machine rests at it."""
+"""2^-20 mm: a rest this close before the start of a section counts as a rest at the start."""
 
 
 @dataclass(frozen=True)
 class FileMark:
-    """A file of the job, with size and time by which a change shows."""
+    """A file of the job. A change shows in its size or time."""
 
     path: str
     size: int
