@@ -2,9 +2,9 @@
 """Equal sections of a job: what is fitted, planned and proved for one holds for all that are equal but for their place.
 
 Holes of one depth are drilled by equal sections, and so are moves between places of a grid. A section is equal to
-another one if its points, from the first one on, are within 2^-40 mm of the other's, with the same feeds, tolerance
-and angles. Its curve is the other's, moved; its program has the other's integers, moved. No rule of a program but the
-range of its points and the travel of the axes depends on the place, and these two are looked at.
+another one if its points, seen from the first one, are the other's when rounded to 2^-40 mm, with the same feeds,
+tolerance and angles. Its curve is the other's, moved; its program has the other's integers, moved. No rule of a
+program but the range of its points and the travel of the axes depends on the place, and these two are looked at.
 """
 
 from __future__ import annotations
@@ -34,6 +34,10 @@ _MOST_CHORDS = 2000
 
 _GRID = 2.0**40
 
+_REACH_MM = 8192.0
+"""Twice the range of coordinates in a program: with points farther from the first one there is no program, and their
+places on the grid would leave 64 bits at 2^23 mm."""
+
 
 @dataclass(eq=False)
 class SharedPrograms:
@@ -45,7 +49,7 @@ class SharedPrograms:
 
 @dataclass(frozen=True, eq=False)
 class KnownSection:
-    """A section that was fitted."""
+    """A section that was fitted, with the axes that turn along."""
 
     fitted: FittedPath
     shared: SharedPrograms
@@ -67,7 +71,9 @@ class EqualSections:
         return replace(known, fitted=_moved_path(known.fitted, section.reference))
 
     def add(self, section: Section, fitted: FittedPath) -> SharedPrograms:
-        """Keeps a section that has been fitted; returns what the ones equal to it will share with it."""
+        """Keeps a section that has been fitted, with the axes that turn along; returns what the ones equal to it will
+        share with it.
+        """
         shared, key = SharedPrograms(), _key(section)
         if key is not None:
             self._known[key] = KnownSection(fitted, shared)
@@ -77,13 +83,16 @@ class EqualSections:
 
 
 def _key(section: Section) -> bytes | None:
-    """Equal for sections that are equal; None: the section is too long to be compared."""
+    """The same bytes for sections that are equal; None: the section is too long, or too large, to be compared."""
     own = section.reference
     if own.count > _MOST_CHORDS:
         return None
+    from_first_mm = own.point - own.point[0]
+    if not (np.abs(from_first_mm) < _REACH_MM).all():
+        return None
     turn = b"" if own.turn_deg is None else own.turn_deg.tobytes()
     kind = repr((section.tolerance_mm, section.tied, section.stands_at, own.count, bool(turn)))
-    moved = np.rint((own.point - own.point[0]) * _GRID).astype(np.int64)
+    moved = np.rint(from_first_mm * _GRID).astype(np.int64)
     return b"".join(
         (kind.encode(), moved.tobytes(), own.feed_mm_s.tobytes(), own.sag_mm.tobytes(), turn)
     )

@@ -22,7 +22,7 @@ from .config.outputs import Outputs
 from .equal_sections import EqualSections, SharedPrograms, moved_program
 from .errors import InputError, PlanError
 from .events import Events, no_events
-from .feed import FeedPlan, FeedRequest, FeedZone, Limits
+from .feed import FeedPieces, FeedPlan, FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
 from .pipeline import THOROUGH_GAIN, Judged, Pipeline, program_limits
@@ -143,34 +143,44 @@ class SectionPipeline(Pipeline):
         """
         plan = super()._planned(limits)
         for reserve in _MORE_RESERVE:
-            if not self._without_override(plan):
+            if not self._without_override(plan)[1].any():
                 return plan
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
+        return self._passed_slowly(plan)
+
+    def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
+        again = super()._slower(plan, zones, why)
+        passed = self._passed_slowly(again)
+        if passed is again:
+            return again
+        return replace(passed, notes=(*passed.notes, again.notes[-1]))
+
+    def _passed_slowly(self, plan: FeedPlan) -> FeedPlan:
+        """The plan, with a lower feed where a piece leaves no headroom for a changing override."""
         for _ in range(_MOST_SLOWER):
-            slower = self._without_override(plan)
+            pieces, lacking = self._without_override(plan)
+            slower = pieces.slower_zones(lacking, _SLOWER, self._length_q40)
             if not slower:
                 break
             plan = super()._planned(replace(plan.limits, zones=(*plan.limits.zones, *slower)))
         return plan
 
-    def _without_override(self, plan: FeedPlan) -> list[FeedZone]:
-        """The pieces of a plan that leave no headroom for a changing override, with a lower feed: a bend of less than
-        a micrometre may be over between two places where limits are evaluated.
+    def _without_override(self, plan: FeedPlan) -> tuple[FeedPieces, NDArray[np.bool_]]:
+        """The pieces of a plan, and which of them leave no headroom for a changing override: a bend of less than a
+        micrometre may be over between two places where limits are evaluated.
         """
-        joints_q40 = quantise(self.curve, ()).start_q40
-        pieces = plan.pieces_over(int(joints_q40[-1]), joints_q40)
+        pieces = plan.pieces_over(self._length_q40, self._joints_q40)
         codes = np.minimum(pieces.override_rate_codes, pieces.override_second_codes)
-        ends_mm = np.append(pieces.start_q40, joints_q40[-1]).astype(np.float64) * 2.0**-40
-        seconds = pieces.duration_s
-        return [
-            FeedZone(low, high, max(_SLOWER * (high - low) / duration_s, LEAST_FEED_MM_S))
-            for low, high, duration_s, least in zip(
-                *(ends_mm[:-1].tolist(), ends_mm[1:].tolist(), seconds.tolist()),
-                codes.min(axis=1).tolist(),
-                strict=True,
-            )
-            if least == 0 and low < high
-        ]
+        return pieces, np.asarray(codes.min(axis=1) == 0)
+
+    @cached_property
+    def _joints_q40(self) -> Int:
+        """Joints of the curve in its program."""
+        return quantise(self.curve, ()).start_q40
+
+    @property
+    def _length_q40(self) -> int:
+        return int(self._joints_q40[-1])
 
     def _compiled_again(self, plan: FeedPlan) -> Compilation:
         return self._with_stops(plan, self.stop_terms)
@@ -510,6 +520,7 @@ class SectionMaker:
         limits = _motion_limits(self._moving(section))
         found = fit(section.reference, Tolerance(section.tolerance_mm, limits), section.tied)
         if isinstance(found, FittedPath):
+            found = self._turned(section, found)
             shared = SharedPrograms() if self.known is None else self.known.add(section, found)
             yield self._section(section, found, shared)
             return
@@ -583,7 +594,6 @@ class SectionMaker:
 
     def _section(self, section: Section, fitted: FittedPath, shared: SharedPrograms) -> JobSection:
         machine = self._moving(section)
-        fitted = self._turned(section, fitted)
         nominal, zones = _feeds(fitted)
         first = int(section.reference.line[0])
         nodes = np.asarray(fitted.curve.nodal_points)

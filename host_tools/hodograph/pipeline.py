@@ -33,6 +33,7 @@ from .feed import (
     ControllerLimits,
     FeedPlan,
     FeedRequest,
+    FeedZone,
     Limits,
     Peak,
     Plant,
@@ -447,20 +448,26 @@ class Pipeline:
         return replan_optimal if self.feed.optimal else replan
 
     def _compiled(self, plan: FeedPlan) -> Compilation:
-        """The program of a plan; of one made again where a fault stop would come too late. Raises LongStopError where
-        that helps nowhere.
+        """The program of a plan; of one made again where a fault stop would come too late. Raises PlanError where no
+        plan is in time.
         """
         try:
             return self._with_stops(plan, self.stop_terms)
         except LongStopError as error:
-            again = Replanning(
-                self._planned,
-                self._replan,
-                self._compiled_again,
-                self._searched,
-                self.machine.stop_time_ms * 1e-3,
-            )
-            return again.in_time(plan, error)
+            late = error
+        again = Replanning(
+            self._planned,
+            self._slower,
+            self._compiled_again,
+            self._searched,
+            self.machine.stop_time_ms * 1e-3,
+        )
+        with _named_by(f"{self.file.file}:"):
+            return again.in_time(plan, late)
+
+    def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
+        """The plan made again with further feed zones; why goes to its notes."""
+        return self._replan(plan, zones, why)
 
     def _compiled_again(self, plan: FeedPlan) -> Compilation:
         """The program of a plan made again. Only where few trials find stops that are hardly late, all are made."""

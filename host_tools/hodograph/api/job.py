@@ -57,7 +57,7 @@ class Section:
 
     @cached_property
     def plan(self) -> Plan:
-        """The feed by the feeds of the toolpath and the limits of the machine. Raises PlanError at first use."""
+        """The feed of the program, by the feeds of the toolpath and the limits of the machine. Raises PlanError."""
         return Plan(self.path, self.machine, self._section.pipeline)
 
     def program(self) -> Program:
@@ -152,7 +152,7 @@ class Job:
 
     @cached_property
     def duration_s(self) -> float:
-        """Time of all plans, without dwells. Raises PlanError."""
+        """Time of all programs, without dwells. Raises PlanError."""
         return math.fsum(section.plan.duration_s for section in self.sections)
 
     def simulate(self, kernel: Kernel | None = None) -> JobRun:

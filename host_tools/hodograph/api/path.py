@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 from os import PathLike
 from pathlib import Path as FilePath
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..config import PathFile, PathSpec, SpacePathSpec, load_path_file
 from ..errors import InputError
-from ..feed import AxisLimits, FeedRequest
+from ..feed import AxisLimits, FeedPlan, FeedRequest
 from ..feed import FeedZone as FileZone
 from ..feed import Limits as FileLimits
 from ..feed.kinematics import axis_motion
@@ -268,6 +269,10 @@ class Path:
 class Plan:
     """The feed along a path, from rest to rest; made by `Path.plan` or `load_plan`.
 
+    With a machine it is the feed of the program. Where a fault stop would take longer than `stop_time_ms` of the
+    machine, the path is planned again with more room for stops, and `notes` say so. The program is made at the first
+    use of a property or method, which raises PlanError where none is possible.
+
     >>> from hodograph import example_file, load_plan
     >>> plan = load_plan(example_file("alpha"))
     >>> motion = plan.sample(np.linspace(0.0, plan.duration_s, 101))
@@ -284,41 +289,46 @@ class Plan:
     def __post_init__(self) -> None:
         _ = self._pipeline.plan  # errors come here
 
+    @cached_property
+    def _feed(self) -> FeedPlan:
+        """The plan of the program; without a machine there is none."""
+        return self._pipeline.plan if self.machine is None else self._pipeline.compilation.plan
+
     @property
     def profile(self) -> str:
         """Name of the feed profile."""
-        return self._pipeline.plan.profile
+        return self._feed.profile
 
     @property
     def duration_s(self) -> float:
         """Time of the whole."""
-        return self._pipeline.plan.duration_s
+        return self._feed.duration_s
 
     @property
     def feed_mm_s(self) -> float:
         """Greatest feed."""
-        return self._pipeline.plan.feed_mm_s
+        return self._feed.feed_mm_s
 
     @property
     def acceleration_mm_s2(self) -> float:
         """Greatest acceleration along the path."""
-        return self._pipeline.plan.peak_acceleration_mm_s2
+        return self._feed.peak_acceleration_mm_s2
 
     @property
     def jerk_mm_s3(self) -> float:
         """Greatest jerk along the path."""
-        return self._pipeline.plan.peak_jerk_mm_s3
+        return self._feed.peak_jerk_mm_s3
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know, one line each: what lowered the feed, which limit does nothing."""
-        return self._pipeline.notes(self._pipeline.plan)
+        return self._pipeline.notes(self._feed)
 
     def usage(self) -> dict[str, LimitUsage]:
         """Every limited quantity where it comes nearest to its limit, by name ("feed_mm_s", "axis.jerk_mm_s3.x")."""
         return {
             name: LimitUsage(peak.value, peak.limit.given, peak.s_mm)
-            for name, peak in self._pipeline.peaks.items()
+            for name, peak in self._pipeline.peaks_of(self._feed).items()
         }
 
     def sample(self, t_s: ArrayLike) -> PathMotion:
@@ -327,7 +337,7 @@ class Plan:
         slack = 1e-12 * self.duration_s
         if not ((t >= -slack) & (t <= self.duration_s + slack)).all():
             raise InputError(f"sample: times must be from 0 to {self.duration_s:.9g} s")
-        curve, feed = self._pipeline.curve, self._pipeline.plan
+        curve, feed = self._pipeline.curve, self._feed
         s = np.clip(feed.arc_length(t), 0.0, curve.length_mm)
         along = feed.feed(t), feed.acceleration(t), feed.jerk(t)
         axes = (np.moveaxis(each, 0, -1) for each in axis_motion(frames(curve, s), *along))
@@ -335,9 +345,6 @@ class Plan:
 
     def program(self) -> Program:
         """The program for the plan's machine, as its controller accepts it.
-
-        Where a fault stop would take longer than `stop_time_ms` of the machine, the path is planned again with more
-        room for stops: the program then takes longer than the plan.
 
         Raises InputError without a machine, PlanError where a limit of the controller is not kept.
         """

@@ -10,9 +10,12 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from .limits import FeedZone
 from .override_levels import FACTOR_ONE_Q14, FULL, Codes, rates_per_s, seconds_per_s2
+from .request import LEAST_FEED_MM_S
 
 Real = NDArray[np.float64]
+Bool = NDArray[np.bool_]
 Int = NDArray[np.int64]
 Unsigned = NDArray[np.uint32]
 
@@ -91,6 +94,19 @@ class FeedPieces:
     def total_q32_s(self) -> int:
         """Duration of the program, exactly."""
         return int(self.duration_q32_s.sum(dtype=np.int64))
+
+    def slower_zones(self, chosen: Bool, share: float, length_q40: int) -> list[FeedZone]:
+        """Feed zones over the chosen (M,) pieces of a path of this length. Each has a share, below 1, of the mean feed
+        of its piece, but LEAST_FEED_MM_S at least. Pieces that are no faster than that, or have no length, have none.
+        """
+        ends_mm = np.ldexp(np.append(self.start_q40, length_q40).astype(np.float64), -40)
+        length_mm = np.diff(ends_mm)
+        slower = np.maximum(share * length_mm / self.duration_s, LEAST_FEED_MM_S)
+        faster = length_mm > LEAST_FEED_MM_S * self.duration_s
+        return [
+            FeedZone(float(ends_mm[k]), float(ends_mm[k + 1]), float(slower[k]))
+            for k in np.flatnonzero(chosen & faster)
+        ]
 
 
 @dataclass(frozen=True, eq=False)

@@ -145,7 +145,10 @@ class NativeProgram:
         return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
 
     def accept_as(self, other: NativeProgram) -> None:
-        """Counts as accepted if `other` does, which has the same integers at another place within the same range."""
+        """Counts as accepted if `other` does. The caller ensures that `other` has the same integers but for a shift of
+        all points, and that the points and boxes of this program are within range and travel
+        (`program.check.leaves_range`): no other rule depends on the place.
+        """
         self._accepted = other._accepted
 
     def require(self) -> None:

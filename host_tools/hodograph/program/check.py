@@ -114,6 +114,9 @@ SLOPE = 2.0**-20
 CLOSE_Q40 = 1 << 16
 TRAVEL_SLACK_Q40 = 2.0**16
 """A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
+BOX_ROUNDING_Q40 = 8.0
+"""More than the boxes here and in the controller differ by: each of five steps is rounded here, by 1/2 at most, and the
+controller's sum by less than 1."""
 
 _FAR_Q40 = 2.0**50
 """No segment is as long: differences above are not looked into, so that nothing overflows."""
@@ -270,15 +273,18 @@ def boxes_q40(program: Program) -> tuple[Real, Real]:
 
 
 def leaves_range(program: Program, limits: ProgramLimits) -> bool:
-    """Whether a point is beyond the format, or a segment may leave the travel."""
-    return bool(_beyond(program.point_q40, POINT_LIMIT_Q40).any() or _leaves(program, limits).any())
+    """Whether a point is beyond the format, or a segment may leave the travel by the boxes of the controller, which are
+    within BOX_ROUNDING_Q40 of those here.
+    """
+    outside = _leaves(program, limits, TRAVEL_SLACK_Q40 - BOX_ROUNDING_Q40)
+    return bool(_beyond(program.point_q40, POINT_LIMIT_Q40).any() or outside.any())
 
 
-def _leaves(program: Program, limits: ProgramLimits) -> Bool:
+def _leaves(program: Program, limits: ProgramLimits, slack_q40: float = TRAVEL_SLACK_Q40) -> Bool:
     """The box is not within the travel."""
     lowest, highest = boxes_q40(program)
-    low = np.array(limits.min_q40_mm, dtype=np.float64) - TRAVEL_SLACK_Q40
-    high = np.array(limits.max_q40_mm, dtype=np.float64) + TRAVEL_SLACK_Q40
+    low = np.array(limits.min_q40_mm, dtype=np.float64) - slack_q40
+    high = np.array(limits.max_q40_mm, dtype=np.float64) + slack_q40
     return np.asarray(((lowest < low) | (highest > high)).any(axis=1))
 
 

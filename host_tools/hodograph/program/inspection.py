@@ -13,6 +13,7 @@ from ..feed.pieces import derivative_peaks
 from ..names import AXES
 from .geometry import arc_to_q40, segment_arcs
 from .image import (
+    COMPACT_PIECE_BYTES,
     COMPACT_PIECE_SIZE,
     COMPACT_STOP_SIZE,
     PIECE_SIZE,
@@ -103,7 +104,7 @@ def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
     """
     size = (
         segment_size(program.axis_count, compact=True),
-        COMPACT_PIECE_SIZE + COMPACT_STOP_SIZE,
+        COMPACT_PIECE_BYTES,
     )
     starts = np.append(program.pieces.start_q40, program.length_q40)
     times = np.concatenate((np.zeros(1), np.cumsum(program.pieces.duration_q32_s) * 2.0**-32))

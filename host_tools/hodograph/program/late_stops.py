@@ -27,15 +27,18 @@ LEAST_STEP, GREATEST_STEP = 0.3, 0.95
 MOST_STEPS = 8
 """How many times the feed is lowered."""
 
+FAILED_STEP = 0.7
+"""One more factor of the feed where no program can be made of a plan for another reason than a late stop."""
+
 
 @dataclass(frozen=True)
 class Replanning:
     """How a path is planned again, and how a program is made of a plan.
 
-    plan         a plan inside limits
-    slower       a plan made again with feed zones; the text, why, goes to its notes
-    compile      the program of a plan; raises LongStopError
-    search       the program of a plan with few trials and fault stops only; raises LongStopError
+    plan         a plan inside limits; raises PlanError
+    slower       a plan made again with feed zones; the text, why, goes to its notes; raises PlanError
+    compile      the program of a plan; raises LongStopError, and another PlanError
+    search       the program of a plan with few trials and fault stops only; raises as `compile` does
     stop_time_s  greatest bound of a fault stop
     """
 
@@ -46,8 +49,8 @@ class Replanning:
     stop_time_s: float
 
     def in_time(self, plan: FeedPlan, late: LongStopError) -> Compilation:
-        """The program of the first of some plans whose fault stops are in time. Raises `late`, that of `plan`, where
-        none is found.
+        """The program of the first of some plans whose fault stops are in time; `late` is the refusal of `plan`. A plan
+        that is not found, or of which no program can be made, is passed over. Raises PlanError where none is in time.
         """
         found = None
         if plan.request.optimal:
@@ -55,7 +58,9 @@ class Replanning:
             found = None if found is None else _noted(found, late)
         found = found or self._with_less_feed(plan, late)
         if found is None:
-            raise late
+            raise PlanError(
+                f"stops: {late.reason}, and no plan was found with shorter stops: {late.remedy}"
+            )
         return found
 
     def _with_reserve(self, limits: Limits, late: LongStopError) -> Compilation | None:
@@ -67,66 +72,65 @@ class Replanning:
         for share in EVERYWHERE:
             if whole and late_too_often(program, self.stop_time_s):
                 break
-            lower = self.plan(replace(limits, machine=limits.machine.scaled(1.0 - share)))
             try:
+                lower = self.plan(replace(limits, machine=limits.machine.scaled(1.0 - share)))
                 lowered = self.search(lower).program
                 whole.append(lower)
             except LongStopError as error:
                 lowered = error.program
                 if late_too_often(lowered, self.stop_time_s):
                     continue
+            except PlanError:
+                continue
             for spread in SPREADS:
                 more = zones_at_places(program, lowered, self.stop_time_s, share, spread)
                 if not more:
                     break
-                zones += tuple(more)
+                wider = (*zones, *more)
                 try:
-                    return self.compile(self.plan(replace(limits, reserve_zones=zones)))
+                    return self.compile(self.plan(replace(limits, reserve_zones=wider)))
                 except LongStopError as error:
-                    program = error.program
+                    program, zones = error.program, wider
+                except PlanError:  # without these zones
+                    continue
         for plan in whole:
-            with suppress(LongStopError):
+            with suppress(PlanError):
                 return self.compile(plan)
         return None
 
     def _with_less_feed(self, plan: FeedPlan, late: LongStopError) -> Compilation | None:
         """The program of a plan whose feed is lower where fault stops are late; None: none is in time."""
-        error = late
+        program, share = late.program, 1.0
         for _ in range(MOST_STEPS):
-            step = self.stop_time_s / error.program.stops.worst(FAULT).time_s
-            step = min(max(step, LEAST_STEP), GREATEST_STEP)
-            zones = _late_zones(error.program, self.stop_time_s, step)
-            if not plan.request.optimal:
-                zones = [FeedZone(0.0, plan.length_mm, step * plan.feed_mm_s)]
-            if min(zone.feed_mm_s for zone in zones) < LEAST_FEED_MM_S:
+            zones = self._slower_zones(plan, program, share)
+            if not zones:
                 break
             try:
-                plan = self.slower(plan, zones, late.reason)
-            except PlanError:  # the planner finds nothing at so low a feed
-                break
+                slower = self.slower(plan, zones, late.reason)
+            except PlanError:
+                share *= FAILED_STEP
+                continue
             try:
-                self.search(plan)
-                return self.compile(plan)
+                self.search(slower)
+                return self.compile(slower)
             except LongStopError as again:
-                error = again
+                plan, program, share = slower, again.program, 1.0
+            except PlanError:
+                share *= FAILED_STEP
         return None
 
-
-def _late_zones(program: Program, stop_time_s: float, share: float) -> list[FeedZone]:
-    """The feed pieces whose fault stops are late, each with this share of its mean feed."""
-    ends_mm = [*program.piece_starts_mm.tolist(), program.length_q40 * 2.0**-40]
-    late = program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s
-    return [
-        FeedZone(low, high, share * (high - low) / duration_s)
-        for low, high, duration_s, is_late in zip(
-            ends_mm[:-1],
-            ends_mm[1:],
-            program.pieces.duration_s.tolist(),
-            late.tolist(),
-            strict=True,
-        )
-        if is_late and low < high
-    ]
+    def _slower_zones(self, plan: FeedPlan, program: Program, share: float) -> list[FeedZone]:
+        """Feed zones for the next plan, with lower feeds than this program of `plan` has; none: no feed may be lower.
+        `share`: a further factor of their feeds.
+        """
+        step = self.stop_time_s / program.stops.worst(FAULT).time_s
+        step = share * min(max(step, LEAST_STEP), GREATEST_STEP)
+        if plan.request.optimal:
+            late = program.stops.bound_us[:, FAULT] * 1e-6 > self.stop_time_s
+            return program.pieces.slower_zones(late, step, program.length_q40)
+        feed_mm_s = max(step * plan.feed_mm_s, LEAST_FEED_MM_S)
+        whole = FeedZone(0.0, plan.length_mm, feed_mm_s)
+        return [whole] if feed_mm_s < plan.feed_mm_s else []
 
 
 def _noted(made: Compilation, late: LongStopError) -> Compilation:

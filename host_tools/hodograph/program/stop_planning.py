@@ -53,6 +53,8 @@ class LongStopError(PlanError):
     late_by  its time over the limit
     """
 
+    remedy = "lower the feed there, or raise stop_time_ms or the machine's acceleration and jerk"
+
     def __init__(self, program: Program, stop_time_ms: int) -> None:
         worst = program.stops.worst(FAULT)
         place_mm = float(program.piece_starts_mm[worst.piece])
@@ -62,10 +64,7 @@ class LongStopError(PlanError):
             f"a fault stop at arc length {place_mm:.6g} mm (piece {worst.piece}) may take {worst.time_s:.3g} s, "
             f"longer than stop_time_ms = {stop_time_ms} of the machine file"
         )
-        super().__init__(
-            f"stops: {self.reason}, and no plan was found with shorter stops: lower the feed there, or raise "
-            "stop_time_ms or the machine's acceleration and jerk"
-        )
+        super().__init__(f"stops: {self.reason}: {self.remedy}")
 
 
 @dataclass(frozen=True)

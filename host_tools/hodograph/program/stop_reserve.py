@@ -37,7 +37,7 @@ _USED_SHARE = 0.96
 _OWN_SHARE = 0.4
 """Of that time: places that need no zone are taken if they are so far from the next one."""
 
-_HAIR_S = 1e-4
+_SAME_S = 1e-4
 """Places that are so close are the same one."""
 
 _MOST_LATE = 0.3
@@ -107,7 +107,7 @@ def zones_at_places(
             next_s, bound_s = float(own.begin_s[k]), float(own.bound_s[k])
             continue
         k = int(np.searchsorted(end_s, next_s - room_s))
-        if k < end_s.size and begin_s[k] < next_s - _HAIR_S:
+        if k < end_s.size and begin_s[k] < next_s - _SAME_S:
             next_s, bound_s = float(begin_s[k]), float(other.bound_s[k])
             zones.append(_zone_around(lowered, other, k, share, spread))
             continue
@@ -115,7 +115,7 @@ def zones_at_places(
         near = [
             (float(at_s[n - 1]), float(places.bound_s[n - 1]))
             for at_s, places in ((own.begin_s, own), (begin_s, other))
-            if (n := int(np.searchsorted(at_s, next_s - _HAIR_S))) > 0
+            if (n := int(np.searchsorted(at_s, next_s - _SAME_S))) > 0
         ]
         if not near:
             break

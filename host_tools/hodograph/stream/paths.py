@@ -137,6 +137,7 @@ class PathsJob:
         job: int,
         last: bool,
     ) -> PathChunk:
+        _ = pipeline.accepted  # raises where the controller would refuse it
         program = pipeline.program
         rest = Rest(listed.dwell_ms, listed.stop == "program", listed.stop == "optional")
         header = ChunkHeader(

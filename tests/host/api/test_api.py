@@ -77,6 +77,28 @@ def test_programs_of_files_are_those_of_compile(name: str) -> None:
     assert hg.load_plan(file).program().image == load_pipeline(file).image
 
 
+def test_a_plan_on_a_machine_is_that_of_the_program(tmp_path: Path, mill: hg.Machine) -> None:
+    """A path that is planned again, since its fault stops would be late."""
+    text = (ROOT / "examples" / "machines" / "mill.toml").read_text()
+    text = text.replace('"../drives', f'"{ROOT}/examples/drives').replace(
+        "stop_time_ms = 500", "stop_time_ms = 120"
+    )
+    file = tmp_path / "mill.toml"
+    file.write_text(text)
+    quick = hg.Machine.load(file)
+    points = [[0, 0, 0], [20, 0, 0], [20, 8, 0]]
+    polygon = hg.Path.through(points)
+    limits = hg.Limits(feed_mm_s=100)
+    usual, again = (polygon.plan(limits, machine=on) for on in (mill, quick))
+    assert again.duration_s > 1.05 * usual.duration_s
+    assert "stop_time_ms = 120" in again.notes[-1]
+    assert not any("stop_time_ms" in line for line in usual.notes)
+    end = again.sample(again.duration_s)
+    assert end.position_mm == pytest.approx([20, 8, 0], abs=1e-6)
+    assert again.usage().keys() == usual.usage().keys()
+    assert again.program().duration_s == pytest.approx(again.duration_s, abs=1e-6)
+
+
 def test_a_path_from_points_is_that_of_a_file(tmp_path: Path, machine: hg.Machine) -> None:
     """Every key of the file has its parameter."""
     text = f"""

@@ -11,8 +11,13 @@ import pytest
 from hodograph.cli.main import main
 from hodograph.config import load_machine, load_path_file
 from hodograph.errors import PlanError
+from hodograph.feed.request import LEAST_FEED_MM_S
+from hodograph.job import SectionPipeline, load_job
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import Program, stop_reserve
+from hodograph.program.compiler import Compilation
+from hodograph.program.late_stops import MOST_STEPS, Replanning
+from hodograph.program.stop_planning import LongStopError
 from hodograph.program.stop_reserve import StopPlaces, zones_at_places
 from hodograph.program.stops import FAULT
 
@@ -93,6 +98,122 @@ def test_where_no_plan_helps_the_refusal_has_the_place_and_what_to_do() -> None:
     assert "stop_time_ms = 3" in text
     assert "no plan was found" in text
     assert "raise stop_time_ms" in text
+
+
+def corner(folder: Path, stop_time_ms: int) -> SectionPipeline:
+    """A toolpath around one corner, planned for least time."""
+    file = folder / "corner.ngc"
+    file.write_text("G21 F6000\nG1 X20 Y0\nG1 X20 Y8\nM2\n", encoding="utf-8")
+    mill = load_machine(EXAMPLES / "machines/mill.toml")
+    return load_job(file, replace(mill, stop_time_ms=stop_time_ms)).only_section("test").pipeline
+
+
+@pytest.mark.parametrize("stop_time_ms", [100, 60])
+def test_a_section_of_a_toolpath_is_planned_with_less_feed(
+    tmp_path: Path, stop_time_ms: int
+) -> None:
+    made = corner(tmp_path, stop_time_ms)
+    assert made.program.stops.worst(FAULT).time_s <= stop_time_ms * 1e-3
+    assert made.accepted.check() is None
+    (note,) = made.compilation.notes
+    assert note.startswith("feed capped: a fault stop at arc length 5.88")
+    assert made.compilation.plan.feed_mm_s < 0.5 * made.plan.feed_mm_s
+
+
+def test_an_optimal_plan_that_no_plan_helps_is_refused(tmp_path: Path) -> None:
+    made = corner(tmp_path, 2)
+    with pytest.raises(PlanError, match=r"corner.ngc:2: stops: .*, and no plan was found") as found:
+        _ = made.program
+    assert str(found.value).count("corner.ngc") == 1
+    assert not isinstance(found.value, LongStopError)
+
+
+def test_only_what_was_planned_again_is_said_to_be(tmp_path: Path) -> None:
+    """Direct callers, such as `goto`, plan once."""
+    program = corner(tmp_path, 500).program
+    assert str(LongStopError(program, 3)).startswith("stops: a fault stop at arc length ")
+    assert "no plan was found" not in str(LongStopError(program, 3))
+    assert "lower the feed there, or raise stop_time_ms" in str(LongStopError(program, 3))
+
+
+class Attempts:
+    """The callables of a pipeline, of which one fails at first with another refusal than a late stop."""
+
+    def __init__(self, made: Pipeline, fails: str, times: int = 1) -> None:
+        self.made, self.fails, self.left = made, fails, times
+        self.calls: list[str] = []
+
+    def of(self, name: str) -> object:
+        """A callable of the pipeline."""
+        own = {
+            "plan": self.made._planned,
+            "slower": self.made._slower,
+            "compile": self.made._compiled_again,
+            "search": self.made._searched,
+        }[name]
+
+        def called(*given: object) -> object:
+            self.calls.append(name)
+            if name == self.fails and self.left:
+                self.left -= 1
+                raise PlanError("program: no headroom")
+            return own(*given)
+
+        return called
+
+    def in_time(self, stop_time_ms: int) -> Compilation:
+        """The program of a plan made again."""
+        plan = self.made.plan
+        with pytest.raises(LongStopError) as late:
+            self.made._with_stops(plan, self.made.stop_terms)
+        each = [self.of(name) for name in ("plan", "slower", "compile", "search")]
+        return Replanning(*each, stop_time_ms * 1e-3).in_time(plan, late.value)
+
+
+@pytest.mark.parametrize("fails", ["plan", "search", "compile"])
+def test_a_reserve_of_which_no_program_can_be_made_is_passed_over(
+    tmp_path: Path, fails: str
+) -> None:
+    attempts = Attempts(corner(tmp_path, 120), fails)
+    found = attempts.in_time(120)
+    assert found.program.stops.worst(FAULT).time_s <= 0.12
+    assert "planned again with more room" in found.notes[-1]
+    assert "slower" not in attempts.calls
+
+
+@pytest.mark.parametrize("fails", ["slower", "search", "compile"])
+def test_a_feed_of_which_no_program_can_be_made_is_passed_over(fails: str) -> None:
+    attempts = Attempts(on_machine("alpha", 72), fails)
+    found = attempts.in_time(72)
+    assert found.program.stops.worst(FAULT).time_s <= 0.072
+    assert attempts.calls.count(fails) > 1
+
+
+@pytest.mark.parametrize("name", ["alpha", "alpha_optimal"])
+def test_where_all_attempts_fail_the_first_reason_is_said(name: str) -> None:
+    attempts = Attempts(on_machine(name, 60), "search", 10**6)
+    with pytest.raises(PlanError, match=r"fault stop at arc length .*, and no plan was found"):
+        attempts.in_time(60)
+    assert attempts.calls.count("slower") == MOST_STEPS
+
+
+def test_the_feed_is_not_lowered_below_the_least_one() -> None:
+    """A piece beside standstill has no feed zone below it, and keeps none of the others from one."""
+    program = on_machine("alpha_optimal", 250).program
+    pieces, chosen = program.pieces, np.ones(program.piece_count, dtype=np.bool_)
+    mean = np.diff(np.append(pieces.start_q40, program.length_q40)) * 2.0**-40 / pieces.duration_s
+    zones = pieces.slower_zones(chosen, 0.5, program.length_q40)
+    assert len(zones) == np.count_nonzero(mean > LEAST_FEED_MM_S)
+    assert [zone.feed_mm_s for zone in zones] == pytest.approx((0.5 * mean).tolist())
+    zones = pieces.slower_zones(chosen, 1e-9, program.length_q40)
+    assert {zone.feed_mm_s for zone in zones} == {LEAST_FEED_MM_S}
+    duration_q32_s = pieces.duration_q32_s.copy()
+    duration_q32_s[0] = 1 << 53
+    still = replace(pieces, duration_q32_s=duration_q32_s)
+    assert len(still.slower_zones(chosen, 0.5, program.length_q40)) == len(zones) - 1
+    assert not still.slower_zones(np.arange(program.piece_count) == 0, 0.5, program.length_q40)
+    none_left = replace(pieces, start_q40=np.full_like(pieces.start_q40, program.length_q40))
+    assert not none_left.slower_zones(chosen, 0.5, program.length_q40)
 
 
 def test_commands_say_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hodograph import pipeline
 from hodograph.cli.main import main
 from hodograph.cli.stream_command import has_paths
 from hodograph.config import Machine, load_machine, load_path_file, load_paths
 from hodograph.errors import InputError, PlanError
-from hodograph.native.program import NativeLimits
+from hodograph.native.program import NativeFault, NativeLimits
 from hodograph.pipeline import program_limits
 from hodograph.program.inspection import end_point_q40
 from hodograph.stream.chunk import Chunk, Rest
@@ -222,6 +223,16 @@ def test_a_path_begins_where_the_one_before_ends(tmp_path: Path, machine: Machin
 def test_a_path_that_is_too_long(machine: Machine) -> None:
     with pytest.raises(PlanError, match=r"path 1 takes .* divide the path"):
         list(PathsJob(PATHS, machine, 1, 4000, True).chunks(0, 0))
+
+
+def test_a_path_that_the_controller_would_refuse_is_not_sent(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fault = NativeFault(-61, 0, "an axis limit is not proved to be kept")
+    judge = pipeline._judge
+    monkeypatch.setattr(pipeline, "_judge", lambda *given: replace(judge(*given), fault=fault))
+    with pytest.raises(PlanError, match=r"paths.toml.*the controller would refuse the program: an"):
+        next(PathsJob(PATHS, machine, 1, CHUNK_BYTES, True).chunks(0, 0))
 
 
 def test_other_commands_name_the_way(capsys: pytest.CaptureFixture[str]) -> None:
