@@ -162,7 +162,7 @@ struct layout {
     uint32_t pieces_at, piece_size;
 };
 
-static struct layout records_of_next(void)
+static struct layout layout_of_next(void)
 {
     const struct program_header *h = &chunks[1].program.header;
     const int compact = (h->flags & PROGRAM_FLAG_COMPACT) != 0;
