@@ -11,12 +11,11 @@
 #include "core/little_endian.h"
 #include "core/override_ramp.h"
 #include "core/program_check.h"
-#include "core/qmath.h"
 
 #define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */
 #define CRC_FROM      16u
 #define ARC_LIMIT_Q40 ((int64_t)1 << 62)
-#define MEETS_Q40  ((int64_t)1 << 16) /* 2^-24 mm: how far an end may be from the start behind it */
+#define MEETS_Q40 ((uint64_t)1 << 16) /* 2^-24 mm: how far an end may be from the start behind it */
 #define REST_FLAGS (CHUNK_REST_STOP | CHUNK_REST_OPTIONAL)
 #define FLAGS      (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST | CHUNK_FLAG_JOINED)
 
@@ -212,9 +211,12 @@ static int check_events(const struct chunk *next, const struct chunk *previous, 
 
 /* --- One that begins at rest --- */
 
+/* The start is not checked yet, so it may be any number: the difference is one of unsigned numbers, which may wrap. An end
+ * has a magnitude below 2^62, so a difference that wraps is far from 0. */
 static int meets(int64_t start_q40, int64_t end_q40)
 {
-    return qmath_magnitude(start_q40 - end_q40) <= MEETS_Q40;
+    const uint64_t off_q40 = (uint64_t)start_q40 - (uint64_t)end_q40;
+    return off_q40 + MEETS_Q40 <= 2u * MEETS_Q40;
 }
 
 /* Whether it begins at the point where its predecessor ends. */

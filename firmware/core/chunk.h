@@ -4,8 +4,8 @@
  *
  * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside
  * the limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before
- * the joint, where that tail begins, bit for bit, and goes on from there. The controller takes it over while the motion
- * is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
+ * the joint, where that tail begins, with the same numbers, and goes on from there. The controller takes it over while
+ * the motion is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
  * rests on the path. Events are shared like segments: both chunks have those up to the end of the predecessor, so that none
  * acts twice or is left out, whichever chunk the motion passes it with.
  *

@@ -4,9 +4,11 @@
 #include "hub/hub.h"
 
 #include <errno.h>
+#include <fcntl.h>
 #include <poll.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/time.h>
@@ -57,28 +59,66 @@ static bool is_left_over(const char *path, const struct stat *found)
     return refused;
 }
 
-/* The path is there when it is served, not before. */
-static int listen_at(const char *path)
+/* Hubs that start in one folder take turns, so that no two serve one path. Gives what to close when the turn is over, or a
+ * negative errno. The turn of a killed process is over, too. */
+static int take_turn(const char *path)
 {
-    struct sockaddr_un address = {.sun_family = AF_UNIX};
-    struct stat found;
-    const int length = snprintf(address.sun_path, sizeof address.sun_path, "%s.new", path);
-    if (length < 0 || (size_t)length >= sizeof address.sun_path) {
-        return -ENAMETOOLONG;
+    char folder[sizeof((struct sockaddr_un *)NULL)->sun_path];
+    (void)snprintf(folder, sizeof folder, "%s", path);
+    char *slash = strrchr(folder, '/');
+    if (slash == NULL) {
+        (void)snprintf(folder, sizeof folder, ".");
+    } else {
+        slash[slash == folder ? 1 : 0] = '\0';
     }
+    const int turn = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (turn < 0 || flock(turn, LOCK_EX) == 0) {
+        return turn < 0 ? -errno : turn;
+    }
+    const int error = -errno;
+    (void)close(turn);
+    return error;
+}
+
+/* The socket is served before it gets its path: until then it has another one, `own`. */
+static int serve(int fd, const struct sockaddr_un *own, const char *path)
+{
+    struct stat found;
     if (lstat(path, &found) == 0 && !is_left_over(path, &found)) {
         return -EADDRINUSE;
     }
-    const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-    if (fd >= 0 && bind(fd, (const struct sockaddr *)&address, sizeof address) == 0 &&
-        listen(fd, (int)HUB_CONNECTIONS) == 0 && rename(address.sun_path, path) == 0) {
-        return fd;
+    if (lstat(own->sun_path, &found) == 0 && is_left_over(own->sun_path, &found)) {
+        (void)unlink(own->sun_path); /* of a hub that was killed here */
+    }
+    if (bind(fd, (const struct sockaddr *)own, sizeof *own) != 0) {
+        return -errno;
+    }
+    if (listen(fd, (int)HUB_CONNECTIONS) == 0 && rename(own->sun_path, path) == 0) {
+        return 0;
     }
     const int error = -errno;
-    if (fd >= 0) {
+    (void)unlink(own->sun_path);
+    return error;
+}
+
+static int listen_at(const char *path)
+{
+    struct sockaddr_un own = {.sun_family = AF_UNIX};
+    const int length = snprintf(own.sun_path, sizeof own.sun_path, "%s.new", path);
+    if (length < 0 || (size_t)length >= sizeof own.sun_path) {
+        return -ENAMETOOLONG;
+    }
+    const int turn = take_turn(path);
+    if (turn < 0) {
+        return turn;
+    }
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    const int error = fd < 0 ? -errno : serve(fd, &own, path);
+    (void)close(turn);
+    if (error != 0 && fd >= 0) {
         (void)close(fd);
     }
-    return error;
+    return error != 0 ? error : fd;
 }
 
 int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,

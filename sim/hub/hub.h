@@ -95,8 +95,9 @@ struct hub {
     uint64_t lost;                  /* frames that found no room */
 };
 
-/* Serves a bus at each of these paths, which are made and must not be there. 0, or a negative errno with the index of the path that
- * failed in `*failed`. */
+/* Serves a bus at each of these paths, which it makes. A socket that nobody serves, left by a hub that was killed, is replaced. 0,
+ * or a negative errno with the index of the path that failed in `*failed`: -EADDRINUSE where a hub serves the path, or where
+ * it is something else than a socket. */
 int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,
              size_t *failed);
 

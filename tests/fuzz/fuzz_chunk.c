@@ -5,7 +5,8 @@
  * jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes longer than
  * its deadline.
  *
- * Input: which job, 16 commands (ticks to wait, command), the ticks from which each chunk is there, then changes.
+ * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk is there,
+ * then changes.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -18,6 +19,7 @@
 #include "golden.h"
 
 #define JOBS        7u /* in the plane, one of them with events; in space; with six axes */
+#define FORM_COUNT  8u
 #define WITH_EVENTS 4u /* the first job that has events, as all after it */
 #define EVENTS      40u
 #define COMMANDS    16u
@@ -30,9 +32,16 @@
 #define BACK_MM 0.0002 /* a feed may run back by 2^-14 mm, and the next setpoint come from there */
 #define Q40     1099511627776.0
 
+/* In a form, chunk i is compact where bit i of its mask is set and its numbers fit. */
+static const struct form {
+    uint32_t compact;
+    int at_rest; /* two chunks, the second at rest where the first ends */
+} FORMS[FORM_COUNT] = {{0u, 0}, {UINT32_MAX, 0}, {0x55555555u, 0}, {0xAAAAAAAAu, 0},
+                       {0u, 1}, {UINT32_MAX, 1}, {1u, 1},          {2u, 1}};
+
 static struct job {
     struct override_program whole;
-    struct chunked cuts;
+    struct chunked cuts[FORM_COUNT];
 } jobs[JOBS];
 
 /* As a job comes: its chunks with the changes of the input. */
@@ -56,21 +65,39 @@ struct run {
     unsigned known;
 };
 
+static void make_form(struct chunked *out, const struct chunked *wide, const struct form *form)
+{
+    chunked_copy(out, wide);
+    if (form->at_rest != 0) {
+        chunked_make_rest(out);
+    }
+    for (uint32_t i = 0; i < out->count; i++) {
+        if ((form->compact >> i & 1u) != 0u) {
+            (void)chunked_make_compact(out, i);
+        }
+    }
+}
+
 static void make_jobs(void)
 {
     static const char *const names[JOBS] = {
         "alpha_minimax.hdgp",     "line.hdgp",   "heart_minimax.hdgp", "alpha_exponential.hdgp",
         "alpha_exponential.hdgp", "space3.hdgp", "space6.hdgp"};
     uint64_t random = 5;
-    for (unsigned i = 0; i < JOBS && jobs[JOBS - 1u].cuts.count == 0u; i++) {
+    for (unsigned i = 0; i < JOBS && jobs[JOBS - 1u].cuts[0].count == 0u; i++) {
+        struct chunked wide;
         override_program_golden(&jobs[i].whole, names[i]);
         chunked_refine(&jobs[i].whole, 0.03);
         override_program_limits(&jobs[i].whole, &random);
         if (i >= WITH_EVENTS) {
             chunked_add_events(&jobs[i].whole, EVENTS, &random);
         }
-        while (chunked_random(&jobs[i].cuts, &jobs[i].whole, &random) == 0) {
+        while (chunked_random(&wide, &jobs[i].whole, &random) == 0) {
         }
+        for (size_t k = 0; k < FORM_COUNT; k++) {
+            make_form(&jobs[i].cuts[k], &wide, &FORMS[k]);
+        }
+        chunked_close(&wide);
     }
 }
 
@@ -272,8 +299,10 @@ static void harness(struct fuzz_input *in)
     uint8_t commands[2 * COMMANDS];
     make_jobs();
     memset(&run, 0, sizeof run);
-    const struct job *job = &jobs[fuzz_byte(in) % JOBS];
-    const uint32_t count = job->cuts.count;
+    const uint8_t which = fuzz_byte(in);
+    const struct job *job = &jobs[which % JOBS];
+    const struct chunked *cuts = &job->cuts[which / JOBS % FORM_COUNT];
+    const uint32_t count = cuts->count;
     const struct program_limits limits = limits_of(job);
     FUZZ_CHECK(count > 0u);
     fuzz_bytes(in, commands, sizeof commands);
@@ -281,10 +310,10 @@ static void harness(struct fuzz_input *in)
         struct part *part = &run.parts[i];
         const uint8_t from = fuzz_byte(in);
         part->from_tick = from == NEVER ? UINT32_MAX : 8u * from;
-        part->size = job->cuts.sizes[i];
+        part->size = cuts->sizes[i];
         part->bytes = malloc(part->size);
         FUZZ_CHECK(part->bytes != NULL);
-        memcpy(part->bytes, job->cuts.bytes[i], part->size);
+        memcpy(part->bytes, cuts->bytes[i], part->size);
     }
     while (fuzz_left(in)) {
         change(&run, count, in);

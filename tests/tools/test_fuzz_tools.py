@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -12,10 +13,13 @@ import pytest
 
 from fuzzing import harnesses
 from fuzzing.child import run_case
-from fuzzing.targets import TARGETS, Finding, Outcome, Toml, loaded
+from fuzzing.targets import TARGETS, Finding, Outcome, Toml, is_rounding, loaded
 from fuzzing.toml_text import UNKNOWN, mutate, places, plain, spelled
 from hodograph.config.table import Table, read_toml
 from hodograph.errors import InputError
+from hodograph.native.program import NativeProgram
+from hodograph.program import Program, decode, encode
+from hodograph.program.stops import FAULT, HOLD
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLE = ROOT / "examples/machines/real_drives.toml"
@@ -48,6 +52,38 @@ def test_a_case_is_a_function_of_its_number() -> None:
     for number in range(20):
         once, again = (mutate(data, words, Random(number)) for _ in range(2))
         assert repr(once) == repr(again)
+
+
+def _least_us(program: Program, piece: int, kind: int) -> int:
+    """The least bound of a stop that the controller accepts for a piece."""
+    low, high = 0, int(program.stops.bound_us[piece, kind])
+    while low < high:
+        middle = (low + high) // 2
+        fault = NativeProgram(encode(_with_bound(program, piece, kind, middle))).check()
+        low, high = (low, middle) if fault is None else (middle + 1, high)
+    return low
+
+
+def _with_bound(program: Program, piece: int, kind: int, value_us: int) -> Program:
+    bound_us = program.stops.bound_us.copy()
+    bound_us[piece, kind] = value_us
+    hold_us, fault_us = bound_us.max(axis=0).tolist()
+    stops = replace(program.stops, bound_us=bound_us, worst_us=(hold_us, fault_us))
+    return replace(program, stops=stops)
+
+
+@pytest.mark.parametrize("kind", [HOLD, FAULT])
+def test_only_the_bound_that_is_refused_excuses_a_difference(kind: int) -> None:
+    """That of the other kind has as little room as rounding leaves."""
+    program = decode((ROOT / "tests/data/programs/alpha_minimax.hdgp").read_bytes())
+    piece, other = 3, HOLD + FAULT - kind
+    tight = _with_bound(program, piece, other, _least_us(program, piece, other))
+    least_us = _least_us(tight, piece, kind)
+    for value_us, excused in ((least_us - 1, True), (least_us - 200, False)):
+        image = encode(_with_bound(tight, piece, kind, value_us))
+        fault = NativeProgram(image).check()
+        assert fault is not None
+        assert is_rounding(image, fault.code, fault.index) == excused
 
 
 def _careful(file: Path) -> object:

@@ -521,9 +521,70 @@ int chunked_make_compact(struct chunked *c, uint32_t number)
     c->sizes[number] = CHUNK_HEADER_SIZE + image;
     put(out + 8, c->sizes[number], 4);
     chunked_seal(out, c->sizes[number]);
-    c->bytes[number] = out;
+    c->bytes[number] =
+        realloc(out, c->sizes[number]); /* so that the sanitizer sees any read beyond */
+    TEST_ASSERT_NOT_NULL(c->bytes[number]);
     free(wide);
     return 1;
+}
+
+/* All its segments, so that the first one begins at this point. */
+static void move_to(uint8_t *image, const int64_t point_q40[PROGRAM_AXES])
+{
+    struct program p;
+    struct program_segment first;
+    TEST_ASSERT_EQUAL_INT(0, program_open(&p, image, read_u32(image + 8)));
+    program_segment_get(&p, 0, &first);
+    const uint32_t axis_count = p.header.axis_count;
+    const uint32_t curve_axes = program_curve_axes(axis_count);
+    for (uint32_t i = 0; i < p.header.segment_count; i++) {
+        uint8_t *segment = image + p.header.header_size + i * program_segment_size(axis_count);
+        for (uint32_t axis = 0; axis < curve_axes; axis++) {
+            uint8_t *at = segment + 8u + 8u * axis;
+            put(at, read_u64(at) + (uint64_t)(point_q40[axis] - first.point_q40_mm[axis]), 8);
+        }
+        for (uint32_t k = 0; k < program_extra_axes(axis_count); k++) {
+            uint8_t *at = segment + PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * k;
+            const int64_t to_q40 = point_q40[PROGRAM_SPACE + k];
+            put(at, read_u64(at) + (uint64_t)(to_q40 - first.extra[k].start_q40), 8);
+        }
+    }
+}
+
+static uint8_t *copy_of(const struct chunked *c, uint32_t number)
+{
+    uint8_t *out = malloc(c->sizes[number]);
+    TEST_ASSERT_NOT_NULL(out);
+    memcpy(out, c->bytes[number], c->sizes[number]);
+    return out;
+}
+
+void chunked_copy(struct chunked *out, const struct chunked *from)
+{
+    *out = *from;
+    for (uint32_t i = 0; i < from->count; i++) {
+        out->bytes[i] = copy_of(from, i);
+    }
+}
+
+void chunked_make_rest(struct chunked *c)
+{
+    const struct program_limits limits = golden_no_limits();
+    struct program_fault fault;
+    struct chunk first;
+    TEST_ASSERT_EQUAL_INT(0, chunk_open(&first, c->bytes[0], c->sizes[0]));
+    TEST_ASSERT_EQUAL_INT(0, chunk_check(&first, NULL, &limits, &fault));
+    for (uint32_t i = 1; i < c->count; i++) {
+        free(c->bytes[i]);
+    }
+    c->count = 2;
+    c->bytes[1] = copy_of(c, 0);
+    c->sizes[1] = c->sizes[0];
+    put(c->bytes[1] + 6, CHUNK_FLAG_REST | CHUNK_FLAG_LAST, 2);
+    put(c->bytes[1] + 20, 1, 4);
+    put(c->bytes[1] + 56, (uint64_t)first.program.header.length_q40_mm, 8);
+    move_to(c->bytes[1] + CHUNK_HEADER_SIZE, first.end.position_q40);
+    chunked_seal(c->bytes[1], c->sizes[1]);
 }
 
 void chunked_close(struct chunked *c)

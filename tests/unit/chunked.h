@@ -52,6 +52,12 @@ int chunked_random(struct chunked *out, const struct override_program *whole, ui
 /* Chunk `number` gets compact records. 0: its numbers do not fit them, and it stays. */
 int chunked_make_compact(struct chunked *c, uint32_t number);
 
+/* A copy of wide chunks or compact ones, to be closed too. */
+void chunked_copy(struct chunked *out, const struct chunked *from);
+
+/* Instead of its later chunks, which have to be wide: the first once more, at rest at the end of the first. */
+void chunked_make_rest(struct chunked *c);
+
 void chunked_close(struct chunked *c);
 
 /* Writes the CRCs that a changed chunk should have: of the image, and of the whole. */

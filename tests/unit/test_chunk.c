@@ -12,30 +12,40 @@
 #include "unity.h"
 
 enum { MOST_TICKS = 4000, BEHIND = 60 };
-enum { SEQUENCE = 20, PIECE_SHIFT = 24, SHARED_PIECES = 32, SHARED_SEGMENTS = 36 };
+enum { SEQUENCE = 20, PIECE_SHIFT = 24, SHARED_PIECES = 32, SHARED_SEGMENTS = 36, JOB_START = 56 };
 
 static struct override_program whole;
 static struct chunked chain;
 static struct chunk chunks[CHUNKED_MOST];
 static void *records[CHUNKED_MOST];
 
-void setUp(void)
+static void open_whole(const char *name)
 {
     uint64_t random = 7;
-    override_program_golden(&whole, "alpha_minimax.hdgp");
+    override_program_golden(&whole, name);
     chunked_refine(&whole, 0.01);
     override_program_limits(&whole, &random);
     golden_seal(whole.image, whole.program.size);
     memset(records, 0, sizeof records);
 }
 
-void tearDown(void)
+static void close_whole(void)
 {
     for (uint32_t i = 0; i < CHUNKED_MOST; i++) {
         free(records[i]);
     }
     chunked_close(&chain);
     override_program_close(&whole);
+}
+
+void setUp(void)
+{
+    open_whole("alpha_minimax.hdgp");
+}
+
+void tearDown(void)
+{
+    close_whole();
 }
 
 static int check_chunk(uint32_t i, struct program_fault *fault)
@@ -69,6 +79,13 @@ static void cut_in_two(void)
     const uint32_t firsts[2] = {0, 12};
     const uint32_t joints[2] = {40, whole.program.header.piece_count};
     TEST_ASSERT_TRUE(chunked_make(&chain, &whole, firsts, joints, 2));
+}
+
+static void put(uint8_t *at, uint64_t value)
+{
+    for (uint32_t i = 0; i < 8u; i++) {
+        at[i] = (uint8_t)(value >> 8u * i);
+    }
 }
 
 /* --- The check --- */
@@ -139,15 +156,24 @@ static void test_damage_is_refused(void)
     TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
 }
 
-/* The first byte of a segment or piece of the image of chunk 1. */
-static uint32_t segment_at(uint32_t i)
-{
-    return CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE + i * PROGRAM_SEGMENT_SIZE;
-}
+/* Records of the image of chunk 1: where they begin, and bytes of each. */
+struct layout {
+    uint32_t segments_at, segment_size;
+    uint32_t pieces_at, piece_size;
+};
 
-static uint32_t piece_at(uint32_t i)
+static struct layout layout_of_next(void)
 {
-    return segment_at(chunks[1].program.header.segment_count) + i * PROGRAM_PIECE_SIZE;
+    const struct program_header *h = &chunks[1].program.header;
+    const int compact = (h->flags & PROGRAM_FLAG_COMPACT) != 0;
+    struct layout r = {
+        .segments_at = CHUNK_HEADER_SIZE + h->header_size,
+        .segment_size = compact ? program_compact_segment_size(h->axis_count)
+                                : program_segment_size(h->axis_count),
+        .piece_size = compact ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE,
+    };
+    r.pieces_at = r.segments_at + h->segment_count * r.segment_size;
+    return r;
 }
 
 static struct program_fault fault_with_bit(uint32_t at)
@@ -161,57 +187,117 @@ static struct program_fault fault_with_bit(uint32_t at)
     return fault;
 }
 
-/* Any byte of the shared part. */
-static void test_the_shared_part_is_compared_bit_for_bit(void)
+/* A changed bit of any byte of the shared records is found, and named with its record. */
+static void expect_shared_bytes_compared(void)
 {
     struct program_fault fault;
-    cut_in_two();
     TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
     TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
-    const uint32_t segments = chunks[1].shared_segments;
-    const uint32_t pieces = chunks[1].shared_pieces;
-    TEST_ASSERT_TRUE(segments > 1 && pieces == 28);
-    for (uint32_t at = segment_at(0); at < segment_at(segments); at++) {
-        fault = fault_with_bit(at);
+    const struct layout r = layout_of_next();
+    TEST_ASSERT_TRUE(chunks[1].shared_segments > 0u && chunks[1].shared_pieces > 0u);
+    for (uint32_t at = 0; at < chunks[1].shared_segments * r.segment_size; at++) {
+        fault = fault_with_bit(r.segments_at + at);
         TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEGMENT, fault.code);
-        TEST_ASSERT_EQUAL_UINT32((at - segment_at(0)) / PROGRAM_SEGMENT_SIZE, fault.index);
+        TEST_ASSERT_EQUAL_UINT32(at / r.segment_size, fault.index);
     }
-    for (uint32_t at = piece_at(0); at < piece_at(pieces); at += 5) {
-        fault = fault_with_bit(at);
+    for (uint32_t at = 0; at < chunks[1].shared_pieces * r.piece_size; at++) {
+        fault = fault_with_bit(r.pieces_at + at);
         TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PIECE, fault.code);
-        TEST_ASSERT_EQUAL_UINT32((at - piece_at(0)) / PROGRAM_PIECE_SIZE, fault.index);
+        TEST_ASSERT_EQUAL_UINT32(at / r.piece_size, fault.index);
     }
-    fault = fault_with_bit(piece_at(pieces) + 17); /* behind the joint: the rules of a program */
+}
+
+static void test_any_byte_of_the_shared_part_is_compared(void)
+{
+    cut_in_two();
+    expect_shared_bytes_compared();
+    TEST_ASSERT_TRUE(chunks[1].shared_segments > 1u && chunks[1].shared_pieces == 28u);
+    const struct layout r = layout_of_next();
+    const struct program_fault fault = /* behind the joint: the rules of a program */
+        fault_with_bit(r.pieces_at + chunks[1].shared_pieces * r.piece_size + 17u);
     TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
 }
 
-/* Each byte of the shared part of a compact chunk is compared, whether its predecessor is compact or not. */
+/* Whether the predecessor is compact or not. */
 static void test_compact_chunks_are_compared_too(void)
 {
-    struct program_fault fault;
     cut_in_two();
     TEST_ASSERT_TRUE(chunked_make_compact(&chain, 1));
-    for (int both = 0; both <= 1; both++) {
-        TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
-        TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
-        const uint32_t pieces_at =
-            CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE +
-            chunks[1].program.header.segment_count * PROGRAM_COMPACT_SEGMENT_SIZE;
-        const uint32_t end = chunks[1].shared_segments * PROGRAM_COMPACT_SEGMENT_SIZE;
-        for (uint32_t at = 0; at < end; at++) {
-            fault = fault_with_bit(CHUNK_HEADER_SIZE + PROGRAM_HEADER_SIZE + at);
-            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_SEGMENT, fault.code);
-            TEST_ASSERT_EQUAL_UINT32(at / PROGRAM_COMPACT_SEGMENT_SIZE, fault.index);
+    expect_shared_bytes_compared();
+    TEST_ASSERT_TRUE(chunked_make_compact(&chain, 0));
+    expect_shared_bytes_compared();
+}
+
+/* The fields that a planar program does not have. */
+static void test_chunks_with_six_axes_are_compared_too(void)
+{
+    close_whole();
+    open_whole("space6.hdgp");
+    cut_in_two();
+    expect_shared_bytes_compared();
+    TEST_ASSERT_TRUE(chunked_make_compact(&chain, 1));
+    expect_shared_bytes_compared();
+}
+
+/* --- The start at rest --- */
+
+/* Chunk 1 as one that begins at rest at the end of chunk 0, but for its points. */
+static void begin_next_at_rest(void)
+{
+    uint8_t *bytes = chain.bytes[1];
+    memset(bytes + PIECE_SHIFT, 0, JOB_START - PIECE_SHIFT);
+    bytes[6] = CHUNK_FLAG_REST | CHUNK_FLAG_LAST;
+    bytes[CHUNK_HEADER_SIZE + 28] = 0;
+    put(bytes + JOB_START, (uint64_t)chunks[0].program.header.length_q40_mm);
+}
+
+/* The code where segment 0 of chunk 1 begins so far from the end of chunk 0 in one coordinate, of all others 0. */
+static int code_with_start(uint32_t axis, uint64_t off_q40)
+{
+    struct program_fault fault;
+    const uint32_t axis_count = chunks[0].program.header.axis_count;
+    uint8_t *segment = chain.bytes[1] + CHUNK_HEADER_SIZE + chunks[0].program.header.header_size;
+    for (uint32_t i = 0; i < axis_count; i++) {
+        const uint32_t at = i < program_curve_axes(axis_count)
+                                ? 8u + 8u * i
+                                : PROGRAM_SPACE_SIZE + PROGRAM_EXTRA_SIZE * (i - PROGRAM_SPACE);
+        const uint64_t end_q40 = (uint64_t)chunks[0].end.position_q40[i];
+        put(segment + at, end_q40 + (i == axis ? off_q40 : 0u));
+    }
+    chunked_seal(chain.bytes[1], chain.sizes[1]);
+    return check_chunk(1, &fault);
+}
+
+/* A point up to 2^-24 mm off is accepted: what is wrong then are the pieces, which begin in motion. */
+static void expect_start_compared(void)
+{
+    const uint64_t most_q40 = (uint64_t)1 << 16;
+    struct program_fault fault;
+    cut_in_two();
+    TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
+    begin_next_at_rest();
+    for (uint32_t axis = 0; axis < chunks[0].program.header.axis_count; axis++) {
+        const uint64_t end_q40 = (uint64_t)chunks[0].end.position_q40[axis];
+        const uint64_t far[] = {most_q40 + 1u, 0u - most_q40 - 1u, (uint64_t)INT64_MIN - end_q40,
+                                (uint64_t)INT64_MAX - end_q40, (uint64_t)1 << 63};
+        const uint64_t near[] = {0u, most_q40, 0u - most_q40};
+        for (uint32_t i = 0; i < sizeof far / sizeof *far; i++) {
+            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_REST, code_with_start(axis, far[i]));
         }
-        for (uint32_t at = 0; at < chunks[1].shared_pieces * PROGRAM_COMPACT_PIECE_SIZE; at++) {
-            fault = fault_with_bit(pieces_at + at);
-            TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CHUNK_PIECE, fault.code);
-            TEST_ASSERT_EQUAL_UINT32(at / PROGRAM_COMPACT_PIECE_SIZE, fault.index);
-        }
-        if (both == 0) {
-            TEST_ASSERT_TRUE(chunked_make_compact(&chain, 0));
+        for (uint32_t i = 0; i < sizeof near / sizeof *near; i++) {
+            const int code = code_with_start(axis, near[i]);
+            TEST_ASSERT_TRUE(code < 0 && code != PROGRAM_ERR_CHUNK_REST);
         }
     }
+}
+
+/* Any number may stand in the place of a coordinate. */
+static void test_a_chunk_at_rest_begins_where_its_predecessor_ends(void)
+{
+    expect_start_compared();
+    close_whole();
+    open_whole("space6.hdgp");
+    expect_start_compared();
 }
 
 /* --- Events --- */
@@ -721,8 +807,10 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_headers_are_refused_with_their_codes);
     RUN_TEST(test_damage_is_refused);
-    RUN_TEST(test_the_shared_part_is_compared_bit_for_bit);
+    RUN_TEST(test_any_byte_of_the_shared_part_is_compared);
     RUN_TEST(test_compact_chunks_are_compared_too);
+    RUN_TEST(test_chunks_with_six_axes_are_compared_too);
+    RUN_TEST(test_a_chunk_at_rest_begins_where_its_predecessor_ends);
     RUN_TEST(test_events_of_the_shared_part_are_the_predecessors);
     RUN_TEST(test_one_event_more_or_less_is_refused);
     RUN_TEST(test_a_program_in_motion_is_accepted_in_a_chunk_only);

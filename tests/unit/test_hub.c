@@ -3,7 +3,12 @@
 #define _GNU_SOURCE
 #include <errno.h>
 #include <poll.h>
+#include <pthread.h>
+#include <stdio.h>
 #include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "hub_thread.h"
@@ -177,6 +182,81 @@ static void test_the_path_is_taken(void)
     (void)unlink(paths[0]);
 }
 
+static char left[64]; /* the path of a hub that was killed */
+
+static void name_left(void)
+{
+    (void)snprintf(left, sizeof left, "/tmp/hodograph-test-hub-%ld-left", (long)getpid());
+}
+
+/* As a hub leaves it that is killed. */
+static void leave_socket(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    (void)snprintf(address.sun_path, sizeof address.sun_path, "%s", path);
+    (void)unlink(path);
+    const int fd = socket(AF_UNIX, SOCK_SEQPACKET, 0);
+    TEST_ASSERT_TRUE(fd >= 0);
+    TEST_ASSERT_EQUAL(0, bind(fd, (const struct sockaddr *)&address, sizeof address));
+    (void)close(fd);
+}
+
+/* Killed while it served, and before it served. */
+static void test_paths_of_killed_hubs_are_served_again(void)
+{
+    static struct hub second;
+    const char *paths[1] = {left};
+    char own[sizeof left + 4u];
+    size_t failed = 0;
+    name_left();
+    (void)snprintf(own, sizeof own, "%s.new", left);
+    leave_socket(left);
+    leave_socket(own);
+    TEST_ASSERT_EQUAL(0, hub_open(&second, paths, 1, (struct hub_options){0}, &failed));
+    TEST_ASSERT_NOT_EQUAL(0, access(own, F_OK));
+    hub_close(&second);
+    (void)unlink(left);
+    TEST_ASSERT_EQUAL(0,
+                      mkdir(left, 0700)); /* no socket: it stays, and nothing is left beside it */
+    TEST_ASSERT_EQUAL(-EADDRINUSE, hub_open(&second, paths, 1, (struct hub_options){0}, &failed));
+    TEST_ASSERT_NOT_EQUAL(0, access(own, F_OK));
+    TEST_ASSERT_EQUAL(0, rmdir(left));
+}
+
+struct starter {
+    struct hub hub;
+    int code;
+};
+
+static void *start_hub(void *starter)
+{
+    const char *paths[1] = {left};
+    size_t failed = 0;
+    struct starter *own = starter;
+    own->code = hub_open(&own->hub, paths, 1, (struct hub_options){0}, &failed);
+    return NULL;
+}
+
+static void test_one_of_two_hubs_gets_a_path_that_was_left(void)
+{
+    static struct starter starters[2];
+    name_left();
+    for (int round = 0; round < 200; ++round) {
+        pthread_t threads[2];
+        leave_socket(left);
+        for (int i = 0; i < 2; ++i) {
+            TEST_ASSERT_EQUAL(0, pthread_create(&threads[i], NULL, start_hub, &starters[i]));
+        }
+        for (int i = 0; i < 2; ++i) {
+            TEST_ASSERT_EQUAL(0, pthread_join(threads[i], NULL));
+        }
+        TEST_ASSERT_EQUAL(-EADDRINUSE, starters[0].code + starters[1].code);
+        hub_close(&starters[0].hub);
+        hub_close(&starters[1].hub);
+    }
+    (void)unlink(left);
+}
+
 static void test_real_time_is_the_clock_of_the_system(void)
 {
     TEST_ASSERT_EQUAL(0, clock_join(hub_thread_paths[0], "test"));
@@ -202,6 +282,8 @@ int main(void)
     RUN_TEST(test_the_end_is_noticed);
     RUN_TEST(test_nobody_serves);
     RUN_TEST(test_the_path_is_taken);
+    RUN_TEST(test_paths_of_killed_hubs_are_served_again);
+    RUN_TEST(test_one_of_two_hubs_gets_a_path_that_was_left);
     RUN_TEST(test_real_time_is_the_clock_of_the_system);
     return UNITY_END();
 }

@@ -8,6 +8,7 @@
 #include "compact_image.h"
 #include "core/counts.h"
 #include "core/crc32.h"
+#include "core/little_endian.h"
 #include "golden.h"
 #include "unity.h"
 
@@ -176,6 +177,25 @@ static void test_counts(void)
     TEST_ASSERT_EQUAL_INT32(0, counts_from_q40_mm(INT64_MAX, 0));
 }
 
+static void test_integers_at_the_ends_of_their_fields(void)
+{
+    static const uint8_t least[] = {0, 0, 0, 0, 0, 0, 0x80};
+    static const uint8_t most[] = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0x7F};
+    static const uint8_t minus_one[] = {0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF};
+    static const uint8_t counted[] = {1, 2, 3, 4, 5, 6, 7};
+    TEST_ASSERT_EQUAL_INT64(-((int64_t)1 << 55), read_i56(least));
+    TEST_ASSERT_EQUAL_INT64(((int64_t)1 << 55) - 1, read_i56(most));
+    TEST_ASSERT_EQUAL_INT64(-1, read_i56(minus_one));
+    TEST_ASSERT_EQUAL_INT64(0x07060504030201, read_i56(counted));
+    TEST_ASSERT_EQUAL_INT64(-((int64_t)1 << 47), read_i48(least + 1));
+    TEST_ASSERT_EQUAL_INT64(((int64_t)1 << 47) - 1, read_i48(most + 1));
+    TEST_ASSERT_EQUAL_INT64(-1, read_i48(minus_one));
+    TEST_ASSERT_EQUAL_INT64(0x060504030201, read_i48(counted));
+    TEST_ASSERT_EQUAL_UINT32((1u << 24) - 1u, read_u24(minus_one));
+    TEST_ASSERT_EQUAL_UINT32(1u << 23, read_u24(least + 4));
+    TEST_ASSERT_EQUAL_UINT32(0x030201u, read_u24(counted));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -183,6 +203,7 @@ int main(void)
     RUN_TEST(test_header_is_read);
     RUN_TEST(test_segment_is_read);
     RUN_TEST(test_pieces_sum_up);
+    RUN_TEST(test_integers_at_the_ends_of_their_fields);
     RUN_TEST(test_compact_records_have_the_same_numbers);
     RUN_TEST(test_ticks);
     RUN_TEST(test_exponent);

@@ -90,7 +90,7 @@ static uint64_t cache_memory[CACHE_MOST / 8u];
 static struct {
     uint64_t ticks;
     unsigned moving, resting, underruns, refused, same, ended, stopped, held, waited, windows,
-        compact;
+        compact, after_compact;
     double jerk;
 } seen;
 
@@ -190,12 +190,16 @@ static void note_begins(struct chain *c)
     }
 }
 
-/* Every other chunk gets compact records, where its numbers fit: such a one follows another one, and is followed by
- * one. */
-static void some_compact(struct chain *c, uint32_t from)
+/* Each chunk is made compact or stays wide at random, where its numbers fit: so each of the two follows each. */
+static void some_compact(struct chain *c, uint64_t random)
 {
-    for (uint32_t i = from % 2u; i < c->cuts.count; i += 2u) {
-        seen.compact += (uint32_t)chunked_make_compact(&c->cuts, i);
+    unsigned previous = 0;
+    for (uint32_t i = 0; i < c->cuts.count; i++) {
+        const int wanted = (golden_random(&random) & 1u) != 0u;
+        const unsigned compact = wanted ? (unsigned)chunked_make_compact(&c->cuts, i) : 0u;
+        seen.compact += compact;
+        seen.after_compact += compact & previous;
+        previous = compact;
     }
 }
 
@@ -215,7 +219,7 @@ static void make_whole(uint32_t w, uint64_t *random)
     for (uint32_t i = 0; i < 4u * CHAINS && wholes[w].chain_count < CHAINS; i++) {
         struct chain *c = &wholes[w].chains[wholes[w].chain_count];
         if (chunked_random(&c->cuts, p, random)) {
-            some_compact(c, wholes[w].chain_count);
+            some_compact(c, (uint64_t)CHAINS * w + wholes[w].chain_count);
             accept(c);
             note_begins(c);
             wholes[w].chain_count++;
@@ -538,7 +542,7 @@ static void test_cuts_at_any_instant(void)
     for (uint32_t w = 0; w < WHOLES + IN_SPACE; w++) {
         make_whole(w, &random);
     }
-    TEST_ASSERT_TRUE(seen.compact > WHOLES);
+    TEST_ASSERT_TRUE(seen.compact > WHOLES && seen.after_compact > WHOLES);
     for (unsigned i = setting("HODOGRAPH_FIRST", 0); i < cases; i++) {
         now.number = i;
         run_case(seed * 0x100000001u + i, 0, WHOLES);

@@ -21,12 +21,15 @@ import re
 import tomllib
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fuzzing.toml_text import Tree, mutate, places, plain, spelled
+
+if TYPE_CHECKING:
+    from hodograph.program import Program
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -34,6 +37,8 @@ STATUSES = (0, 2, 3, 4, 5, 6, 7)
 _WALL_TIME = ("planning_s",)
 _ROUNDED_US = 20.0
 """By so much the controller's bounds of stops may be above those in Python (hodograph.program.check_stops)."""
+_LONG_US = 1 << 31
+"""Longer than any stop."""
 
 
 class Finding(Exception):
@@ -398,21 +403,38 @@ def _finite(found: object) -> None:
         raise Finding(f"inspect shows what is no number: {text[:500]}")
 
 
-def _is_rounding(image: bytes, code: int, piece: int) -> bool:
+def _refused_stop(program: Program, piece: int) -> int | None:
+    """HOLD or FAULT: whose bound of this piece the controller refuses, found by a larger one. None: neither alone."""
+    from hodograph.native.program import NativeProgram
+    from hodograph.program import encode
+    from hodograph.program.codes import ProgramError
+    from hodograph.program.stops import FAULT, HOLD
+
+    for kind in (HOLD, FAULT):
+        bound_us = program.stops.bound_us.copy()
+        bound_us[piece, kind] = max(int(bound_us[piece, kind]), _LONG_US)
+        hold_us, fault_us = bound_us.max(axis=0).tolist()
+        stops = replace(program.stops, bound_us=bound_us, worst_us=(hold_us, fault_us))
+        fault = NativeProgram(encode(replace(program, stops=stops))).check()
+        if fault is None or (fault.code, fault.index) != (ProgramError.STOP_BOUND, piece):
+            return kind
+    return None
+
+
+def is_rounding(image: bytes, code: int, piece: int) -> bool:
     """Whether the controller refuses the bound of a stop only for what its integers round up."""
     from hodograph.program import decode
     from hodograph.program.check_stops import bounds
     from hodograph.program.codes import ProgramError
-    from hodograph.program.stops import FAULT, HOLD
 
     if code != ProgramError.STOP_BOUND:
         return False
     program = decode(image)
-    room_us = (
-        float(program.stops.bound_us[piece, kind] - bounds(program, kind)[0][piece])
-        for kind in (HOLD, FAULT)
-    )
-    return any(0.0 <= room <= _ROUNDED_US for room in room_us)
+    kind = _refused_stop(program, piece)
+    if kind is None:
+        return False
+    room_us = float(program.stops.bound_us[piece, kind] - bounds(program, kind)[0][piece])
+    return 0.0 <= room_us <= _ROUNDED_US
 
 
 def _compare_checks(image: bytes) -> None:
@@ -434,7 +456,7 @@ def _compare_checks(image: bytes) -> None:
     except (ArithmeticError, ValueError) as error:
         raise Finding(f"check_image: {type(error).__name__}: {error}") from error
     if (native_code == 0) != (python_code == 0) and not (
-        native is not None and python_code == 0 and _is_rounding(image, native.code, native.index)
+        native is not None and python_code == 0 and is_rounding(image, native.code, native.index)
     ):
         raise Finding(f"the check in C says {native_code}, that in Python {python_code}")
 

@@ -342,14 +342,19 @@ class _Layout:
 
 
 def _fits_compact(program: Program) -> bool:
-    """Whether all numbers fit compact records: below 1 s, 128 mm, 32 m, and bounds below 16 s; protocol.md 1.7.1."""
+    """Whether all numbers fit compact records; protocol.md 1.7.1.
+
+    Durations are below 1 s and bounds below 2^24 us. Arc lengths and places are within 32768 mm, coefficients within
+    128 mm, those of the preimage within 8 mm^(1/2). For extra axes the unit may be degrees.
+    """
     pieces = program.pieces
     powers = (pieces.c_q40, program.a_q44, program.extra_q40)
+    places = (program.start_q40, pieces.start_q40, program.point_q40)
     return bool(
         pieces.duration_q32_s.max(initial=0) < 1 << 32
         and all(_within(one, 1 << 47) for one in powers)
         and program.length_q40 < 1 << 55
-        and _within(program.point_q40, 1 << 55)
+        and all(_within(one, 1 << 55) for one in places)
         and program.stops.bound_us.max(initial=0) < 1 << 24
     )
 

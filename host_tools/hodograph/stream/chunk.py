@@ -2,7 +2,7 @@
 """A chunk of a stream: a header and a whole program image, to and from bytes; docs/reference/protocol.md 1.7.
 
 Every chunk ends at rest. Its last pieces are a tail that brakes along the path; the next chunk repeats the pieces
-before the tail bit for bit and goes on from their end, the joint.
+before the tail with the same numbers and goes on from their end, the joint.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from ..program.image import Program, decode, encode
 
 MAGIC = b"HDGC"
 VERSION = 2
+_READABLE = (1, VERSION)
+"""Older recordings have chunks of version 1, with the same fields; a controller refuses those."""
 HEADER_SIZE = 80
 FLAG_FIRST, FLAG_LAST, FLAG_REST, FLAG_JOINED = 1, 2, 4, 8
 _FLAGS = FLAG_FIRST | FLAG_LAST | FLAG_REST | FLAG_JOINED
@@ -169,7 +171,7 @@ def parse(data: bytes) -> Chunk:
     if len(data) < HEADER_SIZE:
         raise InputError(f"chunk: {len(data)} bytes are less than a header")
     (magic, version, flags, size, crc, *rest) = _HEADER.unpack_from(data)
-    if magic != MAGIC or version != VERSION or not _flags_fit(flags, rest[-2], rest[-1]):
+    if magic != MAGIC or version not in _READABLE or not _flags_fit(flags, rest[-2], rest[-1]):
         raise InputError("chunk: wrong magic, version or flag, or a reserved field is not 0")
     if not HEADER_SIZE <= size <= len(data):
         raise InputError(f"chunk: says {size} bytes, and there are {len(data)}")

@@ -71,14 +71,15 @@ def _with_number(program: Program, field: str, value: int) -> Program:
         bound_us = program.stops.bound_us.copy()
         bound_us[1, 1] = value
         return replace(program, stops=replace(program.stops, bound_us=bound_us))
-    if field in ("duration_q32_s", "c_q40"):
-        values = getattr(pieces, field).copy()
+    if field in ("duration_q32_s", "c_q40", "piece_start_q40"):
+        name = field.removeprefix("piece_")
+        values = getattr(pieces, name).copy()
         values[1, ...] = value
-        return replace(program, pieces=replace(pieces, **{field: values}))
+        return replace(program, pieces=replace(pieces, **{name: values}))
     if field == "length_q40":
         return replace(program, length_q40=value)
     values = getattr(program, field).copy()
-    values[-1, 1, ...] = value
+    values[(-1, 1) if values.ndim > 1 else 1] = value
     return replace(program, **{field: values})
 
 
@@ -90,6 +91,8 @@ def _with_number(program: Program, field: str, value: int) -> Program:
         ("a_q44", 48, True),
         ("extra_q40", 48, True),
         ("point_q40", 56, True),
+        ("start_q40", 56, True),
+        ("piece_start_q40", 56, True),
         ("length_q40", 55, False),
         ("bound_us", 24, False),
     ],

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import replace
 from typing import Any
 
@@ -80,6 +81,18 @@ def test_what_is_no_accepted_chunk_is_left_out() -> None:
         assert capture.feed(_frames(rows)) == []
     (found,) = capture.feed(_frames(_download(data)))
     assert found.encode() == data
+
+
+def test_chunks_of_version_1_are_read_too() -> None:
+    """Those of a recording that was made before version 2."""
+    data = bytearray(chunks(3, JOB)[0])
+    data[4:6] = (1).to_bytes(2, "little")
+    data[12:16] = zlib.crc32(data[16:], zlib.crc32(data[4:12])).to_bytes(4, "little")
+    (found,) = ChunkCapture(NODE).feed(_frames(_download(bytes(data))))
+    assert found.encode() == chunks(3, JOB)[0]
+    data[4] = 3
+    data[12:16] = zlib.crc32(data[16:], zlib.crc32(data[4:12])).to_bytes(4, "little")
+    assert ChunkCapture(NODE).feed(_frames(_download(bytes(data)))) == []
 
 
 def _message(drawing: JobPoints) -> dict[str, Any]:

@@ -110,6 +110,15 @@ def test_wrong_bytes_are_sent_again(code: int) -> None:
     assert node.transfers == 2
 
 
+@pytest.mark.parametrize(("code", "named"), [(-80, True), (-81, False)])
+def test_a_format_that_is_refused_each_time_names_versions(code: int, named: bool) -> None:
+    node = Scripted([SdoAbortedError(ABORT_VALUE_RANGE)] * 4, wanted=5, refused=code)
+    with pytest.raises(BusError, match=rf"part\.ngc:12: .*{code}.*--continue") as raised:
+        _send(node)
+    assert ("different versions" in str(raised.value)) == named
+    assert node.transfers == 4
+
+
 def test_a_refusal_names_file_and_line() -> None:
     node = Scripted([SdoAbortedError(ABORT_VALUE_RANGE)], wanted=5, refused=-72)
     with pytest.raises(RefusedError, match=r"part\.ngc:12: node 1 refused .*-72"):

@@ -19,7 +19,9 @@ NONE, OPEN, UNDERRUN, ENDED, STOPPED, PROGRAM_STOP = range(6)
 UNKNOWN_MS = 0xFFFFFFFF
 _TRIES = 4
 _PATIENCE_S = 5.0
-_CORRUPT = (-4, -80, -81)
+_OTHER_FORMAT = -80
+"""Of a chunk whose version the controller does not read, too."""
+_CORRUPT = (-4, _OTHER_FORMAT, -81)
 """Refusals that a transfer with wrong bytes brings too: the chunk is sent again."""
 
 
@@ -93,7 +95,7 @@ def send_chunk(node: Node, data: bytes, job: int, sequence: int, place: str) -> 
             if _accepted(node, job, sequence):
                 return True
             if error.code == ABORT_VALUE_RANGE:
-                _check_refusal(node, place)
+                last = _wrong_bytes(node, place)
         except (SdoCommunicationError, RuntimeError) as error:
             last = one_line(error)
             if _accepted(node, job, sequence):
@@ -114,11 +116,16 @@ def _accepted(node: Node, job: int, sequence: int) -> bool:
         return False
 
 
-def _check_refusal(node: Node, place: str) -> None:
-    """Raises RefusedError, unless the bytes may have come wrong."""
+def _wrong_bytes(node: Node, place: str) -> str:
+    """Why the bytes were refused, where they may have come wrong. Raises RefusedError: they came as they were sent."""
     code, index = node.read(STREAM, 5), node.read(STREAM, 6)
+    text = program_fault_text(code, index)
     if code not in _CORRUPT:
         raise RefusedError(
-            f"{place}: {node.who()} refused a part of the job: {program_fault_text(code, index)}: the motion rests on "
+            f"{place}: {node.who()} refused a part of the job: {text}: the motion rests on "
             "the path; hodograph stop ends it"
         )
+    cause = (
+        ", as where host and controller are of different versions" if code == _OTHER_FORMAT else ""
+    )
+    return text + cause
