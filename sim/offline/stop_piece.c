@@ -118,20 +118,29 @@ static double extra_axes_most(const struct stop_setting *setting, const struct s
     return most;
 }
 
-/* The greatest codes of a piece: no less than a stop within LEAST_TICKS from its greatest speed needs, and beyond that only
- * what takes the path that is left after it in as many ticks. */
+/* The same where there are extra axes, and no more than this value. */
+static double followed_most(const struct stop_setting *setting, const struct stop_piece *piece,
+                            const double inverse[PROGRAM_AXES], double most)
+{
+    return setting->road.axis_count > PROGRAM_SPACE
+               ? fmin(most, extra_axes_most(setting, piece, inverse))
+               : most;
+}
+
+/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or over the path that is left
+ * after it where that needs more; but no more than the extra axes can follow. */
 static void piece_most(const struct stop_setting *setting, struct stop_piece *piece)
 {
     const double span_s = LEAST_TICKS * setting->period_s;
     const double left_mm = stop_greater(setting->length_mm - piece->at[piece->count - 1u].s, 0.0);
-    const double acceleration =
+    const double needed =
         stop_greater(8.0 * stop_greater(piece->fastest.v, LEAST_MM_S), left_mm / span_s) / span_s;
-    const int extra = setting->road.axis_count > PROGRAM_SPACE;
+    const double acceleration =
+        followed_most(setting, piece, setting->inverse.axis_acceleration, needed);
+    const double jerk =
+        followed_most(setting, piece, setting->inverse.axis_jerk, needed / (2.0 * span_s));
     for (int k = 0; k < 3; k++) {
-        const double *inverse =
-            k == 1 ? setting->inverse.axis_acceleration : setting->inverse.axis_jerk;
-        const double most = fmin(k == 1 ? acceleration : acceleration / (2.0 * span_s),
-                                 extra ? extra_axes_most(setting, piece, inverse) : HUGE_VAL);
+        const double most = k == 1 ? acceleration : jerk;
         piece->most[k] = setting->most[k];
         while (piece->most[k] > 1 && stop_number_of(k, piece->most[k]) > most) {
             piece->most[k]--;

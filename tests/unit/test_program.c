@@ -66,7 +66,7 @@ static void test_pieces_sum_up(void)
     TEST_ASSERT_EQUAL_UINT64(p.header.duration_q32_s, sum);
 }
 
-static void segments_are_alike(const struct program *compact)
+static void expect_same_segments(const struct program *compact)
 {
     for (uint32_t i = 0; i < p.header.segment_count; i++) {
         struct program_segment one;
@@ -82,7 +82,7 @@ static void segments_are_alike(const struct program *compact)
     }
 }
 
-static void pieces_are_alike(const struct program *compact)
+static void expect_same_pieces(const struct program *compact)
 {
     for (uint32_t i = 0; i < p.header.piece_count; i++) {
         struct program_piece one;
@@ -125,8 +125,8 @@ static void test_compact_records_have_the_same_numbers(void)
         TEST_ASSERT_LESS_THAN_UINT32(p.size, size);
         TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIZE, program_open(&compact, image, size - 1u));
         TEST_ASSERT_EQUAL_INT(0, program_open(&compact, image, size));
-        segments_are_alike(&compact);
-        pieces_are_alike(&compact);
+        expect_same_segments(&compact);
+        expect_same_pieces(&compact);
         TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_FLAGS, program_check(&compact, &limits, &fault));
         limits.chunk = 1;
         TEST_ASSERT_EQUAL_INT(0, program_check(&compact, &limits, &fault));

@@ -187,7 +187,7 @@ static void log_errors(void)
 }
 
 /* Once a second at most: a line takes some milliseconds. */
-static void tell_events(uint32_t now_us)
+static void log_events(uint32_t now_us)
 {
     if (now_us - self.reported_us < REPORT_US) {
         return;
@@ -211,7 +211,7 @@ void port_wait(uint32_t timeout_us)
 {
     const uint32_t began_us = port_time_us();
     port_progress();
-    tell_events(began_us);
+    log_events(began_us);
     while (!self.awake && port_time_us() - began_us < timeout_us) {
         if (self.started) {
             cpu_sleep();
