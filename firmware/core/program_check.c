@@ -11,9 +11,9 @@
 #include "core/segment_length_check.h"
 #include "core/stop_check.h"
 
-#define NAME_FROM   80u
-#define NAME_SIZE   32u
-#define CHUNK_FLAGS (PROGRAM_FLAG_MOVING | PROGRAM_FLAG_COMPACT) /* of a chunk only */
+#define NAME_FROM      80u
+#define NAME_SIZE      32u
+#define FLAGS_IN_CHUNK (PROGRAM_FLAG_MOVING | PROGRAM_FLAG_COMPACT)
 
 static int bytes_are_zero(const uint8_t *b, uint32_t size)
 {
@@ -50,7 +50,7 @@ static int check_header(const struct program *p, const struct program_limits *li
         return code;
     }
     const uint32_t flags =
-        PROGRAM_FLAG_CLOSED | FIRST_AXIS_FLAGS | (limits->chunk != 0 ? CHUNK_FLAGS : 0u);
+        PROGRAM_FLAG_CLOSED | FIRST_AXIS_FLAGS | (limits->chunk != 0 ? FLAGS_IN_CHUNK : 0u);
     if ((h->flags & ~flags) != 0) {
         return PROGRAM_ERR_FLAGS;
     }
@@ -110,7 +110,7 @@ static const struct text texts[] = {
     {PROGRAM_ERR_KERNEL, "the controller does not have the kernel configured"},
     {PROGRAM_ERR_PERIOD, "period not 1000, 2000, 4000 or 8000 us"},
     {PROGRAM_ERR_PERIOD_USED, "period is not the one configured in the controller"},
-    {PROGRAM_ERR_FLAGS, "unknown flag"},
+    {PROGRAM_ERR_FLAGS, "unknown flag, or one that only a chunk may have"},
     {PROGRAM_ERR_AXES, "axis count not 2 ... 6, or not that of the machine"},
     {PROGRAM_ERR_DURATION, "not the sum of the pieces, or not below 2^22 s"},
     {PROGRAM_ERR_LENGTH, "length not in (0, 2^22) mm"},

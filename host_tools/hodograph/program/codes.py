@@ -100,7 +100,7 @@ _TEXTS = {
     ProgramError.KERNEL: "the controller does not have the kernel configured",
     ProgramError.PERIOD: "period not 1000, 2000, 4000 or 8000 us",
     ProgramError.PERIOD_USED: "period is not the one configured in the controller",
-    ProgramError.FLAGS: "unknown flag",
+    ProgramError.FLAGS: "unknown flag, or one that only a chunk may have",
     ProgramError.AXES: "axis count is not 2 ... 6, or not that of the machine",
     ProgramError.DURATION: "not the sum of the pieces, or not below 2^22 s",
     ProgramError.LENGTH: "length not in (0, 2^22) mm",
