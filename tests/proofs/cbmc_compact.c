@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins where
- * it has its whole length before the end of an image of up to 64 KiB that program_open accepts.
+ * it has its whole length before the end of an image of up to 8 KiB that program_open accepts.
  *
  * prover: cbmc
  * options: --unwind 40
  * shows: segment_size piece_size stop_size
  * mutant: core/program.c: need != h->image_size => need < h->image_size
- * mutant: core/program.c: ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE => ? 90u : PROGRAM_PIECE_SIZE
+ * mutant: core/program.c: ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE => ? 68u : PROGRAM_PIECE_SIZE
  * mutant: core/program.c: ? PROGRAM_COMPACT_STOP_SIZE : PROGRAM_STOP_SIZE => ? 11u : PROGRAM_STOP_SIZE
  */
 #include "core/program.c"
@@ -26,7 +26,7 @@ static void places(uint32_t axis_count, uint32_t segment)
     struct program_header h;
     uint32_t size = nondet_uint32();
     uint32_t i = nondet_uint32();
-    __CPROVER_assume(size <= 1u << 16);
+    __CPROVER_assume(size <= 1u << 13);
     h.flags = PROGRAM_FLAG_COMPACT;
     h.axis_count = (uint16_t)axis_count;
     h.header_size = (uint16_t)program_header_size(axis_count);

@@ -64,6 +64,10 @@ class LocalHub:
         self._folder = tempfile.TemporaryDirectory(prefix="hodograph-", dir=_folder())
         paths = self._paths or [Path(self._folder.name) / name for name in self._names]
         command = [str(find_program(HUB)), *self._words, *map(str, paths)]
+        served = next((path for path in paths if is_served(path)), None)
+        if served is not None:
+            self._folder.cleanup()
+            raise BusError(f"{served}: another {HUB} serves a bus there: use it, or another path")
         child = self.child = subprocess.Popen(
             guarded(command), stdin=subprocess.DEVNULL, start_new_session=True
         )

@@ -157,10 +157,14 @@ class JobPlan:
         with self._changed:
             self._ending = True
             self._changed.notify_all()
-        from_input = any(str(file) == STANDARD_INPUT for file in self._job.files)
-        self._thread.join(_INPUT_WAIT_S if from_input else None)
+        self._thread.join(_INPUT_WAIT_S if self.reads_input else None)
         if not self._thread.is_alive():
             self._store.forget_all()
+
+    @property
+    def reads_input(self) -> bool:
+        """Whether a file of the job is standard input."""
+        return any(str(file) == STANDARD_INPUT for file in self._job.files)
 
     def allow(self, most_bytes: int) -> None:
         """Chunks may have so many bytes."""

@@ -43,6 +43,8 @@ AHEAD_S = 20.0
 
 _POLL_S = 0.05
 _PLAN_WAIT_S = 0.05
+_VIRTUAL_PLAN_WAIT_S = 60.0
+"""Longest wait for the planner while virtual time stands still."""
 _JOURNAL_S = 1.0
 _RECORD_S = 0.5
 _UNDERRUN_S = 10.0
@@ -174,6 +176,13 @@ class Sender:
                 return item
             self._look()
 
+    def _planned(self) -> tuple[PlannedSection, Chunk, float] | None:
+        """The next chunk, if it is planned by now. Virtual time stands still for the planner, so that the frames on the
+        bus follow from the job alone; not for standard input, which may come at any time.
+        """
+        stands_still = self.at.controller.clock.is_virtual and not self.plan.reads_input
+        return self.plan.item(self._next, _VIRTUAL_PLAN_WAIT_S if stands_still else 0.0)
+
     def _look(self) -> None:
         """Raises what has gone wrong on the bus meanwhile."""
         if self.at.rig is not None:
@@ -262,7 +271,7 @@ class Sender:
         it need not wait either, but for a job that is over so soon that it may be sent as a whole before.
         """
         try:
-            item = self.plan.item(self._next, 0.0)
+            item = self._planned()
         except HodographError:
             return False
         if item is None:
@@ -303,7 +312,7 @@ class Sender:
     def _send_one(self, status: StreamStatus | None) -> bool | None:
         """Sends the next chunk, if it is planned and there is room: whether it is the last one of the job."""
         try:
-            item = self.plan.item(self._next, 0.0)
+            item = self._planned()
         except HodographError as error:
             self._unplanned = error
             return None

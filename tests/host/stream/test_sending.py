@@ -359,14 +359,31 @@ def test_a_job_that_cannot_be_planned_on_runs_to_its_last_chunk() -> None:
     def item(index: int, wait_s: float) -> None:
         raise PlanError(f"line 99: {index} {wait_s}")
 
-    at: Any = Stopped(SimpleNamespace(wait_for=lambda *_: None))
-    plan: Any = SimpleNamespace(item=item)
+    clock = SimpleNamespace(is_virtual=False)
+    at: Any = Stopped(SimpleNamespace(wait_for=lambda *_: None, clock=clock))
+    plan: Any = SimpleNamespace(item=item, reads_input=False)
     nothing: Any = None
     sender = Sender(at, nothing, plan, lambda *_: None)
     assert sender._send_one(None) is None
     assert not sender._over(_status(OPEN), all_sent=False)
     with pytest.raises(PlanError, match="line 99"):
         sender._over(_status(UNDERRUN), all_sent=False)
+
+
+@pytest.mark.parametrize(
+    ("is_virtual", "reads_input", "waits"),
+    [(True, False, True), (True, True, False), (False, False, False)],
+)
+def test_virtual_time_stands_still_for_the_planner(
+    is_virtual: bool, reads_input: bool, waits: bool
+) -> None:
+    waited: list[float] = []
+    controller = SimpleNamespace(clock=SimpleNamespace(is_virtual=is_virtual))
+    at: Any = Stopped(controller)
+    plan: Any = SimpleNamespace(item=lambda _, s: waited.append(s), reads_input=reads_input)
+    nothing: Any = None
+    assert Sender(at, nothing, plan, lambda *_: None)._send_one(None) is None
+    assert (waited[0] > 10.0) == waits
 
 
 def test_rests_for_want_of_chunks_are_said_now_and_then() -> None:
@@ -436,10 +453,13 @@ def test_motion_starts_when_waiting_is_of_no_use(
     """10 kB took 1 s and hold 1 s of motion."""
     item = None if next_bytes is None else (None, SimpleNamespace(size=next_bytes), next_s)
     plan: Any = SimpleNamespace(
-        item=lambda *_: item, is_longer=lambda least_s, _: planned_s > least_s
+        item=lambda *_: item,
+        is_longer=lambda least_s, _: planned_s > least_s,
+        reads_input=False,
     )
+    at: Any = Stopped(SimpleNamespace(clock=SimpleNamespace(is_virtual=False)))
     nothing: Any = None
-    sender = Sender(nothing, nothing, plan, lambda *_: None, slow=slow)
+    sender = Sender(at, nothing, plan, lambda *_: None, slow=slow)
     sender._bytes, sender._sending_s, sender._motion_s = 10_000, 1.0, 1.0
     assert sender._need_not_wait() == at_once
 
