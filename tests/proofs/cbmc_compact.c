@@ -7,6 +7,7 @@
  * options: --unwind 40
  * shows: segment_size piece_size stop_size
  * mutant: core/program.c: need != h->image_size => need < h->image_size
+ * mutant: core/program.c: (uint64_t)h->segment_count * segment_size(h) => h->segment_count * segment_size(h)
  * mutant: core/program.c: ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE => ? 68u : PROGRAM_PIECE_SIZE
  * mutant: core/program.c: ? PROGRAM_COMPACT_STOP_SIZE : PROGRAM_STOP_SIZE => ? 11u : PROGRAM_STOP_SIZE
  */
