@@ -12,12 +12,12 @@
 #define CRC_FROM 16u /* the CRC covers everything after itself */
 
 /* Where fields of compact records begin, protocol.md 1.7.1. */
-#define COMPACT_POINT    7u /* of a segment */
-#define COMPACT_BESIDE   7u /* of an extra axis: its coefficients */
-#define COMPACT_START    4u /* of a piece */
-#define COMPACT_POWERS   11u
-#define COMPACT_OVERRIDE 53u
-#define COMPACT_BOUNDS   6u /* of a stop */
+#define COMPACT_POINT        7u /* of a segment */
+#define COMPACT_COEFFICIENTS 7u /* of an extra axis */
+#define COMPACT_START        4u /* of a piece */
+#define COMPACT_POWERS       11u
+#define COMPACT_OVERRIDE     53u
+#define COMPACT_BOUNDS       6u /* of a stop */
 
 static void read_header(struct program_header *h, const uint8_t *b)
 {
@@ -81,7 +81,7 @@ static int is_compact(const struct program_header *h)
     return (h->flags & PROGRAM_FLAG_COMPACT) != 0u;
 }
 
-/* Bytes of a record. */
+/* Bytes of a segment's record; below of a piece and of a stop. */
 static uint32_t segment_size(const struct program_header *h)
 {
     return is_compact(h) ? program_compact_segment_size(h->axis_count)
@@ -303,7 +303,7 @@ static void read_planar(const uint8_t *b, struct program_segment *out)
     }
 }
 
-/* Those with 48 bits: of a segment in space, and of a compact one. */
+/* Reads preimage coefficients of 48 bits: those of a segment in space, and of a compact one. */
 static void read_preimage(const uint8_t *b, uint32_t axis_count, struct program_segment *out)
 {
     const uint32_t step = program_component_step(axis_count);
@@ -348,7 +348,7 @@ static void read_compact(const uint8_t *b, struct program_segment *out)
     for (uint32_t k = PROGRAM_SPACE; k < out->axis_count; k++) {
         const size_t extra = k - PROGRAM_SPACE;
         const uint8_t *at = b + PROGRAM_COMPACT_SPACE_SIZE + PROGRAM_COMPACT_EXTRA_SIZE * extra;
-        read_extra(at + COMPACT_BESIDE, read_i56(at), &out->extra[extra]);
+        read_extra(at + COMPACT_COEFFICIENTS, read_i56(at), &out->extra[extra]);
     }
 }
 

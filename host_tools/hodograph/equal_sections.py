@@ -64,10 +64,10 @@ class EqualSections:
     def find(self, section: Section) -> KnownSection | None:
         """An equal section with its curve moved to the place of this one."""
         key = _key(section)
-        known = None if key is None else self._known.get(key)
-        if known is None or key is None:
+        if key is None or key not in self._known:
             return None
         self._known.move_to_end(key)
+        known = self._known[key]
         return replace(known, fitted=_moved_path(known.fitted, section.reference))
 
     def add(self, section: Section, fitted: FittedPath) -> SharedPrograms:

@@ -13,6 +13,7 @@
  */
 #include "core/program.c"
 #include "proof.h"
+#include "any_header.h"
 
 uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 {
@@ -24,17 +25,10 @@ uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 /* In a program with so many path axes, whose segments have so many bytes. */
 static void places(uint32_t axis_count, uint32_t segment)
 {
-    struct program_header h;
     uint32_t size = nondet_uint32();
     uint32_t i = nondet_uint32();
     __CPROVER_assume(size <= 1u << 13);
-    h.flags = PROGRAM_FLAG_COMPACT;
-    h.axis_count = (uint16_t)axis_count;
-    h.header_size = (uint16_t)program_header_size(axis_count);
-    h.image_size = nondet_uint32();
-    h.segment_count = nondet_uint32();
-    h.piece_count = nondet_uint32();
-    h.event_count = nondet_uint32();
+    const struct program_header h = any_header(axis_count, PROGRAM_FLAG_COMPACT);
     prove(segment_size(&h) == segment);
     if (check_size(&h, size) != 0) {
         return;

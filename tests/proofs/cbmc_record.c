@@ -13,12 +13,13 @@
  * mutant: core/program.c: b + 32 + 16 * k => b + 40 + 16 * k
  * mutant: core/program.c: read_preimage(b + 32, => read_preimage(b + 40,
  * mutant: core/program.c: read_extra(at + 8, => read_extra(at + 14,
- * mutant: core/program.c: read_extra(at + COMPACT_BESIDE, => read_extra(at + 8,
+ * mutant: core/program.c: read_extra(at + COMPACT_COEFFICIENTS, => read_extra(at + 8,
  * mutant: core/program.c: b + COMPACT_POWERS + 6 * k => b + COMPACT_POWERS + 11 * k
  * mutant: core/program.c: need != h->image_size => need < h->image_size
  */
 #include "core/program.c"
 #include "proof.h"
+#include "any_header.h"
 
 uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 {
@@ -67,17 +68,10 @@ static void readers(void)
 /* In a program with so many path axes. */
 static void places(uint32_t axis_count)
 {
-    struct program_header h;
     uint32_t size = nondet_uint32();
     uint32_t i = nondet_uint32();
     __CPROVER_assume(size <= 1u << 14);
-    h.axis_count = (uint16_t)axis_count;
-    h.header_size = (uint16_t)program_header_size(axis_count);
-    h.image_size = nondet_uint32();
-    h.segment_count = nondet_uint32();
-    h.piece_count = nondet_uint32();
-    h.event_count = nondet_uint32();
-    h.flags = 0; /* compact ones: cbmc_compact.c */
+    const struct program_header h = any_header(axis_count, 0); /* compact ones: cbmc_compact.c */
     uint32_t segment = segment_size(&h);
     uint32_t piece = piece_size(&h);
     if (check_size(&h, size) != 0) {

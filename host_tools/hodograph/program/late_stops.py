@@ -126,7 +126,7 @@ class Replanning:
         step = self.stop_time_s / program.stops.worst(FAULT).time_s
         step = share * min(max(step, LEAST_STEP), GREATEST_STEP)
         if plan.request.optimal:
-            late = program.stops.bound_us[:, FAULT] * 1e-6 > self.stop_time_s
+            late = program.stops.late(FAULT, self.stop_time_s)
             return program.pieces.slower_zones(late, step, program.length_q40)
         feed_mm_s = max(step * plan.feed_mm_s, LEAST_FEED_MM_S)
         whole = FeedZone(0.0, plan.length_mm, feed_mm_s)

@@ -47,7 +47,7 @@ _MOST_LATE = 0.3
 def late_too_often(program: Program, stop_time_s: float) -> bool:
     """Whether fault stops may take longer than `stop_time_s` for more than _MOST_LATE of the time."""
     seconds = program.pieces.duration_s
-    late = program.stops.bound_us[:, FAULT] * 1e-6 > stop_time_s
+    late = program.stops.late(FAULT, stop_time_s)
     return float(seconds[late].sum()) > _MOST_LATE * float(seconds.sum())
 
 

@@ -72,6 +72,10 @@ class Stops:
     def __len__(self) -> int:
         return int(self.bound_us.shape[0])
 
+    def late(self, kind: int, time_s: float) -> NDArray[np.bool_]:
+        """The pieces (M,) in which stops of a kind may take longer than this."""
+        return np.asarray(self.bound_us[:, kind] * 1e-6 > time_s)
+
     def worst(self, kind: int) -> WorstStop:
         """The worst stop of a kind."""
         return WorstStop(
