@@ -26,8 +26,9 @@ sys.path[:0] = [str(ROOT / "host_tools")]
 from hodograph.config import Machine, load_machine, load_path_file  # noqa: E402
 from hodograph.errors import HodographError  # noqa: E402
 from hodograph.feed.limits import MACHINE_SHARE  # noqa: E402
+from hodograph.machine_limits import program_limits  # noqa: E402
 from hodograph.native.program import NativeLimits, NativeProgram  # noqa: E402
-from hodograph.pipeline import Pipeline, program_limits  # noqa: E402
+from hodograph.pipeline import Pipeline  # noqa: E402
 from hodograph.program import ProgramOptions, StopTerms, compile_path, encode  # noqa: E402
 
 MACHINES = {2: "paper_alpha", 3: "mill", 5: "mill_five_axes"}

@@ -27,8 +27,9 @@ from toppra_bound import bound  # noqa: E402
 
 from hodograph.errors import HodographError  # noqa: E402
 from hodograph.feed import Limits  # noqa: E402
+from hodograph.machine_limits import controller_limits, plants  # noqa: E402
 from hodograph.native.program import NativeProgram  # noqa: E402
-from hodograph.pipeline import Pipeline, controller_limits, load_pipeline, plants  # noqa: E402
+from hodograph.pipeline import Pipeline, load_pipeline  # noqa: E402
 from hodograph.verify import sampled, verify_program  # noqa: E402
 
 PAPER = """feed_mm_s = 100

@@ -21,9 +21,10 @@ sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
 
 from least_stop import LeastStop, State  # noqa: E402
 
+from hodograph.machine_limits import stop_terms  # noqa: E402
 from hodograph.native import NativeProgram  # noqa: E402
 from hodograph.native.stop_search import StopSearch  # noqa: E402
-from hodograph.pipeline import Pipeline, load_pipeline, stop_terms  # noqa: E402
+from hodograph.pipeline import Pipeline, load_pipeline  # noqa: E402
 from hodograph.program.stop_planning import fault_limits, hold_limits  # noqa: E402
 from hodograph.simulate import simulate_stop  # noqa: E402
 

@@ -39,8 +39,8 @@ from hodograph.bus.sdo.objects import STREAM
 from hodograph.bus.sdo.stream_channel import close_stream
 from hodograph.config import Machine, load_machine
 from hodograph.errors import HodographError
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits
-from hodograph.pipeline import program_limits
 from hodograph.stream.chunk import Chunk
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlannedSection
 from hodograph.stream.sender import Sender, StreamedJob, StreamProgress

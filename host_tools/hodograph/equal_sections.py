@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .feed import FeedPlan
+from .fixed_point import to_q40
 from .native.program import NativeProgram
 from .pipeline import Judged
 from .program.check import leaves_range
@@ -31,8 +32,6 @@ _MOST_KNOWN = 256
 
 _MOST_CHORDS = 2000
 """Longer sections are seldom equal, and would take much memory."""
-
-_GRID = 2.0**40
 
 _REACH_MM = 8192.0
 """Twice the range of coordinates in a program: with points farther from the first one there is no program, and their
@@ -92,7 +91,7 @@ def _key(section: Section) -> bytes | None:
         return None
     turn = b"" if own.turn_deg is None else own.turn_deg.tobytes()
     kind = repr((section.tolerance_mm, section.tied, section.stands_at, own.count, bool(turn)))
-    moved = np.rint(from_first_mm * _GRID).astype(np.int64)
+    moved = to_q40(from_first_mm)
     return b"".join(
         (kind.encode(), moved.tobytes(), own.feed_mm_s.tobytes(), own.sag_mm.tobytes(), turn)
     )

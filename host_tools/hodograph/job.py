@@ -7,9 +7,8 @@ sections (dwells, spindle, outputs, tool changes) is kept with its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
 from time import perf_counter
@@ -19,20 +18,12 @@ from numpy.typing import NDArray
 
 from .config import Machine, PathFile, SpacePathSpec
 from .config.outputs import Outputs
-from .equal_sections import EqualSections, SharedPrograms, moved_program
+from .equal_sections import EqualSections, SharedPrograms
 from .errors import InputError, PlanError
-from .events import Events, no_events
-from .feed import FeedPieces, FeedPlan, FeedRequest, FeedZone, Limits
+from .feed import FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
-from .pipeline import THOROUGH_GAIN, Judged, Pipeline, program_limits
-from .program.compiler import Compilation
-from .program.geometry import quantise
-from .program.stop_planning import LongStopError, StopTerms
-from .simulate import Motion, simulate_on
-from .spline.build import FoundSpline
-from .spline.curve import PHSpline
-from .spline.spatial import SpatialPHSpline
+from .section_pipeline import SectionPipeline
 from .toolpath.files import ReadOptions, is_gcode, read_toolpath
 from .toolpath.fit.fitting import FittedPath, Tolerance, fit
 from .toolpath.fit.sections import Section, Toolpath, cut_at, divided
@@ -57,16 +48,6 @@ Int = NDArray[np.int64]
 DEFAULT_TOLERANCE_MM = 0.01
 GREATEST_TOLERANCE_MM = 10.0
 
-_MORE_RESERVE = (0.004, 0.008, 0.02, 0.05)
-"""Shares of the axis limits that plans leave free, one after the other, until a program can be made of them."""
-
-_SLOWER, _MOST_SLOWER = 0.7, 12
-"""Share of its mean feed that a piece gets where more reserve does not help, and how many times."""
-
-_THOROUGH_CHORDS = 1000
-"""Sections with at most so many chords, and so many feed pieces, are searched for stops with all trials where few do
-not suffice."""
-
 _TOOL_OFFSET = "tool offset (G43)"
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
@@ -77,132 +58,6 @@ _IGNORED: dict[tuple[type[Command], ...], str] = {
 }
 _LONGEST_NAME = 40
 _ROUNDING_MM = 1e-9
-_Q40 = 2.0**40
-
-
-@dataclass(frozen=True, eq=False)
-class SectionPipeline(Pipeline):
-    """A pipeline whose curve is that of a section.
-
-    shared  with equal sections of the job
-    """
-
-    fitted: FittedPath | None = None
-    given_events: Events = field(default_factory=no_events)
-    shared: SharedPrograms = field(default_factory=SharedPrograms)
-
-    @property
-    def events(self) -> Events:
-        """The outputs that switch on the path."""
-        return self.given_events
-
-    @cached_property
-    def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
-        """The curve, in the plane where only two axes of the machine follow a path."""
-        assert self.fitted is not None
-        curve = self.fitted.curve
-        if len(self.machine.path_axes) > 2:
-            return FoundSpline(curve, 0)
-        return FoundSpline(_in_plane(curve), 0)
-
-    @property
-    def stop_terms(self) -> StopTerms:
-        """What the stops of the program keep."""
-        return replace(super().stop_terms, quick=True)
-
-    @cached_property
-    def _timed_plan(self) -> tuple[FeedPlan, float]:
-        begin = perf_counter()
-        if self.shared.plan is None:
-            self.shared.plan = self._planned(self.limits)
-        return self.shared.plan, perf_counter() - begin
-
-    def _judge_plans(self) -> Judged:
-        """The program of an equal section where there is one, moved here."""
-        known = self.shared.judged.get(self.given_events.tobytes())
-        moved = known and moved_program(known, self._start_q40, program_limits(self.machine))
-        if moved:
-            return moved
-        judged = super()._judge_plans()
-        self.shared.judged.setdefault(self.given_events.tobytes(), judged)
-        return judged
-
-    @property
-    def _start_q40(self) -> Int:
-        """The first point of its program (axes,), in machine coordinates."""
-        assert self.fitted is not None
-        first = self.fitted.curve.axes_nodes[0]
-        offset = np.rint(np.array(self.machine.offset_mm) * _Q40)
-        start = np.zeros(offset.size)
-        start[: first.size] = np.rint(first * _Q40)[: offset.size]
-        return np.asarray(start + offset).astype(np.int64)
-
-    def _planned(self, limits: Limits) -> FeedPlan:
-        """The plan; with more reserve, then with a lower feed there, where a piece would have none left for the least
-        override rate.
-        """
-        plan = super()._planned(limits)
-        for reserve in _MORE_RESERVE:
-            if not self._without_override(plan)[1].any():
-                return plan
-            plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
-        return self._passed_slowly(plan)
-
-    def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
-        again = super()._slower(plan, zones, why)
-        passed = self._passed_slowly(again)
-        if passed is again:
-            return again
-        return replace(passed, notes=(*passed.notes, again.notes[-1]))
-
-    def _passed_slowly(self, plan: FeedPlan) -> FeedPlan:
-        """The plan, with a lower feed where a piece leaves no headroom for a changing override."""
-        for _ in range(_MOST_SLOWER):
-            pieces, lacking = self._without_override(plan)
-            slower = pieces.slower_zones(lacking, _SLOWER, self._length_q40)
-            if not slower:
-                break
-            plan = super()._planned(replace(plan.limits, zones=(*plan.limits.zones, *slower)))
-        return plan
-
-    def _without_override(self, plan: FeedPlan) -> tuple[FeedPieces, NDArray[np.bool_]]:
-        """The pieces of a plan, and which of them leave no headroom for a changing override: a bend of less than a
-        micrometre may be over between two places where limits are evaluated.
-        """
-        pieces = plan.pieces_over(self._length_q40, self._joints_q40)
-        codes = np.minimum(pieces.override_rate_codes, pieces.override_second_codes)
-        return pieces, np.asarray(codes.min(axis=1) == 0)
-
-    @cached_property
-    def _joints_q40(self) -> Int:
-        """Joints of the curve in its program."""
-        return quantise(self.curve, ()).start_q40
-
-    @property
-    def _length_q40(self) -> int:
-        return int(self._joints_q40[-1])
-
-    def _compiled_again(self, plan: FeedPlan) -> Compilation:
-        return self._with_stops(plan, self.stop_terms)
-
-    def _with_stops(self, plan: FeedPlan, terms: StopTerms) -> Compilation:
-        """The program of a plan. Its stops are searched with few trials; where their bounds are a little too long, with
-        all. Raises LongStopError.
-        """
-        try:
-            return super()._with_stops(plan, terms)
-        except LongStopError as error:
-            assert self.fitted is not None
-            few = max(self.fitted.reference.count, error.program.piece_count) <= _THOROUGH_CHORDS
-            if not few or error.late_by > THOROUGH_GAIN:
-                raise
-            return super()._with_stops(plan, replace(terms, quick=False))
-
-
-def _in_plane(curve: SpatialPHSpline) -> PHSpline:
-    """A curve whose z does not change, without it."""
-    w = curve.preimage[:, 0] + 1j * curve.preimage[:, 3]
-    return PHSpline(curve.origin[:, 0] + 1j * curve.origin[:, 1], w, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -675,120 +530,3 @@ def _feeds(fitted: FittedPath) -> tuple[float, tuple[FeedZone, ...]]:
         if value < nominal and high > low:
             zones.append(FeedZone(low, high, value))
     return nominal, tuple(zones)
-
-
-@dataclass(frozen=True, eq=False)
-class JobMotion:
-    """A run of a job: the motions of its sections, one after the other.
-
-    The last point of a section is the first one of the next and counts once. Dwells are not part of it.
-    """
-
-    job: Job
-    motions: tuple[Motion, ...]
-    planning_s: float
-
-    @property
-    def period_s(self) -> float:
-        """Time between two ticks."""
-        return self.motions[0].period_us / 1e6
-
-    @property
-    def ticks(self) -> int:
-        """Of all sections."""
-        return 1 + sum(motion.ticks - 1 for motion in self.motions)
-
-    @property
-    def duration_s(self) -> float:
-        """Time of the motion, from the first tick to the last, without dwells."""
-        return (self.ticks - 1) * self.period_s
-
-    @property
-    def path_motions(self) -> Iterator[Motion]:
-        """Motions in which x, y or z move. The errors of the others are in degrees."""
-        for section, motion in zip(self.job.sections, self.motions, strict=True):
-            if section.stands_at is None:
-                yield motion
-
-    def summary(self) -> dict[str, object]:
-        """The keys that tools may rely on in `--json` output."""
-        return self.job.summary() | {
-            "duration_s": self.duration_s,
-            "ticks": self.ticks,
-            "planning_s": self.planning_s,
-            "fit_s": self.job.fit_s,
-            "max_contour_error_um": max(
-                (motion.max_contour_error_um for motion in self.path_motions), default=0.0
-            ),
-            "max_following_error_um": max(
-                (motion.max_following_error_um for motion in self.path_motions), default=0.0
-            ),
-            "section": [
-                section.lines_summary() | motion.summary()
-                for section, motion in zip(self.job.sections, self.motions, strict=True)
-            ],
-        }
-
-
-def simulate_job(
-    job: Job,
-    kernel: str | None = None,
-    *,
-    keep_rows: bool = True,
-    progress: Callable[[int, int], None] | None = None,
-) -> JobMotion:
-    """Plans, compiles and runs every section. Errors name file and line."""
-    begin = perf_counter()
-    images = [section.pipeline.accepted for section in job.sections]
-    planning_s = perf_counter() - begin
-    motions = []
-    for done, image in enumerate(images):
-        machine = job.sections[done].pipeline.machine
-        motions.append(simulate_on(machine, image, kernel, keep_rows=keep_rows))
-        if progress is not None:
-            progress(done + 1, len(images))
-    return JobMotion(job, tuple(motions), planning_s)
-
-
-def write_job_trace(run: JobMotion, file: Path) -> None:
-    """One row a tick: tick, t_s, source line, arc length, feed, commanded and actual positions of the axes.
-
-    Positions are in the program's own coordinates: without the work offset. In sections that turn axes alone, arc
-    length stands still and the feed is in degrees a second. Raises InputError.
-    """
-    machine = run.job.machine
-    named = [(axis.name, axis.unit) for axis in machine.path_axes]
-    header = [
-        *("tick", "t_s", "line", "arc_length_mm", "feed_mm_s"),
-        *(f"{name}_cmd_{unit}" for name, unit in named),
-        *(f"{name}_act_{unit}" for name, unit in named),
-    ]
-    try:
-        with file.open("w", encoding="ascii", newline="\n") as out:
-            out.write(",".join(header) + "\n")
-            for row in _trace_rows(run):
-                out.write(row)
-    except OSError as error:
-        raise InputError(f"{file}: cannot be written: {error.strerror}") from None
-
-
-def _trace_rows(run: JobMotion) -> Iterator[str]:
-    tick, passed_mm = 0, 0.0
-    for index, (section, motion) in enumerate(zip(run.job.sections, run.motions, strict=True)):
-        first = 1 if index else 0
-        rows = slice(first, motion.ticks)
-        own = motion.arc_length_mm[rows]
-        count = own.size
-        columns = [
-            np.arange(tick, tick + count),
-            np.arange(tick, tick + count) * run.period_s,
-            section.line_at(own),
-            passed_mm + (own if section.stands_at is None else np.zeros(count)),
-            motion.feed_mm_s[rows],
-            *section.places(motion.cmd_mm[rows]).T,
-            *section.places(motion.act_mm[rows]).T,
-        ]
-        texts = [map(repr, column.tolist()) for column in columns]
-        yield from (",".join(row) + "\n" for row in zip(*texts, strict=True))
-        tick += count
-        passed_mm += section.length_mm

@@ -24,6 +24,7 @@ import numpy as np
 from .config.outputs import Channel, Outputs
 from .errors import InputError
 from .events import DIGITAL, Event, Events, events_of
+from .fixed_point import nearest_q40
 from .toolpath.fit.fitting import FittedPath
 from .toolpath.moves import (
     AnalogOutput,
@@ -146,7 +147,7 @@ class EventMaker:
         _, rest = _split(section.before, is_first=is_first)
         begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, rest)]
         moving = self._on_the_way(section)
-        end_q40 = round(section.length_mm * 2**40)
+        end_q40 = nearest_q40(section.length_mm)
         early = list(behind) if is_last else _split(behind, is_first=False)[0]
         return SectionEvents(repeated, [*begin, *moving, *self.changed(end_q40, early)])
 
@@ -157,7 +158,7 @@ class EventMaker:
         for s_mm, command in section.on_the_way:
             passed = [feed for feed in feeds if feed.s_mm <= s_mm]
             del feeds[: len(passed)]
-            found += [*self._at_feeds(passed), *self.changed(round(s_mm * 2**40), [command])]
+            found += [*self._at_feeds(passed), *self.changed(nearest_q40(s_mm), [command])]
         return found + self._at_feeds(feeds)
 
     def _at_feeds(self, feeds: Iterable[ProgrammedFeed]) -> list[Event]:
@@ -168,7 +169,7 @@ class EventMaker:
             self.feed = feed
             if self.power is None or channel is None:
                 continue
-            event = self._power(channel, round(feed.s_mm * 2**40), feed.line)
+            event = self._power(channel, nearest_q40(feed.s_mm), feed.line)
             if self.last[channel.name][1:] != event[1:]:
                 self.last[channel.name] = event
                 found.append(event)

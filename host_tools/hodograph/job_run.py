@@ -20,7 +20,8 @@ from .bus.goto import goto
 from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
 from .bus.sdo.controller import READY
 from .errors import PlanError, RunError
-from .job import Job, JobMotion, JobSection
+from .job import Job, JobSection
+from .job_simulation import JobMotion
 from .native import NativeProgram
 from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange

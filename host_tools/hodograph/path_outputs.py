@@ -8,6 +8,7 @@ from .config.outputs import PathOutput
 from .config.path_file import PathFile
 from .errors import InputError
 from .events import Event, Events, events_of, no_events
+from .fixed_point import nearest_q40
 from .spline.frames import Curve
 
 END_MM = 1e-6
@@ -43,7 +44,7 @@ def _place_q40(output: PathOutput, curve: Curve, points: int) -> int:
         raise InputError(
             f"{output.where}: at_mm = {place_mm:.9g} is beyond the end of the path, {length_mm:.9g} mm"
         )
-    return round(place_mm * 2**40)
+    return nearest_q40(place_mm)
 
 
 def _place_mm(output: PathOutput, curve: Curve, points: int) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from .config import (
     PLANE_AXES,
     SPACE_AXES,
-    Drive,
     Machine,
     PathFile,
     PathSpec,
@@ -29,29 +28,32 @@ from .config import (
 from .errors import InputError, PlanError
 from .events import Events
 from .feed import (
-    AxisLimits,
-    ControllerLimits,
     FeedPlan,
     FeedRequest,
     FeedZone,
     Limits,
     Peak,
-    Plant,
-    Plants,
     Replan,
     ineffective_limits,
     plan_path,
     replan,
 )
 from .feed.optimal import plan_optimal, plan_peaks, replan_optimal
+from .fixed_point import MM_PER_Q40
+from .machine_limits import (
+    axis_limits,
+    controller_limits,
+    controller_verdict,
+    plants,
+    program_limits,
+    stop_terms,
+)
 from .names import AXES
-from .native.brake_check import BrakeCheck
-from .native.program import NativeFault, NativeLimits, NativeProgram
+from .native.program import NativeFault, NativeProgram
 from .path_outputs import events_on_path
 from .program import (
     Compilation,
     Program,
-    ProgramLimits,
     ProgramOptions,
     StopTerms,
     compile_path,
@@ -61,7 +63,6 @@ from .program import (
 from .program.codes import ProgramError
 from .program.late_stops import Replanning
 from .program.stop_planning import LongStopError
-from .program.stops import DECELERATION, FAULT, HOLD
 from .spline import PHSpline, SplineResult, from_control_polygon, through_points
 from .spline.spatial import (
     SpatialSplineResult,
@@ -72,156 +73,6 @@ from .spline.spatial.curve import SpatialPHSpline, embedded
 from .spline.spatial.extra import with_standing_axes
 
 _Found = TypeVar("_Found", SplineResult, SpatialSplineResult)
-
-
-def controller_limits(machine: Machine) -> ControllerLimits:
-    """The limits that a plan for this machine has to keep."""
-    return ControllerLimits(
-        feed_mm_s=machine.feed_mm_s,
-        acceleration_mm_s2=machine.acceleration_mm_s2,
-        jerk_mm_s3=machine.jerk_mm_s3,
-        reserve=machine.reserve,
-    )
-
-
-def axis_limits(machine: Machine) -> AxisLimits:
-    """The limits of the axes that follow a path. Raises InputError: there is only one axis."""
-    axes = machine.path_axes
-    return AxisLimits(
-        velocity_mm_s=tuple(axis.velocity_mm_s for axis in axes),
-        acceleration_mm_s2=tuple(axis.acceleration_mm_s2 for axis in axes),
-        jerk_mm_s3=tuple(axis.jerk_mm_s3 for axis in axes),
-    )
-
-
-def plants(machine: Machine | None, limits: Limits) -> Plants | None:
-    """The plants of the axes with the volts that their drives have, or `limits` gives them; None: neither is known.
-
-    Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
-    """
-    known = machine is not None and all(axis.drive is not None for axis in machine.path_axes)
-    if limits.volts is None and not known:
-        return None
-    if machine is None:
-        raise InputError(
-            '[limits] volts needs a machine: add [machine] file = "..." or use --machine FILE'
-        )
-    return tuple(_plant(drive, limits.volts) for drive in machine.models(machine.path_axes))
-
-
-def drive_plants(machine: Machine) -> Plants | None:
-    """The plants of the axes with all the volts of their drives, None when one of them has no drive file, or no volts
-    left beside its friction.
-    """
-    known = [axis.drive for axis in machine.path_axes if axis.drive is not None]
-    if len(known) < len(machine.path_axes) or any(
-        drive.volts_limit <= (drive.equipment.friction_volts or 0.0) for drive in known
-    ):
-        return None
-    return tuple(_plant(drive, drive.volts_limit) for drive in known)
-
-
-def stop_terms(machine: Machine, limits: Limits) -> StopTerms:
-    """What the stops of a program on a machine keep beside the limits of its plan, which are in `limits`."""
-    return StopTerms(
-        plants=plants(machine, limits),
-        drives=drive_plants(machine),
-        axis=axis_limits(machine),
-        stop_time_ms=machine.stop_time_ms,
-    )
-
-
-def _plant(drive: Drive, volts: float | None) -> Plant:
-    plant = Plant(
-        drive.gain_rad_s_v * drive.screw_mm_rad,
-        drive.time_constant_s,
-        drive.volts_limit if volts is None else min(volts, drive.volts_limit),
-        drive.equipment.friction_volts or 0.0,
-        drive.volts_limit,
-    )
-    if not plant.reach_mm_s > 0.0:
-        raise InputError(
-            f"{'drive file' if volts is None else f'[limits] volts {volts:g}'}: friction alone takes "
-            f"{plant.friction_volts:g} V of a drive, which has {drive.volts_limit:g}: "
-            "give more than that friction, or another drive"
-        )
-    return plant
-
-
-def program_limits(machine: Machine) -> ProgramLimits:
-    """What the controller of this machine checks a program against. Raises InputError: it has one axis only."""
-    axes = machine.path_axes
-    return ProgramLimits(
-        period_us=machine.period_us,
-        feed_um_s=round(machine.feed_mm_s * 1000),
-        acceleration_um_s2=round(machine.acceleration_mm_s2 * 1000),
-        jerk_mm_s3=round(machine.jerk_mm_s3),
-        min_q40_mm=tuple(round(axis.travel_min_mm * 2**40) for axis in axes),
-        max_q40_mm=tuple(round(axis.travel_max_mm * 2**40) for axis in axes),
-        stop_time_ms=machine.stop_time_ms,
-        axis_velocity_um_s=tuple(round(axis.velocity_mm_s * 1000) for axis in axes),
-        axis_acceleration_um_s2=tuple(round(axis.acceleration_mm_s2 * 1000) for axis in axes),
-        axis_jerk_mm_s3=tuple(round(axis.jerk_mm_s3) for axis in axes),
-        axis_count=0 if machine.first_axis else len(axes),
-    )
-
-
-def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
-    """What the controller of this machine finds in a program; None: it accepts it."""
-    return program.check(NativeLimits(**asdict(program_limits(machine))))
-
-
-@dataclass(frozen=True)
-class ProvedStops:
-    """What is proved of the stops of one kind: from how many feed pieces one may begin, from how many of them all stops
-    keep the limits of the axes until standstill, and where the others begin, mm.
-
-    time_share   share of the time of the pieces from which one may begin that proved ones last: pieces differ in length
-    """
-
-    kind: str
-    pieces: int
-    open_mm: tuple[float, ...]
-    time_share: float
-
-    @property
-    def proved(self) -> int:
-        """Pieces from which all stops are proved."""
-        return self.pieces - len(self.open_mm)
-
-    @property
-    def name(self) -> str:
-        """In words."""
-        return "feed hold and stop" if self.kind == "hold" else "fault stop"
-
-
-def proved_stops(
-    native: NativeProgram, program: Program, machine: Machine
-) -> tuple[ProvedStops, ...]:
-    """Of feed holds and of fault stops of a program that the controller of a machine accepts
-    (firmware/core/brake_check.h).
-    """
-    check = BrakeCheck(native, NativeLimits(**asdict(program_limits(machine))))
-    duration_s = program.pieces.duration_s
-    out = []
-    for kind, name in ((HOLD, "hold"), (FAULT, "fault")):
-        codes = program.stops.codes[:, kind]
-        pieces = np.flatnonzero(codes[:, DECELERATION])
-        keeps = np.array([check.proves(i, kind, codes[i].tolist()) for i in pieces.tolist()], bool)
-        whole_s = float(duration_s[pieces].sum())
-        share = float(duration_s[pieces[keeps]].sum()) / whole_s if whole_s > 0.0 else 1.0
-        places = tuple(program.piece_starts_mm[pieces[~keeps]].tolist())
-        out.append(ProvedStops(name, pieces.size, places, share))
-    return tuple(out)
-
-
-def proved_limits(machine: Machine) -> str:
-    """The limits that the controller of this machine has proved of each program that it accepts."""
-    return ", ".join(
-        f"{axis.name} {axis.velocity_mm_s:g} {axis.unit}/s {axis.acceleration_mm_s2:g} {axis.unit}/s^2 "
-        f"{axis.jerk_mm_s3:g} {axis.unit}/s^3"
-        for axis in machine.path_axes
-    )
 
 
 _MORE_RESERVE = (0.002, 0.01)
@@ -529,7 +380,7 @@ class Pipeline:
         """The program as the controller accepts it; raises PlanError as `image` does."""
         fault = self._judged.fault
         if fault is not None:
-            at_mm = self.program.pieces.start_q40[fault.index] * 2.0**-40
+            at_mm = self.program.pieces.start_q40[fault.index] * MM_PER_Q40
             raise PlanError(
                 f"{self.file.file}: the controller would refuse the program: {fault.text} (code {fault.code}) in the "
                 f"feed piece at {at_mm:.6g} mm: lower [limits] there, and please report this path"

@@ -23,8 +23,8 @@ from hodograph.bus.sdo.controller import Controller
 from hodograph.bus.sdo.objects import MOVING
 from hodograph.bus.sdo.stream_channel import ENDED, OPEN, stream_status
 from hodograph.config import Machine, load_machine
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits, NativeProgram
-from hodograph.pipeline import program_limits
 from hodograph.program import encode
 from hodograph.stream.plan import JobFiles, JobPlan, Place
 from hodograph.stream.simulation import concatenated, from_rest_to_rest

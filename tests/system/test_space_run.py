@@ -33,9 +33,9 @@ from hodograph.cli.main import main
 from hodograph.config import Machine
 from hodograph.errors import RefusedError
 from hodograph.feed import ControllerLimits
+from hodograph.machine_limits import program_limits
 from hodograph.native import Contour, NativeLimits, NativeProgram
 from hodograph.native.program import counts_from_q40_mm
-from hodograph.pipeline import program_limits
 from hodograph.program import encode
 from marks import long
 from spatial_image import add_extra, chain, feed_along, image, wandering

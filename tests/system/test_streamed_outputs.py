@@ -19,9 +19,9 @@ from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.stream_channel import close_stream
 from hodograph.cli.main import main
 from hodograph.config import Machine, load_machine
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
-from hodograph.pipeline import program_limits
 from hodograph.stream.plan import JobFiles, JobPlan, Place
 from hodograph.toolpath.files import ReadOptions
 

@@ -9,7 +9,8 @@ import pytest
 
 from browser import Browser, Page
 from hodograph.config import load_machine
-from hodograph.job import load_job, simulate_job
+from hodograph.job import load_job
+from hodograph.job_simulation import simulate_job
 from hodograph.report import write_toolpath_report
 
 pytestmark = pytest.mark.long

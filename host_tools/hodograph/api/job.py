@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path as FilePath
 
 from .. import job as jobs
+from ..job_simulation import simulate_job
 from ..native import NativeProgram
 from ..toolpath.files import ReadOptions
 from .machine import Machine
@@ -160,7 +161,7 @@ class Job:
 
         Raises PlanError, and InputError when an axis of the machine has no drive file.
         """
-        found = jobs.simulate_job(self._job, kernel)
+        found = simulate_job(self._job, kernel)
         return JobRun(tuple(Run(motion) for motion in found.motions))
 
     def __repr__(self) -> str:

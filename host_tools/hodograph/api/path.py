@@ -21,9 +21,10 @@ from ..feed import Limits as FileLimits
 from ..feed.kinematics import axis_motion
 from ..feed.limits import LEAST_RESERVE
 from ..feed.request import OPTIMAL, PROFILES
-from ..job import JobSection, SectionPipeline
+from ..job import JobSection
 from ..names import AXES
 from ..pipeline import Pipeline, pipeline_of
+from ..section_pipeline import SectionPipeline
 from ..spline import PHSpline, coordinates
 from ..spline.frames import frames
 from ..spline.spatial import SpatialPHSpline

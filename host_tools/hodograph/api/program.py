@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..config import SPACE_AXES
 from ..config import Machine as MachineFile
 from ..errors import InputError
+from ..machine_limits import controller_verdict
 from ..native import NativeProgram
-from ..pipeline import controller_verdict, program_start_counts
+from ..pipeline import program_start_counts
 from ..program.image import read_image
 from ..simulate import Motion, simulate_on
 from .machine import Machine

@@ -13,13 +13,7 @@ import numpy as np
 from ..config import PLANE_AXES, SPACE_AXES, Machine
 from ..errors import InputError, RefusedError, RunError
 from ..feed import FeedPlan, FeedRequest, Limits, plan_path
-from ..pipeline import (
-    axis_limits,
-    controller_limits,
-    plants,
-    program_limits,
-    stop_terms,
-)
+from ..machine_limits import axis_limits, controller_limits, plants, program_limits, stop_terms
 from ..program import ProgramOptions, StopTerms, compile_path, encode
 from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line

@@ -16,9 +16,10 @@ from ..bus.sdo.status import loaded_program
 from ..bustime import require_fit
 from ..config import SPACE_AXES, Machine, load_machine, read_toml
 from ..errors import InputError
+from ..machine_limits import program_limits
 from ..names import is_toolpath
 from ..native import NativeProgram
-from ..pipeline import load_pipeline, program_limits, program_start_counts, start_counts
+from ..pipeline import load_pipeline, program_start_counts, start_counts
 from ..program.image import read_image
 from .bus_commands import reached, stopping
 from .output import duration_text, note, print_json, print_rows, progress, size_text

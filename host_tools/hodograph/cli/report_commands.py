@@ -6,7 +6,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from ..errors import InputError
-from ..job import simulate_job
+from ..job_simulation import simulate_job
 from ..names import is_toolpath
 from ..pipeline import load_pipeline
 from .output import print_json, progress, require_places

@@ -14,8 +14,8 @@ from ..bus.own_bus import opened_bus
 from ..bus.run import BusRun, run_program
 from ..bustime import require_fit
 from ..errors import BusError, InputError
-from ..job import write_job_trace
 from ..job_run import JobRun, NoRoomError, PreparedJob, operator_stops, prepared, run_job
+from ..job_simulation import write_job_trace
 from ..names import is_toolpath
 from ..pipeline import Pipeline, load_pipeline, start_counts
 from ..simulate import write_trace

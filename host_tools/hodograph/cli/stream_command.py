@@ -28,10 +28,12 @@ from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
+from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..job import DEFAULT_TOLERANCE_MM
+from ..machine_limits import program_limits
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
-from ..pipeline import Pipeline, program_limits
+from ..pipeline import Pipeline
 from ..program.inspection import RING_BYTES
 from ..stream.chunk import BLOCK_HEAD, largest_chunk
 from ..stream.chunks import CHUNK_BYTES
@@ -210,7 +212,7 @@ def _run(
         if continued:
             assert entry is not None
             note(
-                f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * 2.0**-40)} mm of it"
+                f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * MM_PER_Q40)} mm of it"
             )
             entry = replace(
                 entry,
@@ -279,7 +281,7 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
         if controller.state() in ON_PATH:
             controller.stop_and_wait()
         status = stream_status(controller)
-        return Place(*entry.place_at(round(status.arc_length_mm * 2**40)))
+        return Place(*entry.place_at(nearest_q40(status.arc_length_mm)))
 
 
 def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> Place:

@@ -12,7 +12,8 @@ import tomlkit
 
 from ..config import load_machine
 from ..errors import InputError
-from ..job import DEFAULT_TOLERANCE_MM, Job, JobSection, load_job, simulate_job, write_job_trace
+from ..job import DEFAULT_TOLERANCE_MM, Job, JobSection, load_job
+from ..job_simulation import simulate_job, write_job_trace
 from ..names import TOOLPATH_SUFFIXES, is_toolpath
 from ..pipeline import Pipeline
 from ..toolpath.files import ReadOptions

@@ -11,16 +11,10 @@ from pathlib import Path
 from ..config import PLANE_AXES, Drive, Machine
 from ..errors import InputError, LimitError
 from ..feed import Peak
+from ..machine_limits import ProvedStops, controller_verdict, proved_limits, proved_stops
 from ..names import is_toolpath
 from ..native.program import NativeFault, NativeProgram
-from ..pipeline import (
-    Pipeline,
-    ProvedStops,
-    controller_verdict,
-    load_pipeline,
-    proved_limits,
-    proved_stops,
-)
+from ..pipeline import Pipeline, load_pipeline
 from ..program import compile_program, encode
 from ..program.compiler import ProgramOptions
 from ..program.image import read_image

@@ -19,6 +19,7 @@ from ..events import (
     Event,
     Events,
 )
+from ..fixed_point import MM_PER_Q40
 from .table import Table
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -337,7 +338,7 @@ def placed_outputs(outputs: Outputs | None, events: Events) -> list[PlacedOutput
 def placed_by(outputs: Outputs, event: Event) -> list[PlacedOutput]:
     """What one event switches."""
     out = []
-    place_mm = event.place_q40 * 2.0**-40
+    place_mm = event.place_q40 * MM_PER_Q40
     for one in outputs.channels:
         value: float | bool | None
         gain = None

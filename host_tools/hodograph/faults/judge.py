@@ -12,6 +12,7 @@ import numpy as np
 
 from ..bus.capture.setpoint_check import find_jumps, find_rough_starts, step_limits
 from ..config import SPACE_AXES
+from ..fixed_point import MM_PER_Q40
 from ..native import Contour, NativeProgram
 from .case_record import CaseRecord, Emergency
 from .case_run import REST_TOLERANCE_COUNTS, CaseRun
@@ -170,7 +171,7 @@ def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[n
     scale = record.clean_run.machine.counts_per_mm
     for point in points:
         near = int(np.argmin(np.sum((places - point) ** 2, axis=1)))
-        arc_mm = float(rows["arc_length_q40_mm"][near]) * 2.0**-40
+        arc_mm = float(rows["arc_length_q40_mm"][near]) * MM_PER_Q40
         worst = max(worst, abs(contour.distance_mm(arc_mm, *(point / scale))))
     return worst
 

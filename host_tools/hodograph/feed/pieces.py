@@ -10,6 +10,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fixed_point import MM_PER_Q40, nearest_q40, to_q40
 from .limits import FeedZone
 from .override_levels import FACTOR_ONE_Q14, FULL, Codes, rates_per_s, seconds_per_s2
 from .request import LEAST_FEED_MM_S
@@ -146,7 +147,7 @@ def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
     e = exponents(duration)
     stretch = np.ldexp(1.0, e + 32) / duration
     k = np.arange(1, DEGREE + 1)
-    c = np.rint(shapes[:, 1:] * stretch[:, None] ** k * 2.0**40).astype(np.int64)
+    c = to_q40(shapes[:, 1:] * stretch[:, None] ** k)
     distance = np.diff(starts)
     curved = np.any(c[:, 1:] != 0, axis=1)
     for i in range(duration.size):
@@ -169,7 +170,7 @@ def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real
     e = exponents(duration_q32_s)
     end = np.ldexp(duration_q32_s.astype(np.float64), -(e + 32))
     k = np.arange(1, DEGREE + 1)
-    unit = c_q40.astype(np.float64) * 2.0**-40 * end[:, None] ** k
+    unit = c_q40.astype(np.float64) * MM_PER_Q40 * end[:, None] ** k
     seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)[:, None]
     out = []
     power = unit * k
@@ -253,7 +254,7 @@ def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> Fe
         shape = _powers(whole, pieces.c_q40[row])
         low, high = _parts(shape, times[1] / whole)
         begin = int(pieces.start_q40[row])
-        middle = begin + round(float(low.sum()) * 2.0**40)
+        middle = begin + nearest_q40(float(low.sum()))
         starts = np.array([begin, middle, ends[row]], dtype=np.int64)
         duration[at : at + 2] = np.diff(times)
         start[at : at + 2] = starts[:2]

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..fixed_point import nearest_q40
 from .kinematics import PathBounds
 from .limits import ControllerLimits, FeedZone, Limits, Peak
 from .override import with_override
@@ -173,7 +174,7 @@ class FeedPlan:
 
     @property
     def _length_q40(self) -> int:
-        return round(self.curve.length_mm * 2**40)
+        return nearest_q40(self.curve.length_mm)
 
 
 Replan = Callable[[FeedPlan, Sequence[FeedZone], str], FeedPlan]

@@ -10,6 +10,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..fixed_point import MM_PER_Q40, nearest_q40, to_q40
 from .pieces import LONGEST_PIECE_MM, RawPieces, derivative_bounds, round_pieces
 from .ramp import ACCELERATION, DISPLACEMENT, FEED, JERK, Ramp
 
@@ -91,7 +92,7 @@ class Timeline:
         self, length_q40: int, period_us: int, joints_q40: Int | None = None
     ) -> RawPieces:
         """Integer pieces over exactly this length, which may differ a little (rounding); any `joints_q40`."""
-        if length_q40 == round(self.length_mm * 2**40):
+        if length_q40 == nearest_q40(self.length_mm):
             return quantise(self, length_q40, period_us)
         length = Fraction(length_q40, 2**40)
         ramp = self.ramp
@@ -132,7 +133,7 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
     middle = _constant_cuts(line, up_end, down_start)
     middle_starts = _constant_starts(line, middle)
     straight = np.zeros((middle.size - 1, 8))
-    straight[:, 1] = np.diff(middle_starts) * 2.0**-40
+    straight[:, 1] = np.diff(middle_starts) * MM_PER_Q40
     inner = round_pieces(middle, middle_starts, straight)
     for cuts in _cut_counts(line, up_end, period_us):
         up_cuts = _ramp_cuts(line, up_end, cuts)
@@ -237,7 +238,7 @@ def _hermite(distance: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:
 def _distance_sums(ramp: _Ramp) -> Int:
     """Distances from the start of the ramp to the ends of its pieces, 0 first; 2^-40 mm."""
     total = np.concatenate((np.zeros(1), np.cumsum(ramp.distance)))
-    return np.rint(total * 2.0**40).astype(np.int64)
+    return to_q40(total)
 
 
 def _constant_cuts(line: Timeline, start: int, end: int) -> Int:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..config import SPACE_AXES
 from ..errors import InputError
+from ..fixed_point import MM_PER_Q40, to_q40
 from ..native import Contour, NativeProgram
 from .decoder import Floats, Samples
 
@@ -48,7 +49,7 @@ class ProgramPath:
         self.name = image[80:112].rstrip(b"\0").decode("utf-8", "replace")
         self.events = program.events
         """Outputs that switch on the path."""
-        self.length_mm = int(program.pointer.header.length_q40_mm) / 2**40
+        self.length_mm = int(program.pointer.header.length_q40_mm) * MM_PER_Q40
         self.duration_s = program.duration_q32_s / 2**32
         self._arc_mm, places = _table(program)
         self._points_mm, self._extra = places[:, :SPACE_AXES], places[:, SPACE_AXES:]
@@ -136,7 +137,7 @@ class ProgramPath:
         return float(self._arc_mm[np.argmin(np.sum(away * away, axis=1))])
 
     def _errors(self, arcs: Floats, counts: Floats) -> Floats:
-        arcs_q40 = np.rint(arcs * 2**40).astype(np.int64)
+        arcs_q40 = to_q40(arcs)
         return self._contour.errors_um(
             arcs_q40, np.rint(counts).astype(np.int32), self._counts_per_mm
         )
@@ -151,9 +152,9 @@ def _table(program: NativeProgram) -> tuple[Floats, Floats]:
     end_q42 = program.duration_q32_s << 10
     times = np.array([end_q42 * i // (count - 1) for i in range(count)], dtype=np.uint64)
     points = program.points("double", times)
-    arcs = points["arc_length_q40_mm"] / 2**40
+    arcs = points["arc_length_q40_mm"] * MM_PER_Q40
     fresh = np.concatenate([[True], np.diff(arcs) > 0])
-    places = points["position_q40"][:, : program.axis_count] / 2**40
+    places = points["position_q40"][:, : program.axis_count] * MM_PER_Q40
     return np.asarray(arcs[fresh]), np.asarray(places[fresh])
 
 

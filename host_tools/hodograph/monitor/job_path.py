@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fixed_point import MM_PER_Q40
 from ..stream.bus_chunks import curve_of
 from ..stream.chunk import Chunk
 from ..stream.geometry import Curve
@@ -55,7 +56,7 @@ class JobPath:
             self._last_mm = self._last_point = None
         if program.first_axis:
             return
-        begin_mm = chunk.header.job_start_q40 * 2.0**-40
+        begin_mm = chunk.header.job_start_q40 * MM_PER_Q40
         while self._parts and self._parts[-1].begin_mm >= begin_mm:
             self._parts.pop()
         self._parts.append(_Part(begin_mm, program.length_mm, curve_of(program)))

@@ -41,6 +41,7 @@ from ..bus.sdo.objects import (
 from ..bus.sdo.status import read_status, stream_dict
 from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
+from ..fixed_point import MM_PER_Q40
 from .pump import Publish
 
 PAUSE_S = 0.2
@@ -248,7 +249,7 @@ def _moving_part(controller: Controller) -> dict[str, Any]:
     return {
         "stream": stream_dict(controller),
         "motion": {
-            "arc_length_mm": controller.read(MOTION, 1) * 2.0**-40,
+            "arc_length_mm": controller.read(MOTION, 1) * MM_PER_Q40,
             "feed_mm_s": controller.read(MOTION, 2) / 1000,
             "time_s": controller.read(MOTION, 3) * 2.0**-32,
         },

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..config.outputs import Outputs, placed_outputs, words_of
 from ..events import Events
+from ..fixed_point import MM_PER_Q40
 from ..stream.bus_chunks import curve_of
 from ..stream.chunk import Chunk
 from .decoder import Floats
@@ -115,7 +116,7 @@ class JobMarks:
             return
         made = output_marks(self._outputs, new)
         points = curve_of(program).axes_point(np.array([mark.place_mm for mark in made]))
-        begin_mm = begin_q40 * 2.0**-40
+        begin_mm = begin_q40 * MM_PER_Q40
         moved = tuple(OutputMark(begin_mm + mark.place_mm, mark.text) for mark in made)
         self.marks = (*self.marks, *moved)[-_MOST:]
         self.drawn = [*self.drawn, *_with_points(made, points)][-_MOST:]

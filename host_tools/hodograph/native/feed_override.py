@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
+from ..fixed_point import MM_PER_Q40
 from .library import library
 from .program import NativeProgram
 
@@ -106,8 +107,8 @@ class FeedOverride(FeedCommands):
         self._lib.feed_override_next(self._feed, self._interp, self._point)
         own = self._point
         return Step(
-            own.arc_length_q40_mm * 2.0**-40,
-            tuple(own.position_q40[axis] * 2.0**-40 for axis in range(self._axes)),
+            own.arc_length_q40_mm * MM_PER_Q40,
+            tuple(own.position_q40[axis] * MM_PER_Q40 for axis in range(self._axes)),
             self._lib.feed_override_feed_q32(self._feed) * 2.0**-32,
             self._lib.feed_override_actual_q30(self._feed) * 2.0**-30,
         )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import HodographError, InputError
 from ..events import ANALOGUES
+from ..fixed_point import MM_PER_Q40
 from .drive import drive_config
 from .library import library, text
 from .program import AXES, Counts, NativeProgram, counts_by_axis
@@ -158,8 +159,8 @@ class OfflineSimulation:
             own.tick,
             None if own.rest_tick == FOR_EVER else own.rest_tick,
             own.bound_us * 1e-6,
-            own.from_q40_mm * 2.0**-40,
-            own.rest_q40_mm * 2.0**-40,
+            own.from_q40_mm * MM_PER_Q40,
+            own.rest_q40_mm * MM_PER_Q40,
         )
 
     def run(self, rows: NDArray[np.void]) -> None:

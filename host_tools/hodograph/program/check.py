@@ -34,6 +34,7 @@ from ..feed.pieces import (
     distance_excess,
     exponents,
 )
+from ..fixed_point import Q40_PER_MM
 from ..names import AXES
 from ..spline.bernstein import square
 from ..spline.spatial.curve import hodograph_of
@@ -266,7 +267,7 @@ def boxes_q40(program: Program) -> tuple[Real, Real]:
         direction = np.moveaxis(
             hodograph_of(np.ldexp(np.moveaxis(program.a_q44, 0, 1).astype(np.float64), -44)), 1, 2
         )
-    steps = np.cumsum(np.rint(direction * (2.0**40 / 5.0)), axis=1)
+    steps = np.cumsum(np.rint(direction * (Q40_PER_MM / 5.0)), axis=1)
     steps = np.concatenate((steps, np.moveaxis(program.extra_q40, 0, 2)), axis=2)
     points = np.concatenate((start[:, None, :], start[:, None, :] + steps), axis=1)
     return points.min(axis=1), points.max(axis=1)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..feed.override_levels import FULL, LEVEL_OVERRIDES, LEVELS
 from ..feed.pieces import part_bounds
+from ..fixed_point import MM_PER_Q40
 from .codes import ProgramError
 from .image import Program, ProgramLimits
 from .stops import DECELERATION, FAULT, HOLD, JERK_DOWN, JERK_UP, numbers
@@ -99,7 +100,7 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     """Least bounds (M,) of time in us and of the distance in um, from the command to rest."""
     own_s, own_mm, waits = own_bounds(program, kind)
     duration = program.pieces.duration_s
-    start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * MM_PER_Q40
     distance = np.maximum(np.diff(start), 0.0)
     window_s = WINDOW_TICKS * program.period_us * 1e-6
     count = duration.size

@@ -14,6 +14,7 @@ from ..errors import InputError, PlanError
 from ..events import Events, no_events
 from ..feed import FeedPlan, FeedZone, Replan, replan
 from ..feed.pieces import FeedPieces
+from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..spline import PHSpline
 from ..spline.frames import Curve, frames
 from ..spline.spatial import SpatialPHSpline
@@ -97,9 +98,9 @@ def compile_path(
         name = name.encode()[:NAME_SIZE].decode(errors="ignore")
     geometry = quantise(spline, offset_mm)
     length_q40 = int(geometry.start_q40[-1])
-    if abs(length_q40 * 2.0**-40 - plan.length_mm) > 1e-6:
+    if abs(length_q40 * MM_PER_Q40 - plan.length_mm) > 1e-6:
         raise InputError(
-            f"the plan is for {plan.length_mm:.9g} mm, the path has {length_q40 * 2.0**-40:.9g} mm"
+            f"the plan is for {plan.length_mm:.9g} mm, the path has {length_q40 * MM_PER_Q40:.9g} mm"
         )
     plan, pieces = _fit_feed(plan, geometry.start_q40, spline, replan)
     program = Program(
@@ -108,7 +109,7 @@ def compile_path(
         closed=spline.closed,
         duration_q32_s=pieces.total_q32_s,
         length_q40=length_q40,
-        offset_q40=tuple(round(mm * 2**40) for mm in offset_mm or (0.0,) * spline.axes),
+        offset_q40=tuple(nearest_q40(mm) for mm in offset_mm or (0.0,) * spline.axes),
         feed_limit_um_s=_limit(plan.limits.feed_mm_s, 1000.0),
         acceleration_limit_um_s2=_limit(plan.limits.acceleration_mm_s2, 1000.0),
         jerk_limit_mm_s3=_limit(plan.limits.jerk_mm_s3, 1.0),
@@ -137,7 +138,7 @@ def _require_override_headroom(program: Program, spline: Curve) -> None:
     if not lacking.size:
         return
     first = int(lacking[0])
-    ends_mm = np.append(pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    ends_mm = np.append(pieces.start_q40, program.length_q40).astype(np.float64) * MM_PER_Q40
     low_mm, high_mm = float(ends_mm[first]), float(ends_mm[first + 1])
     curvature = np.abs(frames(spline, np.linspace(low_mm, high_mm, _PLACES)).curvature)
     sharpest = float(curvature.max())
@@ -184,7 +185,7 @@ def _fit_feed(
                 f"{where}: {feed * (1.0 - 5e-4):.4g} mm/s would do; "
                 'lower nominal_mm_s or set policy "respect"'
             )
-        low, high = joints_q40[pairs] * 2.0**-40, joints_q40[pairs + 2] * 2.0**-40
+        low, high = joints_q40[pairs] * MM_PER_Q40, joints_q40[pairs + 2] * MM_PER_Q40
         zones = zip(low.tolist(), high.tolist(), feeds.tolist(), strict=True)
         plan = replan(plan, [FeedZone(*zone) for zone in zones], where)
     raise PlanError("path: no feed found at which no tick passes more than two segment ends")
@@ -199,7 +200,7 @@ def _on_path(events: Events, length_q40: int) -> Events:
 
 def _span(spline: Curve, joints_q40: Int, segment: int) -> tuple[int, float]:
     """The span of the path that a segment belongs to, and the arc length in mm where the segment starts."""
-    place_mm = float(joints_q40[segment]) * 2.0**-40
+    place_mm = float(joints_q40[segment]) * MM_PER_Q40
     return int(np.searchsorted(spline.segment_starts_mm, place_mm + 1e-9, side="right")), place_mm
 
 
@@ -219,9 +220,9 @@ def _advice(
     if fault.code is not ProgramError.TRAVEL or limits is None:
         return text
     span, _ = _span(spline, program.start_q40, fault.index)
-    lowest, highest = (corner[fault.index] * 2.0**-40 for corner in boxes_q40(program))
+    lowest, highest = (corner[fault.index] * MM_PER_Q40 for corner in boxes_q40(program))
     axes = ", ".join(
-        f"{axis} {low:.6g} … {high:.6g} mm (travel {travel_low * 2.0**-40:g} … {travel_high * 2.0**-40:g})"
+        f"{axis} {low:.6g} … {high:.6g} mm (travel {travel_low * MM_PER_Q40:g} … {travel_high * MM_PER_Q40:g})"
         for axis, low, high, travel_low, travel_high in zip(
             names, lowest, highest, limits.min_q40_mm, limits.max_q40_mm, strict=True
         )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..fixed_point import MM_PER_Q40, nearest_q40, to_q40
 from ..spline import PHSpline
 from ..spline.spatial import SpatialPHSpline
 from .wide import Wide, product
@@ -100,6 +101,18 @@ def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) 
     return Geometry(along, points, a_q44, extra, float(drift.max()))
 
 
+def first_point_q40(spline: PHSpline | SpatialPHSpline, offset_mm: Sequence[float]) -> Int:
+    """The first point (axes,) of the program that `quantise` makes of a spline, with the work offset of each axis.
+
+    Only as many axes count as `offset_mm` has: a spline in space whose z stays the same may be for two axes. Further
+    axes stay at 0.
+    """
+    first = np.asarray(spline.axes_nodes[0])
+    point = np.zeros(len(offset_mm))
+    point[: first.size] = first[: point.size]
+    return to_q40(point) + to_q40(offset_mm)
+
+
 def _real(spline: PHSpline | SpatialPHSpline) -> tuple[Real, Real]:
     """Origins (A, N) and components of the preimage (2, N, 3) or (4, N, 3)."""
     if isinstance(spline, PHSpline):
@@ -121,21 +134,21 @@ def _extra(spline: SpatialPHSpline, offset: Real) -> tuple[Int, Int]:
     bezier = np.moveaxis(spline.extra, 1, 0)
     if not np.all(np.abs(bezier) < 8192.0):
         raise InputError("path: an extra axis is beyond the 4096 mm or degrees of the format")
-    b_q40 = np.rint(bezier * 2.0**40).astype(np.int64)
+    b_q40 = to_q40(bezier)
     b_q40[:, :-1, 5] = b_q40[:, 1:, 0]
     if spline.closed:
         b_q40[:, -1, 5] = b_q40[:, 0, 0]
-    shift = np.rint(offset * 2.0**40).astype(np.int64)
+    shift = to_q40(offset)
     return b_q40[:, :, 0] + shift[:, None], b_q40[:, :, 1:] - b_q40[:, :, :1]
 
 
 def _anchored(distance_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:
     """Start points from exact distances, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
-    offset = round(offset_mm * 2**40)
-    ideal = np.rint(ideal_mm * 2.0**40).astype(np.int64)
+    offset = nearest_q40(offset_mm)
+    ideal = to_q40(ideal_mm)
     chained = ideal[0] + distance_q40
     pull = ideal - chained
     if np.abs(np.diff(pull)).max(initial=0) > _ANCHOR_Q40:
         pull = np.zeros_like(pull)
     points = chained + pull
-    return points + offset, (points - ideal) * 2.0**-40
+    return points + offset, (points - ideal) * MM_PER_Q40

@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..events import EVENT, Events, no_events
 from ..feed.override_levels import LEVELS
 from ..feed.pieces import FeedPieces
+from ..fixed_point import MM_PER_Q40
 from ..names import FIRST_AXIS_SHIFT
 from .codes import ProgramError
 from .stops import Stops
@@ -158,7 +159,7 @@ class Program:
     @property
     def length_mm(self) -> float:
         """Arc length of the path."""
-        return self.length_q40 * 2.0**-40
+        return self.length_q40 * MM_PER_Q40
 
     @property
     def piece_starts_mm(self) -> NDArray[np.float64]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..events import ANALOGUE, DIGITAL, PROPORTIONAL, Event
 from ..feed.pieces import derivative_peaks
+from ..fixed_point import MM_PER_Q40
 from ..names import AXES
 from .geometry import arc_to_q40, segment_arcs
 from .image import (
@@ -53,9 +54,9 @@ def inspect_dict(program: Program) -> dict[str, Any]:
         "ticks": program.ticks,
         "duration_s": program.duration_s,
         "length_mm": program.length_mm,
-        "offset_mm": [one * 2.0**-40 for one in program.offset_q40],
-        "start_mm": (program.point_q40[:, 0] * 2.0**-40).tolist(),
-        "end_mm": (end_point_q40(program) * 2.0**-40).tolist(),
+        "offset_mm": [one * MM_PER_Q40 for one in program.offset_q40],
+        "start_mm": (program.point_q40[:, 0] * MM_PER_Q40).tolist(),
+        "end_mm": (end_point_q40(program) * MM_PER_Q40).tolist(),
         "feed_limit_mm_s": program.feed_limit_um_s / 1000 or None,
         "acceleration_limit_mm_s2": program.acceleration_limit_um_s2 / 1000 or None,
         "jerk_limit_mm_s3": float(program.jerk_limit_mm_s3) or None,
@@ -205,7 +206,7 @@ _EVENT_KINDS = {DIGITAL: "digital", ANALOGUE: "analogue", PROPORTIONAL: "proport
 
 def _event_dict(event: Event) -> dict[str, Any]:
     return {
-        "place_mm": event.place_q40 * 2.0**-40,
+        "place_mm": event.place_q40 * MM_PER_Q40,
         "kind": _EVENT_KINDS.get(event.kind, f"{event.kind}"),
         "channel": event.channel,
         "mask": event.mask,
@@ -229,8 +230,8 @@ def _event_lines(program: Program, full: bool) -> list[str]:
 
 
 def _segment_rows(program: Program) -> list[str]:
-    joints = np.append(program.start_q40, program.length_q40) * 2.0**-40
-    rows = np.column_stack((joints[:-1], program.point_q40.T * 2.0**-40, np.diff(joints)))
+    joints = np.append(program.start_q40, program.length_q40) * MM_PER_Q40
+    rows = np.column_stack((joints[:-1], program.point_q40.T * MM_PER_Q40, np.diff(joints)))
     return [f"{i:8d} " + " ".join(f"{mm:14.6f}" for mm in row) for i, row in enumerate(rows)]
 
 
@@ -240,7 +241,7 @@ def _piece_rows(program: Program) -> list[str]:
     factor = pieces.override_factor
     rate, second = pieces.override_rate_per_s(), pieces.override_second_per_s2()
     return [
-        f"{i:8d} {pieces.duration_q32_s[i] * 2.0**-32:14.9f} {pieces.start_q40[i] * 2.0**-40:14.6f} "
+        f"{i:8d} {pieces.duration_q32_s[i] * 2.0**-32:14.9f} {pieces.start_q40[i] * MM_PER_Q40:14.6f} "
         f"{feed[i]:10.4f} {acceleration[i]:9.2f} {jerk[i]:10.1f} "
         f"{factor[i]:7.4f} {rate[i]:7.4g} {second[i]:7.4g}"
         for i in range(program.piece_count)

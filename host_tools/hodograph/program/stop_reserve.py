@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feed import ReserveZone
+from ..fixed_point import MM_PER_Q40
 from .check_stops import WINDOW, WINDOW_TICKS, own_bounds
 from .image import Program
 from .stops import DECELERATION, FAULT
@@ -126,7 +127,7 @@ def zones_at_places(
 def _piece_ends(program: Program) -> tuple[Real, Real]:
     """Program times and arc lengths (M + 1,) of the ends of pieces."""
     seconds = program.pieces.duration_s
-    ends = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * 2.0**-40
+    ends = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * MM_PER_Q40
     return np.concatenate((np.zeros(1), np.cumsum(seconds))), ends
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from ..bus.run import BusRun
+from ..machine_limits import proved_limits
 from ..paper import compare, quantity_name, shown
 from ..paper.compare import CASES
-from ..pipeline import Pipeline, proved_limits
+from ..pipeline import Pipeline
 from ..simulate import Motion
 from ..spline.spatial import SpatialPHSpline
 from .feed_figures import feed_figure, search_figure

@@ -14,7 +14,8 @@ from matplotlib.collections import LineCollection, PatchCollection
 from matplotlib.patches import Circle, Polygon
 from numpy.typing import NDArray
 
-from ..job import Job, JobMotion, JobSection
+from ..job import Job, JobSection
+from ..job_simulation import JobMotion
 from .style import BLUE, GREY, INK, ORANGE, SOFT, plan_axes, png
 
 Real = NDArray[np.float64]

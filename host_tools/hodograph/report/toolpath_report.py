@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..job import JobMotion
+from ..job_simulation import JobMotion
 from ..job_view import append_places, no_places, with_programmed
-from ..pipeline import proved_limits
+from ..machine_limits import proved_limits
 from .page import Figure, render, write_page
 from .style import styled
 from .toolpath_figures import (

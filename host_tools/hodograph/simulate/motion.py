@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..config.outputs import Outputs
 from ..events import Events, no_events
+from ..fixed_point import MM_PER_Q40
 from ..names import AXES
 from ..native.contour import Contour
 from ..native.program import Counts, counts_by_axis
@@ -22,7 +23,6 @@ from .acted import ActedOutput, acted_outputs
 SETTLING_S = 0.2
 """Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
 
-_Q40 = 2.0**-40
 _Q32 = 2.0**-32
 
 
@@ -147,7 +147,7 @@ class Motion:
     @property
     def arc_length_mm(self) -> NDArray[np.float64]:
         """Commanded arc length, mm, (n,)."""
-        return self.rows["arc_length_q40_mm"] * _Q40
+        return self.rows["arc_length_q40_mm"] * MM_PER_Q40
 
     @property
     def feed_mm_s(self) -> NDArray[np.float64]:
@@ -157,7 +157,7 @@ class Motion:
     @property
     def cmd_mm(self) -> NDArray[np.float64]:
         """Commanded point from the kernel, unrounded, mm, (n, A)."""
-        return self._by_axis("cmd_q40_mm") * _Q40
+        return self._by_axis("cmd_q40_mm") * MM_PER_Q40
 
     @property
     def set_mm(self) -> NDArray[np.float64]:

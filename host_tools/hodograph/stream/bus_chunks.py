@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..bus.capture.frames import Frames
 from ..bus.sdo.objects import STREAM
 from ..errors import InputError
+from ..fixed_point import MM_PER_Q40
 from ..program.image import Program
 from ..spline import PHSpline
 from ..spline.spatial.curve import SpatialPHSpline
@@ -119,7 +120,7 @@ class JobPoints:
         if program.first_axis:
             return
         arc_mm, points = _drawn(program)
-        arcs = arc_mm + header.job_start_q40 * 2.0**-40
+        arcs = arc_mm + header.job_start_q40 * MM_PER_Q40
         if header.job != self._job or header.first:
             self._job, self._stride = header.job, 1
             self._arcs, self._points = np.zeros(0), np.zeros((0, points.shape[1]))

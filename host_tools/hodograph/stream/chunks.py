@@ -15,8 +15,9 @@ from ..errors import PlanError
 from ..events import EVENT
 from ..feed import FeedZone
 from ..feed.pieces import FeedPieces
+from ..fixed_point import nearest_q40
+from ..machine_limits import program_limits, stop_terms
 from ..native.program import NativeFault, NativeLimits, NativeProgram
-from ..pipeline import program_limits, stop_terms
 from ..program.check import REACH_Q40, brief_pairs
 from ..program.codes import ProgramError
 from ..program.image import COMPACT_PIECE_BYTES, Program, encode, segment_size
@@ -482,7 +483,7 @@ class SectionChunks:
             closed=False,
             duration_q32_s=pieces.total_q32_s,
             length_q40=stretch.end_q40 - base,
-            offset_q40=tuple(round(mm * 2**40) for mm in machine.offset_mm),
+            offset_q40=tuple(nearest_q40(mm) for mm in machine.offset_mm),
             feed_limit_um_s=0,
             acceleration_limit_um_s2=0,
             jerk_limit_mm_s3=0,

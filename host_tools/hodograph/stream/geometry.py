@@ -19,6 +19,7 @@ from ..errors import InputError, PlanError
 from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
+from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..program.check import REACH_Q40
 from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
 from ..spline import PHSpline
@@ -38,7 +39,7 @@ _SPEED_RATIO = 2.0
 _PAIR_SHARE = 0.997
 """Of the feed at which a tick at 200 % crosses more than two ends of segments."""
 
-_PAIR_BESIDE_MM = REACH_Q40 * 2.0**-40 + 1e-6
+_PAIR_BESIDE_MM = REACH_Q40 * MM_PER_Q40 + 1e-6
 """How far the zone of short segments reaches beyond them: the controller counts pieces that end this near as on
 them."""
 
@@ -148,7 +149,7 @@ def switching(blocks: Iterator[Block], switched: SwitchedOutputs) -> Iterator[Bl
 def _behind(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
     """A block without its first part, whose events act."""
     first, made = curve_behind(block.curve, begin_mm)
-    passed, events = events_behind(block.events, round(begin_mm * 2**40))
+    passed, events = events_behind(block.events, nearest_q40(begin_mm))
     switched.act(passed)
     return Block(made, block.feed_mm_s[first:], block.line[first:], events)
 

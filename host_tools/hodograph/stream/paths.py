@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
 from ..events import Events, SwitchedOutputs, events_behind, no_events
+from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..pipeline import Pipeline, pipeline_of
 from ..program.inspection import end_point_q40
 from ..spline import PHSpline
@@ -124,7 +125,7 @@ class PathsJob:
 
     def _is_done(self, listed: ListedPath, begin_q40: int) -> bool:
         length_mm = pipeline_of(listed.file, self.machine).curve.length_mm
-        return begin_q40 * 2.0**-40 > length_mm - LEAST_REST_MM
+        return begin_q40 * MM_PER_Q40 > length_mm - LEAST_REST_MM
 
     def _chunk(
         self,
@@ -167,7 +168,7 @@ class PathsJob:
         """Of the path that a job begins with, from an arc length on; at its start the outputs become what all events
         before made.
         """
-        begin_mm, limits = begin_q40 * 2.0**-40, whole.file.limits
+        begin_mm, limits = begin_q40 * MM_PER_Q40, whole.file.limits
         events = self._events(whole)
         if begin_q40:
             passed, events = events_behind(events, begin_q40)
@@ -181,7 +182,7 @@ class PathsJob:
     def _all_axes(self, pipeline: Pipeline, point_q40: Int) -> Int:
         """A place of a path, in machine coordinates of all axes of the machine's path."""
         stands = zip(pipeline.standing_mm, self.machine.offset_mm, strict=False)
-        standing_q40 = [round((at + offset) * 2**40) for at, offset in stands]
+        standing_q40 = [nearest_q40(at + offset) for at, offset in stands]
         return np.concatenate((np.array(standing_q40, dtype=np.int64), point_q40))
 
     def _require_meeting(self, number: int, pipeline: Pipeline, end_q40: Int) -> None:
@@ -191,8 +192,8 @@ class PathsJob:
             return
         axis = self.machine.path_axes[int(np.argmax(off))]
         raise InputError(
-            f"{self.file}: path {number + 1} begins {off.max() * 2.0**-40:.6g} {axis.unit} of {axis.name} from the end "
-            f"of path {number}: let it begin there; moves between paths are paths of their own"
+            f"{self.file}: path {number + 1} begins {off.max() * MM_PER_Q40:.6g} {axis.unit} of {axis.name} from the "
+            f"end of path {number}: let it begin there; moves between paths are paths of their own"
         )
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..config import Machine, load_paths
 from ..errors import InputError, RunError
 from ..events import SwitchedOutputs
+from ..fixed_point import MM_PER_Q40
 from ..names import STANDARD_INPUT, is_toolpath
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
@@ -333,7 +334,7 @@ class JobPlan:
             carried, switched = self.after, SwitchedOutputs()
             for section in reader.sections():
                 begin_q40 = self._begin.arc_q40 if number == self._begin.section else 0
-                blocks = blocks_from(section.blocks, begin_q40 * 2.0**-40, switched)
+                blocks = blocks_from(section.blocks, begin_q40 * MM_PER_Q40, switched)
                 block = next(blocks, None) if number >= self._begin.section else None
                 if block is not None:
                     before = () if begin_q40 else (*carried, *section.before)
@@ -409,7 +410,7 @@ class JobPlan:
         if start is None:
             return False
         machine_mm = start + np.array(section.machine.offset_mm[: start.size])
-        return bool(np.abs(machine_mm - end_q40 * 2.0**-40).max() < _MEETS_MM)
+        return bool(np.abs(machine_mm - end_q40 * MM_PER_Q40).max() < _MEETS_MM)
 
 
 def _is_full(store: ChunkStore) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..config import load_paths
 from ..errors import InputError
+from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..names import is_toolpath
 from ..pipeline import pipeline_of
 from .geometry import Block, Curve
@@ -59,8 +60,8 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
         for block in blocks:
             length_mm = block.curve.length_mm
             if start_q40 is not None:
-                low = (low_q40 - start_q40) * 2.0**-40 - _BESIDE_MM - begin_mm
-                high = (entry.committed_q40 - start_q40) * 2.0**-40 + _BESIDE_MM - begin_mm
+                low = (low_q40 - start_q40) * MM_PER_Q40 - _BESIDE_MM - begin_mm
+                high = (entry.committed_q40 - start_q40) * MM_PER_Q40 + _BESIDE_MM - begin_mm
                 if high > 0.0 and low < length_mm:
                     own = at[len(standing_mm) :]
                     arcs = _nearest_arcs(block.curve, own, max(low, 0.0), min(high, length_mm))
@@ -68,7 +69,7 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
                         _found(
                             block,
                             arc,
-                            Place(number, round((begin_mm + arc) * 2.0**40)),
+                            Place(number, nearest_q40(begin_mm + arc)),
                             at,
                             standing_mm,
                         )

@@ -30,6 +30,7 @@ from ..bus.sdo.stream_channel import (
 from ..bus.signals import interrupts_ignored
 from ..config import Machine
 from ..errors import HodographError, RunError
+from ..fixed_point import nearest_q40
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native import NativeProgram
 from ..pipeline import program_start_counts
@@ -285,7 +286,7 @@ class Sender:
 
     def _pass_sections(self, status: StreamStatus) -> None:
         """Goes on to the section in motion, and says what is to be said before it."""
-        arc_q40 = round(status.arc_length_mm * 2**40)
+        arc_q40 = nearest_q40(status.arc_length_mm)
         while len(self._ahead) > 1 and arc_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
             self._ahead.popleft()
             section = self._section
@@ -360,7 +361,7 @@ class Sender:
         now_s = self.at.controller.clock.now_s()
         if self.journal is not None and now_s - self._journal_s >= _JOURNAL_S:
             self._journal_s = now_s
-            self._note_place(arc_q40=round(status.arc_length_mm * 2**40) - section.start_q40)
+            self._note_place(arc_q40=nearest_q40(status.arc_length_mm) - section.start_q40)
         self._note_underruns(status, now_s)
         self._slow_down()
         if self.progress is not None:

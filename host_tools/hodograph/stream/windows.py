@@ -34,7 +34,8 @@ from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.plan import FeedCurve
 from ..feed.request import LONGEST_S, OPTIMAL
-from ..pipeline import axis_limits, controller_limits, plants
+from ..fixed_point import MM_PER_Q40, to_q40
+from ..machine_limits import axis_limits, controller_limits, plants
 from ..program.image import COMPACT_PIECE_BYTES, segment_size
 from .geometry import Block, StreamPath
 
@@ -467,7 +468,7 @@ class SectionFeed:
         path = self.path
         base = int(path.start_q40[0])
         joints = path.start_q40 - base
-        starts = np.rint(track.s * 2.0**40).astype(np.int64)
+        starts = to_q40(track.s)
         near = joints[np.clip(np.searchsorted(joints, starts - _DRIFT_Q40), 0, joints.size - 1)]
         moved = np.isin(track.s, path.curve.segment_starts_mm) & (
             np.abs(near - starts) <= _DRIFT_Q40
@@ -491,7 +492,7 @@ class SectionFeed:
         knot = window.first + joint
         low = float(found.grid.s[knot])
         state = State(float(found.q[knot]), float(found.slope[knot]))
-        least = (least_q40 - int(self.path.start_q40[0])) * 2.0**-40
+        least = (least_q40 - int(self.path.start_q40[0])) * MM_PER_Q40
         ends = curve.segment_starts_mm
         yield from self._brakes(window, joint, state, low, least)
         before_s = last_s(window.stretch.pieces, joint)

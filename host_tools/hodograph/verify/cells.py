@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fixed_point import MM_PER_Q40, to_q40
 from ..program import Program
 from .curves import Curve, curve_of
 from .polynomials import shifted, values
@@ -81,7 +82,7 @@ def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
     pieces = program.pieces
     exponent = np.array([piece.exponent for piece in pieces], dtype=np.float64)
     duration = pieces.duration_q32_s * 2.0**-32
-    scale = np.concatenate((np.zeros((len(pieces), 1)), pieces.c_q40 * 2.0**-40), axis=1)
+    scale = np.concatenate((np.zeros((len(pieces), 1)), pieces.c_q40 * MM_PER_Q40), axis=1)
     distance = scale * (duration * 2.0**-exponent)[:, None] ** np.arange(8.0)
     piece, u = _joints(program, distance, more_mm)
     cell_piece, low, high = _stretches(len(pieces), piece, u)
@@ -89,11 +90,11 @@ def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
     cell_piece, low, high = cell_piece[~brief], low[~brief], high[~brief]
     middle = values(distance[cell_piece], 0.5 * (low + high))
     start = pieces.start_q40[cell_piece]
-    at_q40 = start + np.rint(middle * 2.0**40).astype(np.int64)
+    at_q40 = start + to_q40(middle)
     segment = np.searchsorted(program.start_q40, at_q40, side="right") - 1
     segment = np.clip(segment, 0, program.segment_count - 1)
     own = shifted(distance[cell_piece], low, high - low)
-    own[:, 0] += (start - program.start_q40[segment]) * 2.0**-40
+    own[:, 0] += (start - program.start_q40[segment]) * MM_PER_Q40
     curve = curve_of(program)
     begun = np.concatenate(([0.0], np.cumsum(duration)[:-1]))
     return Cells(
@@ -109,12 +110,12 @@ def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
 
 def _joints(program: Program, distance: Real, more_mm: Sequence[float]) -> tuple[Int, Real]:
     """Piece and u where the motion passes a joint of segments, or one of `more_mm`."""
-    more = np.rint(np.asarray(more_mm, dtype=np.float64) * 2.0**40).astype(np.int64)
+    more = to_q40(np.asarray(more_mm, dtype=np.float64))
     joints = np.unique(np.concatenate((program.start_q40[1:], more)))
     joints = joints[(joints > 0) & (joints < program.length_q40)]
     starts = program.pieces.start_q40
     piece = np.clip(np.searchsorted(starts, joints, side="right") - 1, 0, None)
-    target = (joints - starts[piece]) * 2.0**-40
+    target = (joints - starts[piece]) * MM_PER_Q40
     low, high = np.zeros(joints.size), np.ones(joints.size)
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..fixed_point import MM_PER_Q40
 from ..names import KERNELS
 from ..native.program import NativeProgram
 
@@ -62,7 +63,7 @@ def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
             second[kernel] = np.maximum(second[kernel], np.abs(differences).max(axis=0))
             third[kernel] = np.maximum(third[kernel], np.abs(jerk).max(axis=0))
             noise[kernel] = max(noise[kernel], float(np.abs(jerk - reference).max()))
-    unit = 2.0**-40
+    unit = MM_PER_Q40
     return tuple(
         Sampled(
             kernel,

@@ -17,8 +17,8 @@ from hodograph.bus.sdo.controller import connect
 from hodograph.config import Machine, load_machine
 from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import PlanError, RefusedError
+from hodograph.machine_limits import program_limits
 from hodograph.native import NativeLimits, NativeProgram
-from hodograph.pipeline import program_limits
 
 MACHINE = load_machine(
     Path(__file__).resolve().parents[3] / "examples" / "machines" / "paper_alpha.toml"

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from hodograph.config import load_machine
+from hodograph.machine_limits import program_limits
 from hodograph.monitor.job_path import JobPath
 from hodograph.native.program import NativeLimits
-from hodograph.pipeline import program_limits
 from hodograph.stream.chunk import Chunk, parse
 from hodograph.stream.chunks import CHUNK_BYTES
 from hodograph.stream.plan import JobFiles, JobPlan, Place

@@ -12,7 +12,7 @@ from hodograph.cli.main import main
 from hodograph.config import load_machine, load_path_file
 from hodograph.errors import PlanError
 from hodograph.feed.request import LEAST_FEED_MM_S
-from hodograph.job import SectionPipeline, load_job
+from hodograph.job import load_job
 from hodograph.pipeline import Pipeline, load_pipeline
 from hodograph.program import Program, stop_reserve
 from hodograph.program.compiler import Compilation
@@ -20,6 +20,7 @@ from hodograph.program.late_stops import MOST_STEPS, Replanning
 from hodograph.program.stop_planning import LongStopError
 from hodograph.program.stop_reserve import StopPlaces, zones_at_places
 from hodograph.program.stops import FAULT
+from hodograph.section_pipeline import SectionPipeline
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 FIVE_AXES = EXAMPLES / "machines/mill_five_axes.toml"

@@ -20,10 +20,10 @@ from hodograph.events import SwitchedOutputs
 from hodograph.feed.optimal.plan_limits import PlanLimits
 from hodograph.feed.optimal.window import Solution
 from hodograph.job import load_job
+from hodograph.machine_limits import program_limits
 from hodograph.native import NativeProgram
 from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
-from hodograph.pipeline import program_limits
 from hodograph.program import encode
 from hodograph.program.check import REACH_Q40, check, check_image
 from hodograph.spline import PHSpline, from_control_polygon

@@ -25,11 +25,11 @@ from hodograph.events import (
     events_of,
 )
 from hodograph.job import load_job
+from hodograph.machine_limits import program_limits
 from hodograph.monitor.messages import job_message
 from hodograph.monitor.output_marks import JobMarks
 from hodograph.native.program import NativeLimits, NativeProgram
 from hodograph.native.stream import OfflineStream
-from hodograph.pipeline import program_limits
 from hodograph.program.codes import ProgramError
 from hodograph.program.image import decode, encode
 from hodograph.stream import output_check

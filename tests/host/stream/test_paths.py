@@ -15,8 +15,8 @@ from hodograph.cli.main import main
 from hodograph.cli.stream_command import has_paths
 from hodograph.config import Machine, load_machine, load_path_file, load_paths
 from hodograph.errors import InputError, PlanError
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeFault, NativeLimits
-from hodograph.pipeline import program_limits
 from hodograph.program.inspection import end_point_q40
 from hodograph.stream.chunk import Chunk, Rest
 from hodograph.stream.chunks import CHUNK_BYTES

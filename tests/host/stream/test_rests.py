@@ -12,9 +12,9 @@ import pytest
 
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
-from hodograph.pipeline import program_limits
 from hodograph.program.codes import ProgramError
 from hodograph.stream.chunk import REST_TICKS, Chunk, ChunkHeader, Rest, parse, shared_fault
 from hodograph.stream.journal import Entry

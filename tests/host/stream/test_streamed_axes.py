@@ -16,9 +16,9 @@ from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
 from hodograph.events import SwitchedOutputs
 from hodograph.job import load_job
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
-from hodograph.pipeline import program_limits
 from hodograph.program.check import check_image
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream import reading

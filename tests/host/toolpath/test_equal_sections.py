@@ -14,8 +14,8 @@ from hodograph.config import Machine, load_machine
 from hodograph.equal_sections import EqualSections, SharedPrograms, moved_program
 from hodograph.errors import PlanError
 from hodograph.job import Job, load_job
+from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits, NativeProgram
-from hodograph.pipeline import program_limits
 from hodograph.program import Program, encode
 from hodograph.program.check import BOX_ROUNDING_Q40, TRAVEL_SLACK_Q40, boxes_q40, leaves_range
 from hodograph.toolpath.fit.fitting import FittedPath, Tolerance, fit

@@ -12,7 +12,8 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.config import load_machine
-from hodograph.job import JobMotion, load_job, simulate_job
+from hodograph.job import load_job
+from hodograph.job_simulation import JobMotion, simulate_job
 from hodograph.job_view import curve_view
 from hodograph.report.toolpath_figures import widest_corners
 from hodograph.report.toolpath_report import view_data, write_toolpath_report

@@ -11,7 +11,8 @@ import pytest
 
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError, PlanError
-from hodograph.job import load_job, simulate_job, write_job_trace
+from hodograph.job import load_job
+from hodograph.job_simulation import simulate_job, write_job_trace
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream.reading import StreamReader
 from hodograph.toolpath.files import ReadOptions

@@ -16,6 +16,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...data import CONTROLLER_EDS, object_dictionary
 from ...errors import BusError, InputError, RefusedError, RunError, one_line
+from ...fixed_point import MM_PER_Q40, nearest_q40
 from ..address import BusAddress
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
 from ..diagnostics.texts import (
@@ -292,7 +293,7 @@ class Controller(Node):
         """
         if from_mm is not None:
             self._require_place(from_mm)
-            self.write(START_POSITION, None, round(from_mm * 2**40))
+            self.write(START_POSITION, None, nearest_q40(from_mm))
         deadline = self.clock.now_s() + wait_s
         while True:
             if unhomed:
@@ -310,7 +311,7 @@ class Controller(Node):
         """The controller itself takes a place beyond an end of the path as this end."""
         if self.read(PROGRAM, _STATE) != _READY:
             return  # it refuses the start and says why
-        length_mm = self.read(PROGRAM, _LENGTH) * 2.0**-40
+        length_mm = self.read(PROGRAM, _LENGTH) * MM_PER_Q40
         if not -ROUNDING_MM <= arc_length_mm <= length_mm + ROUNDING_MM:
             raise InputError(
                 f"start from {arc_length_mm:.9g} mm: the path has arc lengths from 0 to {length_mm:.9g} mm"

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from ...fixed_point import MM_PER_Q40
 from ..diagnostics.boot_texts import BootTrouble
 from ..diagnostics.drive_states import inputs_on, state_of_number
 from ..diagnostics.texts import (
@@ -49,7 +50,6 @@ from .objects import (
 from .stream_channel import NONE, StreamStatus, stream_status
 from .upload import program_fault_text
 
-_Q40 = 2.0**-40
 _Q32 = 2.0**-32
 _Q30 = 2.0**-30
 
@@ -238,7 +238,7 @@ def snapshot(controller: Controller) -> Status:
         last_refusal=REFUSALS.get(refusal),
         configuration=configured,
         program=loaded_program(controller),
-        motion=PathPosition(motion[0] * _Q40, motion[1] / 1000, motion[2] * _Q32),
+        motion=PathPosition(motion[0] * MM_PER_Q40, motion[1] / 1000, motion[2] * _Q32),
         override=Override(override[0], 100 * override[1] * _Q30, bool(override[2])),
         unhomed_nodes=tuple(axis.node for i, axis in enumerate(axes) if unhomed >> i & 1),
         axes=axes,
@@ -285,7 +285,7 @@ def loaded_program(controller: Controller) -> LoadedProgram:
     return LoadedProgram(
         refused=program_fault_text(code, index) if code else None,
         duration_s=numbers.pop("duration_q32_s") * _Q32,
-        length_mm=numbers.pop("length_q40_mm") * _Q40,
+        length_mm=numbers.pop("length_q40_mm") * MM_PER_Q40,
         stops=LongestStops(**{kind: _longest(found) for kind, found in stops.items()}),
         **numbers,
     )

@@ -9,6 +9,7 @@ from typing import Any
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...errors import BusError, RefusedError, one_line
+from ...fixed_point import MM_PER_Q40
 from .node import Node
 from .objects import STREAM
 from .upload import ABORT_VALUE_RANGE, block_download, program_fault_text
@@ -64,7 +65,7 @@ def stream_status(node: Node) -> StreamStatus:
         1e-3 * committed,
         sequence,
         line,
-        arc_length * 2.0**-40,
+        arc_length * MM_PER_Q40,
         None if remaining == UNKNOWN_MS else 1e-3 * remaining,
         underruns,
     )

@@ -15,6 +15,7 @@ from math import inf, perm
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...fixed_point import MM_PER_Q40, nearest_q40, to_q40
 from ...spline.frames import LEFT, RIGHT, Curve, frames
 from ..kinematics import axis_motion
 from ..limits import Limit, Peak
@@ -134,7 +135,7 @@ class Track:
 
     def peaks(self) -> tuple[float, float, float]:
         """Greatest feed, acceleration and jerk along the path, of the pieces."""
-        raw = self.raw_pieces(round(self.length_mm * 2**40))
+        raw = self.raw_pieces(nearest_q40(self.length_mm))
         v, a, j = (float(p.max()) for p in derivative_peaks(raw.duration_q32_s, raw.c_q40))
         return v, a, j
 
@@ -145,7 +146,7 @@ class Track:
 
         joints_q40  (segments + 1,) of the program: pieces that begin at a joint begin exactly there
         """
-        starts = np.rint(self.s * 2.0**40).astype(np.int64)
+        starts = to_q40(self.s)
         if joints_q40 is not None:
             near = joints_q40[
                 np.clip(np.searchsorted(joints_q40, starts - _DRIFT_Q40), 0, joints_q40.size - 1)
@@ -183,9 +184,9 @@ def track_of(raw: RawPieces, length_mm: float) -> Track:
     t_q32 = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(raw.duration_q32_s)))
     unit = np.ldexp(raw.duration_q32_s.astype(np.float64), -32 - exponents(raw.duration_q32_s))
     shape = np.zeros((unit.size, 8))
-    shape[:, 1:] = raw.c_q40 * 2.0**-40 * unit[:, None] ** np.arange(1, 8)
+    shape[:, 1:] = raw.c_q40 * MM_PER_Q40 * unit[:, None] ** np.arange(1, 8)
     ends = np.array([0.0, length_mm])
-    return Track(t_q32, np.append(raw.start_q40 * 2.0**-40, length_mm), shape, ends)
+    return Track(t_q32, np.append(raw.start_q40 * MM_PER_Q40, length_mm), shape, ends)
 
 
 def make_track(ends: Ends, stretch: float, joints: Real) -> Track:

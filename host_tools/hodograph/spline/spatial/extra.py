@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InputError
+from ...fixed_point import MM_PER_Q40, Q40_PER_MM
 from ..bernstein import Real
 from ..nodal import control_polygon_guide
 from .curve import SpatialPHSpline
@@ -18,8 +19,6 @@ _MOST_SLOPE, _MOST_BEND = 1.5, 4.0
 _REPEATED = 1e-9
 
 _SHORT_MM = 1e-4
-_PER_UNIT = 2.0**40
-"""Steps of a coefficient of a program (docs/reference/protocol.md 1.2.2) in a mm or degree."""
 
 
 def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
@@ -49,7 +48,7 @@ def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, ben
     end = _by_parameter(slope[1:], bend[1:], c[:, 4], 4.0 * (c[:, 4] - c[:, 3]))
     extra = _hermite(value[:-1], value[1:], begin, end)
     short = np.diff(curve.segment_starts_mm) < _SHORT_MM
-    extra[short] = np.rint(extra[short] * _PER_UNIT) / _PER_UNIT
+    extra[short] = np.rint(extra[short] * Q40_PER_MM) * MM_PER_Q40
     return extra
 
 
