@@ -10,8 +10,6 @@ keeps 0.998 of these limits. It is checked against the limits themselves (0.2 % 
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 from collections import Counter
@@ -19,6 +17,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "host_tools")]
@@ -111,8 +110,7 @@ def _quick(pipeline: Pipeline) -> StopTerms:
 
 def main() -> int:
     """Exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--plans", type=int, default=300)
     parser.add_argument("--first", type=int, default=0)
     options = parser.parse_args()
@@ -122,8 +120,7 @@ def main() -> int:
         f"{counts['plans']} plans ({counts.get('refused', 0)} not possible): accepted with 0.5 % of room "
         f"{counts['accepted_half_percent']}, with 0.2 % {counts['accepted']}"
     )
-    if options.json is not None:
-        options.json.write_text(json.dumps(counts) + "\n", encoding="utf-8")
+    write_figures(options.json, counts)
     return 0
 
 

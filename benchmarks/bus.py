@@ -10,10 +10,10 @@ this machine's bus, controller, drives and recorder are together. The goal is 1.
 
 from __future__ import annotations
 
-import argparse
-import json
 from pathlib import Path
 from typing import Any
+
+from _figures import figures_parser, write_figures
 
 from hodograph.bus.address import parse_address
 from hodograph.bus.run import run_program, run_session
@@ -46,13 +46,11 @@ def measure(name: str, pace: str) -> dict[str, Any]:
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     figures: dict[str, Any] = {}
     for name, pace in RUNS:
         figures.setdefault(pace, {})[name] = measure(name, pace)
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,11 @@ The table of docs/reference/bus-time.md section 2.1. It takes no bus: CAN FD is 
 
 from __future__ import annotations
 
-import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from _figures import figures_parser, write_figures
 
 from hodograph.bustime import PdoChoice, bus_time
 from hodograph.bustime.fit import PERIODS_US
@@ -50,9 +50,7 @@ def name_of(data_bitrate: int) -> str:
 
 def main() -> None:
     """Measure, print and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     figures: dict[str, Any] = {}
     print("| real drives | bus, Mbit/s | at 1 ms | least period | torque: at 1 ms | least period |")
     print("| --- | --- | --- | --- | --- | --- |")
@@ -63,7 +61,7 @@ def main() -> None:
             plain, torque = rows["setpoints"], rows["with torque"]
             cells = (_at_1_ms(plain), _least(plain), _at_1_ms(torque), _least(torque))
             print(f"| {count} | {name_of(rate)} | {' | '.join(cells)} |")
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 def _at_1_ms(row: dict[str, Any]) -> str:

@@ -6,7 +6,6 @@ Times are of the whole command: import, workers, program, runs, table, report. P
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -17,6 +16,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from _figures import figures_parser, write_figures
 
 CAMPAIGN = Path(__file__).resolve().parents[1] / "examples" / "campaigns" / "ten_thousand.toml"
 WORKERS = 2
@@ -59,9 +60,7 @@ def cluster(folder: Path) -> Iterator[str]:
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     with tempfile.TemporaryDirectory(prefix="hodograph-campaign-") as name:
         folder = Path(name)
         figures: dict[str, Any] = {"here": measured(folder / "here", "--workers", str(WORKERS))}
@@ -71,7 +70,7 @@ def main() -> None:
         here, there = ((folder / f / "runs.csv").read_bytes() for f in ("here", "far"))
         figures["runs"] = here.count(b"\n") - 1
         figures["same_table"] = here == there
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 if __name__ == "__main__":

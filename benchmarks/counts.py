@@ -12,11 +12,12 @@ of its stops costs.
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
 from pathlib import Path
 from typing import Any
+
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tools"))
@@ -53,18 +54,15 @@ def beside(compared: dict[str, Any]) -> dict[str, Any]:
 
 def main() -> None:
     """See the head of the file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--build", type=Path, default=ROOT / "build")
     options = parser.parse_args()
     figures = main_figures(Campaign(options.build).run())
     figures["constant_feed"] = beside(taylor.compare(options.build))
     figures["check"] = checking.costs(options.build)
     figures["stop_check"] = checking.stop_costs(options.build)
-    text = json.dumps(figures, indent=2)
-    print(text)
-    if options.json:
-        options.json.write_text(text + "\n", encoding="utf-8")
+    print(json.dumps(figures, indent=2))
+    write_figures(options.json, figures)
 
 
 if __name__ == "__main__":

@@ -7,14 +7,13 @@ pieces in 50 digits, and the time that planning and compiling take.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "tests/host/feed"), str(ROOT / "host_tools")]
@@ -120,8 +119,7 @@ def times(count: int) -> dict[str, float]:
 
 def main() -> int:
     """Exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--feed", type=float, default=100.0)
     parser.add_argument("--ramp", type=float, default=0.1)
     arguments = parser.parse_args()
@@ -145,9 +143,8 @@ def main() -> int:
     spent = {str(count): times(count) for count in (1_000, 10_000, 100_000)}
     for count, row in spent.items():
         print(f"{count:>7s} segments: " + ", ".join(f"{k[:-2]} {v:.3f} s" for k, v in row.items()))
-    if arguments.json:
-        figures = {"profiles": rows, "search": search, "pieces": errors, "seconds": spent}
-        arguments.json.write_text(json.dumps({"feed": figures}, indent=1) + "\n")
+    figures = {"profiles": rows, "search": search, "pieces": errors, "seconds": spent}
+    write_figures(arguments.json, {"feed": figures})
     return 0
 
 

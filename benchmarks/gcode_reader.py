@@ -9,14 +9,14 @@ The program is a flood of G1 lines as CAM systems write them. `plain` takes the 
 
 from __future__ import annotations
 
-import argparse
-import json
 import random
 import resource
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+from _figures import figures_parser, write_figures
 
 from hodograph.toolpath.gcode import Options, read_gcode
 
@@ -71,14 +71,12 @@ def measure(file: Path) -> dict[str, Any]:
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder, "flood.ngc")
         write_program(program)
         figures = measure(program)
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 if __name__ == "__main__":

@@ -17,9 +17,7 @@ Compiles firmware/core as a shared object of its own. Prints the figures and wri
 
 from __future__ import annotations
 
-import argparse
 import ctypes
-import json
 import re
 import shutil
 import subprocess
@@ -32,6 +30,7 @@ from typing import Any
 
 import mpmath
 import numpy as np
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks" / "support"))
@@ -329,8 +328,7 @@ def run_time(driver: Path, name: str, kernel: int, runs: int) -> float:
 
 def main() -> None:
     """See the head of the file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--points", type=int, default=60, help="points per program")
     parser.add_argument("--compiler", default="gcc")
     options = parser.parse_args()
@@ -344,8 +342,7 @@ def main() -> None:
             "override_tick_instructions": override_cost(options.compiler, folder),
         }
     report(figures)
-    if options.json:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n")
+    write_figures(options.json, figures)
 
 
 def report(figures: dict[str, Any]) -> None:

@@ -8,13 +8,13 @@ browser.
 
 from __future__ import annotations
 
-import argparse
 import json
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 from hodograph.bus.capture.frames import FRAME_DTYPE, Frames
 from hodograph.monitor.decoder import Decoder
@@ -48,9 +48,7 @@ def traffic() -> tuple[bytes, Frames]:
 
 def main() -> None:
     """Prints the figures, or writes them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+    options = figures_parser(__doc__).parse_args()
     image, frames = traffic()
     path = ProgramPath(image, 1_000_000)
     decoder, derivation = Decoder((2, 3)), Derivation((1_000_000,) * 2, 2, 1000)
@@ -69,8 +67,7 @@ def main() -> None:
     }
     if options.json is None:
         print(json.dumps(figures, indent=2))
-    else:
-        options.json.write_text(json.dumps(figures))
+    write_figures(options.json, figures)
 
 
 if __name__ == "__main__":

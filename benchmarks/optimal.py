@@ -7,8 +7,6 @@ the paper's kind, all under the same limits, on the paper's curves, in space, wi
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import tempfile
 import time
@@ -18,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
@@ -289,8 +288,7 @@ def row(name: str, found: dict[str, Any]) -> str:
 
 def main() -> int:
     """Exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--only", nargs="*", help="cases whose names begin so")
     parser.add_argument("--intervals", type=int, default=128, help="of the finest grid, in all")
     options = parser.parse_args()
@@ -302,8 +300,7 @@ def main() -> int:
                 continue
             results[case.name] = measure(case, options.intervals, Path(folder))
             print(row(case.name, results[case.name]), flush=True)
-    if options.json is not None:
-        options.json.write_text(json.dumps(results) + "\n", encoding="utf-8")
+    write_figures(options.json, results)
     return 0
 
 

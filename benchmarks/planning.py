@@ -17,10 +17,10 @@ import resource
 import subprocess
 import sys
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 SEGMENTS = (100, 1000, 10_000)
 SEED = 1
@@ -61,8 +61,7 @@ def measure(segments: int) -> dict[str, Any]:
 
 def main() -> None:
     """Prints the figures, and writes them."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--segments", type=int, nargs="+", default=SEGMENTS)
     parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -81,8 +80,7 @@ def main() -> None:
             f"worst ratio {found['worst_ratio']:.5f}, verified in {found['verify_processor_s']:.2f} s",
             flush=True,
         )
-    if options.json:
-        options.json.write_text(json.dumps(figures), encoding="utf-8")
+    write_figures(options.json, figures)
 
 
 if __name__ == "__main__":

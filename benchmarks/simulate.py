@@ -7,14 +7,13 @@ degree. Accuracy: alpha and heart at servo sample rates up to 1.024 MHz, beside 
 
 from __future__ import annotations
 
-import argparse
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 from hodograph.config import Drive, load_machine, load_path_file
 from hodograph.feed import ControllerLimits, plan_feed
@@ -92,11 +91,9 @@ def accuracy(name: str) -> dict[str, Any]:
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     figures = {"speed": speed(), "alpha": accuracy("alpha"), "heart": accuracy("heart")}
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 if __name__ == "__main__":

@@ -9,8 +9,6 @@ figures and writes them as one JSON object.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 from scipy.optimize import minimize
 from scipy.spatial import cKDTree
 
@@ -279,8 +278,7 @@ def speed() -> dict[str, float]:
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(description="figures of splines in space")
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--paths", type=int, default=200)
     options = parser.parse_args()
     figures = {
@@ -294,8 +292,7 @@ def main() -> None:
     for group, values in figures.items():
         for name, value in values.items():
             print(f"spatial.{group}.{name}: {value}", flush=True)
-    if options.json:
-        options.json.write_text(json.dumps({"spatial": figures}, indent=1) + "\n", encoding="utf-8")
+    write_figures(options.json, {"spatial": figures})
 
 
 if __name__ == "__main__":

@@ -9,8 +9,6 @@ tests/host/spline/polygons.py. Prints the figures and writes them as one JSON ob
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 from numpy.typing import NDArray
 
 Row = tuple[int, int, int, float, float]
@@ -155,8 +154,7 @@ def evaluation() -> dict[str, Any]:
 
 def main() -> None:
     """Entry point."""
-    parser = argparse.ArgumentParser(description="spline figures")
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--polygons", type=int, default=10_000)
     options = parser.parse_args()
     figures = {
@@ -169,8 +167,7 @@ def main() -> None:
         for name, value in values.items():
             shown = f"{value:.6g}" if isinstance(value, float) else value
             print(f"spline.{group}.{name}: {shown}")
-    if options.json:
-        options.json.write_text(json.dumps({"spline": figures}, indent=1) + "\n", encoding="utf-8")
+    write_figures(options.json, {"spline": figures})
 
 
 if __name__ == "__main__":

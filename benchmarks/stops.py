@@ -7,14 +7,13 @@ spread over each program.
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "benchmarks/support"), str(ROOT / "host_tools")]
@@ -142,8 +141,7 @@ def measure(name: str, instants: int, listed: bool) -> dict[str, Any]:
 
 def main() -> int:
     """Exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--only", nargs="*", help="programs by name")
     parser.add_argument("--instants", type=int, default=40)
     parser.add_argument("--list", action="store_true", help="one line for each stop")
@@ -168,8 +166,7 @@ def main() -> int:
             f"({1e3 * end['rest_after_s']:.0f} ms for {1e3 * end['least_s']:.1f}, "
             f"{end['ticks']} ticks before the last setpoint, at {end['feed_mm_s']:.1f} mm/s)"
         )
-    if options.json is not None:
-        options.json.write_text(json.dumps(results) + "\n", encoding="utf-8")
+    write_figures(options.json, results)
     return 0
 
 

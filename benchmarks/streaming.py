@@ -25,6 +25,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
 
+from _figures import figures_parser, write_figures
+
 if TYPE_CHECKING:
     from hodograph.stream.plan import JobFiles
 
@@ -159,8 +161,7 @@ def apart(lines: int, *words: str) -> dict[str, Any]:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--lines", type=int, nargs="+", default=list(LINES))
     parser.add_argument("--fit-lines", type=int, nargs="*", default=list(FIT_LINES))
     parser.add_argument("--step", type=float, default=_STEP_MM, help="length of a line in mm")
@@ -203,8 +204,7 @@ def main() -> None:
         f"time and {begun['start_bus_s']:.2f} s of bus time"
     )
     found = {"jobs": rows, "start": begun, "ring": {} if options.no_ring else ring_table()}
-    if options.json is not None:
-        options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    write_figures(options.json, found)
 
 
 def ring_table() -> dict[str, Any]:

@@ -11,8 +11,6 @@ generated programs of N lines, and the processor time that they take.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
 import tempfile
@@ -20,6 +18,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from _figures import figures_parser, write_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "host_tools")]
@@ -182,8 +182,7 @@ def results(names: list[str] | None, folders: list[Path]) -> Iterator[dict[str, 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--only", nargs="+")
     parser.add_argument("--folder", type=Path, nargs="+", default=list(FOLDERS))
     parser.add_argument("--lines", type=int, default=5000, help="of generated programs; 0: none")
@@ -209,8 +208,7 @@ def main() -> None:
         print(f"\nGeometric mean of the ratios to the S-curve planner: {mean:.3f} (goal 0.40)")
     if options.lines:
         rows += print_stages(options.lines)
-    if options.json is not None:
-        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_figures(options.json, rows)
 
 
 if __name__ == "__main__":

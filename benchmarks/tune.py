@@ -12,14 +12,13 @@ for 3.5 V.
 
 from __future__ import annotations
 
-import argparse
-import json
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from _figures import figures_parser, write_figures
 from numpy.typing import NDArray
 
 from hodograph.config import Drive, Machine, load_machine
@@ -253,11 +252,9 @@ def _found(motion: Motion, axis: int, truth: Drive, seed: int) -> tuple[list[flo
 
 def main() -> None:
     """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, required=True)
-    out: Path = parser.parse_args().json
+    out: Path = figures_parser(__doc__, required=True).parse_args().json
     figures = {"contour": contours(), "sensitivity": sensitivity(), "identify": plants()}
-    out.write_text(json.dumps(figures, indent=1), encoding="utf-8")
+    write_figures(out, figures)
 
 
 if __name__ == "__main__":

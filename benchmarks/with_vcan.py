@@ -18,6 +18,8 @@ import sys
 import time
 from pathlib import Path
 
+from _figures import figures_parser, write_figures
+
 ROOT = Path(__file__).resolve().parent.parent
 WITH_VCAN = [str(ROOT / "tools/with-vcan"), "--own"]
 FRAME = bytes([1, 0, 0, 0, 8, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8])
@@ -104,8 +106,7 @@ def boot_s() -> float:
 
 def main() -> None:
     """Figures as JSON."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.inside:
@@ -115,9 +116,8 @@ def main() -> None:
     command = [*WITH_VCAN, sys.executable, __file__, "--inside"]
     done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=True)
     figures |= json.loads(done.stdout)
-    if options.json:
-        options.json.write_text(json.dumps(figures))
-    else:
+    write_figures(options.json, figures)
+    if options.json is None:
         print(json.dumps(figures, indent=1))
 
 

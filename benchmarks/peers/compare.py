@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import json
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -29,6 +28,8 @@ from hodograph.toolpath.gcode import read_gcode
 from hodograph.toolpath.moves import ORIGIN, ArcMove, SplineMove, StraightMove
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from _figures import figures_parser, write_figures
 
 from peers import klipper, linuxcnc, picture, ruckig_stops, toppra_spline
 from peers.motion import AxisLimits, Motion, deviation_um
@@ -70,8 +71,7 @@ Runner = Callable[[Toolpath, Path], Outcome]
 
 def main() -> int:
     """Exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path)
+    parser = figures_parser(__doc__)
     parser.add_argument("--figure", type=Path, help="a corner of the zigzag, drawn as SVG")
     parser.add_argument("--only", nargs="+", choices=WORDS, metavar="NAME", help=", ".join(WORDS))
     parser.add_argument(
@@ -86,8 +86,7 @@ def main() -> int:
     except klipper.NoKlipperError as error:
         print(f"compare.py: {error}", file=sys.stderr)
         return 1
-    if options.json is not None:
-        options.json.write_text(json.dumps([vars(row) for row in rows], indent=1) + "\n")
+    write_figures(options.json, [vars(row) for row in rows])
     if options.figure is not None and motions:
         picture.draw(motions, TOLERANCE_MM, LIMITS.jerk_mm_s3 or np.inf, options.figure)
     return 0

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +32,8 @@ from ..config import Machine
 from ..errors import HodographError, RunError
 from ..fixed_point import nearest_q40
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
-from ..native import NativeProgram
+from ..native.program import NativeLimits, NativeProgram
 from ..pipeline import program_start_counts
-from ..program import encode
 from .chunk import Chunk
 from .journal import Journal
 from .plan import JobPlan, PlannedSection, PlanRests
@@ -217,7 +216,8 @@ class Sender:
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to where a section begins, unless they stand there."""
-        program = NativeProgram(encode(replace(chunk.program, compact=False)))
+        program = NativeProgram(chunk.image)
+        program.check(NativeLimits(chunk=1))
         start = program_start_counts(program, self.machine, self.kernel, section.standing_mm)
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:
