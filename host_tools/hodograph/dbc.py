@@ -2,8 +2,8 @@
 """A DBC of a machine's bus for cantools, SavvyCAN and others, from the EDS of its drives.
 
 SYNC, NMT commands, EMCY, heartbeats and every PDO that the controller maps. Positions are in mm, voltages in V, torque
-offsets in per cent through the signals' factors. SDO is left out: what its bytes mean depends on the transfer, which
-DBC cannot say.
+offsets in per cent through the signals' factors. SDO is left out: DBC cannot express bytes whose meaning depends on the
+transfer.
 """
 
 from __future__ import annotations

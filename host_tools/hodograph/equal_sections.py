@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Equal sections of a job: what is fitted, planned and proved for one holds for all that are equal but for their place.
+"""Equal sections of a job: sections that differ only in their place share curve, plan and proof.
 
-Holes of one depth are drilled by equal sections, and so are moves between places of a grid. A section is equal to
-another one if its points, seen from the first one, are the other's when rounded to 2^-40 mm, with the same feeds,
-tolerance and angles. Its curve is the other's, moved; its program has the other's integers, moved. No rule of a
-program but the range of its points and the travel of the axes depends on the place, and these two are looked at.
+Holes of one depth are equal sections, and so are equal moves on a grid. Two sections are equal if their points, as
+distances from the first point, are the same after rounding to 2^-40 mm, and so are feeds, tolerance and angles. The
+curve and the integers of the program are then those of the other section, shifted. Only two rules of a program depend
+on its place: the range of its points and the travel of the axes. Both are checked again. Used by job.py and
+section_pipeline.py.
 """
 
 from __future__ import annotations
@@ -28,19 +29,18 @@ from .toolpath.fit.sections import Section
 Int = NDArray[np.int64]
 
 _MOST_KNOWN = 256
-"""Sections that are kept to be compared with: the last ones that were found or used."""
+"""Number of sections that are kept for comparison: those found or used last."""
 
 _MOST_CHORDS = 2000
-"""Longer sections are seldom equal, and would take much memory."""
+"""Longer sections are not compared: they are seldom equal and would take much memory."""
 
 _REACH_MM = 8192.0
-"""Twice the range of coordinates in a program: with points farther from the first one there is no program, and their
-places on the grid would leave 64 bits at 2^23 mm."""
+"""Twice the range of coordinates in a program. No program has points farther from its first one."""
 
 
 @dataclass(eq=False)
 class SharedPrograms:
-    """What equal sections share: the plan, and the program by its events. Filled by the first that asks."""
+    """What equal sections share: the plan, and the programs by the bytes of their events. The first section fills it."""
 
     plan: FeedPlan | None = None
     judged: dict[bytes, Judged] = field(default_factory=dict)
@@ -48,20 +48,20 @@ class SharedPrograms:
 
 @dataclass(frozen=True, eq=False)
 class KnownSection:
-    """A section that was fitted, with the axes that turn along."""
+    """A fitted section, including its rotary axes, and what it shares."""
 
     fitted: FittedPath
     shared: SharedPrograms
 
 
 class EqualSections:
-    """Sections that were fitted, to be found by those that are equal."""
+    """The fitted sections of a job, by what equal sections have in common."""
 
     def __init__(self) -> None:
         self._known: OrderedDict[bytes, KnownSection] = OrderedDict()
 
     def find(self, section: Section) -> KnownSection | None:
-        """An equal section with its curve moved to the place of this one."""
+        """An equal section, its curve moved to the place of this one; None: there is none."""
         key = _key(section)
         if key is None or key not in self._known:
             return None
@@ -70,9 +70,7 @@ class EqualSections:
         return replace(known, fitted=_moved_path(known.fitted, section.reference))
 
     def add(self, section: Section, fitted: FittedPath) -> SharedPrograms:
-        """Keeps a section that has been fitted, with the axes that turn along; returns what the ones equal to it will
-        share with it.
-        """
+        """Keeps a fitted section, including its rotary axes. Returns what equal sections will share with it."""
         shared, key = SharedPrograms(), _key(section)
         if key is not None:
             self._known[key] = KnownSection(fitted, shared)
@@ -82,7 +80,9 @@ class EqualSections:
 
 
 def _key(section: Section) -> bytes | None:
-    """The same bytes for sections that are equal; None: the section is too long, or too large, to be compared."""
+    """Bytes that only equal sections have in common; None: the section has too many chords, or is too large, to
+    compare.
+    """
     own = section.reference
     if own.count > _MOST_CHORDS:
         return None
@@ -104,8 +104,8 @@ def _moved_path(fitted: FittedPath, reference: Reference) -> FittedPath:
 
 
 def moved_program(judged: Judged, start_q40: Int, limits: ProgramLimits) -> Judged | None:
-    """A program that the controller accepts, moved so that its first point is `start_q40`; None: it would leave the
-    travel there, or the range of the format.
+    """An accepted program, shifted so that its first point is `start_q40`. None: the controller refused it, or it would
+    leave the travel or the range of the format there.
     """
     program = _moved_to(judged.compilation.program, start_q40)
     if judged.fault is not None or leaves_range(program, limits):

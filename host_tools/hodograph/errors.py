@@ -19,7 +19,7 @@ class InputError(HodographError):
 
 
 class ToolpathError(InputError):
-    """A toolpath file cannot be read on; the message begins with FILE:LINE:COLUMN, both 1-based."""
+    """A toolpath file cannot be read further; the message begins with FILE:LINE:COLUMN, both from 1."""
 
     def __init__(self, file: str, line: int, column: int, text: str) -> None:
         super().__init__(f"{file}:{line}:{column}: {text}")
@@ -41,7 +41,7 @@ class BusError(HodographError):
 
 
 class BusyError(BusError):
-    """Another client keeps the node to itself."""
+    """Another SDO client uses the node."""
 
 
 class RefusedError(HodographError):
@@ -73,5 +73,5 @@ def brief(text: str) -> str:
 
 
 def one_line(error: Exception) -> str:
-    """An error of somebody else's, to be quoted within a message of ours."""
+    """An error of another library, as one line to be quoted within a message."""
     return " ".join(str(error).split()) or type(error).__name__

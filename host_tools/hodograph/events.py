@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8)."""
+"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8). Used by compiler, checks,
+stream and simulation.
+"""
 
 from __future__ import annotations
 
@@ -14,14 +16,14 @@ DIGITAL, ANALOGUE, PROPORTIONAL = 1, 2, 3
 DIGITALS, ANALOGUES = 16, 3
 """Outputs that events can switch."""
 EVENTS_A_TICK = 16
-"""A tick passes at most so many events, at any override."""
+"""Greatest number of events that one tick may pass, at any override."""
 VALUE_LOW, VALUE_HIGH = -(2**15), 2**15 - 1
-"""Values of an analogue output."""
+"""Least and greatest value of an analogue output."""
 
 EVENT = np.dtype(
     [("place", "<i8"), ("kind", "u1"), ("channel", "u1"), ("mask", "<u2"), ("value", "<i4")]
 )
-"""One event as the image has it."""
+"""One event in the program image."""
 
 Events = NDArray[np.void]
 """(E,) records of `EVENT`, by place."""
@@ -38,7 +40,7 @@ class Event(NamedTuple):
 
 
 def no_events() -> Events:
-    """None."""
+    """An empty table."""
     return np.zeros(0, dtype=EVENT)
 
 
@@ -48,14 +50,14 @@ def events_of(events: Iterable[Event]) -> Events:
 
 
 class SwitchedOutputs:
-    """What events have made of outputs that were all off."""
+    """The state of the outputs after events, from all off."""
 
     def __init__(self) -> None:
         self._levels = 0
         self._analogue: dict[int, Event] = {}
 
     def act(self, events: Events) -> None:
-        """The events act, in their order."""
+        """Applies events in their order."""
         for event in map(Event._make, events.tolist()):
             if event.kind == DIGITAL:
                 self._levels = (self._levels & ~event.mask) | event.value
@@ -63,14 +65,14 @@ class SwitchedOutputs:
                 self._analogue[event.channel] = event
 
     def begin(self) -> Events:
-        """The events at arc length 0 that make the same of outputs that are off."""
+        """Events at arc length 0 that bring outputs from all off to this state."""
         found = [Event(0, DIGITAL, 0, self._levels, self._levels)] if self._levels else []
         found += [one._replace(place_q40=0) for one in self._analogue.values() if one.value]
         return events_of(found)
 
 
 def events_behind(events: Events, place_q40: int) -> tuple[Events, Events]:
-    """Events at or before an arc length, and those behind it with places from there on."""
+    """Events up to an arc length, and those after it with places counted from there."""
     at = int(np.searchsorted(events["place"], place_q40, side="right"))
     behind = events[at:].copy()
     behind["place"] -= place_q40

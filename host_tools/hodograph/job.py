@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A job: programs of a toolpath, each from rest to rest, one after the other.
+"""A job: a toolpath as sections from rest to rest, each with its program.
 
-A toolpath becomes sections, a section a curve within the tolerance, a curve a program. What happens between the
-sections (dwells, spindle, outputs, tool changes) is kept with its place.
+`load_job` divides a toolpath into sections, fits a curve to each within the tolerance, and gives it a pipeline that
+makes its program. Commands at rest (dwells, spindle, outputs, tool changes) are kept with the section that follows
+them. Used by simulation, runs on the bus, reports and the API; stream/ makes its sections by `SectionMaker`.
 """
 
 from __future__ import annotations
@@ -64,10 +65,10 @@ _ROUNDING_MM = 1e-9
 class JobSection:
     """A section with its program.
 
-    before  commands that happen at rest, before it starts
-    events  commands on the way, with the arc lengths in mm where they happen
-    tied    whether it begins and ends in motion, as a part of a longer section
-    stands_at  of a section that turns axes alone: where x, y and z stand, mm; its lengths and feeds are in degrees.
+    before     commands at rest, before it starts
+    events     commands within it, with their arc lengths in mm
+    tied       whether it begins, and whether it ends, in motion as a part of a longer section
+    stands_at  of a section of rotary axes alone: position of x, y and z, mm; its lengths and feeds are in degrees.
                None: x, y and z move
     """
 
@@ -91,20 +92,20 @@ class JobSection:
 
     @property
     def turning_summary(self) -> dict[str, object]:
-        """Of a section that turns axes: a bound of how far they are from the program; of one that turns them alone, the
-        length of its path too.
+        """For JSON: the deviation bound of rotary axes; where they move alone, the length of their path too. Empty:
+        none moves.
         """
         turned = {} if self.stands_at is None else {"turned_deg": self.fitted.curve.length_mm}
         return turned | _turning_bound(self.deviation_deg)
 
     @property
     def deviation_deg(self) -> float | None:
-        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        """Bound of the deviation of A, B and C from the program, degrees; None: none of them moves."""
         fitted = self.fitted
         return fitted.turning_deg if self.stands_at is None else fitted.deviation_mm
 
     def places(self, moved_mm: Real) -> Real:
-        """Positions (n, axes) of the path's axes, without the work offset, of those (n, k) of its program's axes."""
+        """Positions (n, axes) of the path's axes, without the work offset, from positions (n, k) of its program's axes."""
         machine = self.pipeline.machine
         own = moved_mm - np.array(machine.offset_mm)
         stands = np.broadcast_to(self.standing_mm, (len(own), machine.first_axis))
@@ -112,7 +113,7 @@ class JobSection:
 
     @property
     def standing_mm(self) -> Real:
-        """Where the axes before those of its program stand, in the order of the path, without the work offset."""
+        """Positions (first_axis,) of the path's axes before those of its program, which stand; without the work offset."""
         first = self.pipeline.machine.first_axis
         return np.array((self.stands_at or ())[:first], dtype=np.float64)
 
@@ -151,7 +152,7 @@ class JobSection:
 class Job:
     """All sections of a toolpath, on a machine.
 
-    after  commands that happen at rest at the end
+    after  commands at rest at the end
     notes  one line for each thing that the user should know
     fit_s  wall time that reading and fitting took
     """
@@ -186,7 +187,7 @@ class Job:
 
     @property
     def dwell_s(self) -> float:
-        """Standstill that the toolpath asks for."""
+        """Total time of the programmed dwells."""
         return sum(command.duration_s for command in self._at_rest if isinstance(command, Dwell))
 
     @property
@@ -197,12 +198,12 @@ class Job:
 
     @property
     def deviation_deg(self) -> float | None:
-        """Bound of how far A, B and C are from the program; None: none of them turns."""
+        """Bound of the deviation of A, B and C from the program, degrees; None: none of them moves."""
         bounds = (section.deviation_deg for section in self.sections)
         return max((bound for bound in bounds if bound is not None), default=None)
 
     def summary(self) -> dict[str, object]:
-        """What became of the toolpath, for JSON."""
+        """Counts, lengths and deviation bounds of all sections, for JSON."""
         return _turning_bound(self.deviation_deg) | {
             "lines": self.lines,
             "sections": len(self.sections),
@@ -213,7 +214,10 @@ class Job:
         }
 
     def only_section(self, command: str) -> JobSection:
-        """The section of a job that has one. Raises PlanError: it has several."""
+        """The section of a job that has only one. Raises PlanError: it has several, or rotary axes move alone.
+
+        command  name for the message
+        """
         if len(self.sections) != 1:
             second = self.sections[1].first_line
             raise PlanError(
@@ -269,7 +273,7 @@ def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Ite
 def _with_outputs(
     sections: tuple[JobSection, ...], after: tuple[Command, ...], machine: Machine, file: Path
 ) -> tuple[JobSection, ...]:
-    """The sections, with the outputs in their programs."""
+    """The sections, with the switched outputs as events of their programs."""
     if machine.outputs is None:
         return sections
     commands = [section_commands(one) for one in sections]
@@ -281,18 +285,18 @@ def _with_outputs(
 
 
 def _turning_bound(bound_deg: float | None) -> dict[str, object]:
-    """The bound of a turning deviation, for JSON; nothing where no axis turns."""
+    """The deviation bound of rotary axes, for JSON; empty where none moves."""
     return {} if bound_deg is None else {"deviation_bound_deg": bound_deg}
 
 
 def missing_axes(machine: Machine) -> str:
-    """Those of a, b and c that are no axes of the machine's path."""
+    """The letters of a, b and c that are no axes of the machine's path."""
     names = [axis.name.lower() for axis in machine.path_axes[3:]]
     return "".join(name for name in AXES[3:] if name not in names)
 
 
 def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputError:
-    """The refusal of a move that turns a, b or c, which is no axis of the machine's path."""
+    """The error for a move of a, b or c, which is no axis of the machine's path."""
     return InputError(
         f"{file}:{line}: the move turns {name.upper()}, but no axis {name} of {machine.file.name} follows the path: "
         'name it behind "z" in path = [...] at its top, or leave it out'
@@ -300,19 +304,21 @@ def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputErr
 
 
 def section_commands(section: JobSection) -> SectionCommands:
-    """What switches outputs on a section."""
+    """The commands and programmed feeds of a section that may switch outputs."""
     fitted, machine = section.fitted, section.pipeline.machine
     feeds = programmed_feeds(fitted) if in_laser_mode(machine) else ()
     return SectionCommands(section.before, section.events, fitted.curve.length_mm, feeds)
 
 
 def in_laser_mode(machine: Machine) -> bool:
-    """Whether S after M4 follows the feed."""
+    """Whether the output for S follows the feed after M4."""
     return machine.outputs is not None and machine.outputs.codes.laser_mode
 
 
 def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
-    """What a command that the machine does not execute is about; None: it executes it, or it is about motion."""
+    """The kind of a command that the machine does not execute, in words; None: it executes it, or it is a motion
+    command.
+    """
     if is_output(command, outputs):
         return None
     return next((text for kinds, text in _IGNORED.items() if isinstance(command, kinds)), None)
@@ -344,9 +350,11 @@ def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> It
 
 @dataclass(frozen=True, eq=False)
 class SectionMaker:
-    """Makes sections of a job.
+    """Makes the sections of a job: fits them and gives them their pipelines.
 
-    known  sections made before, whose curves and programs equal ones share. None: none does
+    feed_mm_s  replaces the programmed feed; None: it stays
+    notes      grows by one line for each thing that the user should know
+    known      sections made before, which share curves and programs with equal ones; None: nothing is shared
     """
 
     file: Path
@@ -356,7 +364,7 @@ class SectionMaker:
     known: EqualSections | None = None
 
     def made(self, section: Section) -> Iterator[JobSection]:
-        """The section, or its parts where no curve was found within the tolerance."""
+        """The fitted section; where no curve was found within the tolerance, its parts with exact stops between them."""
         if self.feed_mm_s is not None:
             reference = section.reference
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
@@ -395,13 +403,12 @@ class SectionMaker:
             yield from self._parts(part)
 
     def _moving(self, section: Section) -> Machine:
-        """The machine, with the axes that the program of the section moves."""
+        """The machine, with the axes that the section's program moves."""
         return self.machine if section.stands_at is None else self.machine.turning
 
     def _on_turning_axes(self, section: Section) -> Section:
-        """A section that turns a, b and c alone, with the coordinates of the axes of its program as points.
-
-        Raises InputError: one that turns is no axis of the machine.
+        """A section of rotary axes alone, with the coordinates of its program's axes as points. Raises InputError: one
+        of them is no axis of the machine's path.
         """
         assert section.stands_at is not None
         reference = section.reference
@@ -427,7 +434,7 @@ class SectionMaker:
             )
 
     def _turned(self, section: Section, fitted: FittedPath) -> FittedPath:
-        """With the axes of the machine that turn along. Raises InputError and PlanError, naming file and line."""
+        """The fitted path with the machine's rotary axes added. Raises InputError and PlanError, naming file and line."""
         angles = section.reference.turn_deg
         if angles is None:
             return fitted
@@ -440,7 +447,7 @@ class SectionMaker:
             raise PlanError(f"{self.file}: {error}") from None
 
     def _check_turning(self, angles: Real, lines: Int) -> None:
-        """Raises InputError, naming the line, where a, b or c turns, which is no axis of the machine's path."""
+        """Raises InputError, naming the line, where a, b or c moves and is no axis of the machine's path."""
         missing = missing_axes(self.machine)
         for k, name in enumerate(AXES[3:]):
             if name in missing and angles[:, k].any():

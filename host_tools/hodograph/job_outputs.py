@@ -2,14 +2,14 @@
 """Outputs of a toolpath (M62 to M65, M67, M68, and spindle and coolant where the machine file maps them) as events of
 its sections' programs.
 
-A command on the way acts where the curve has its place. One at rest acts with the first setpoint of the section that
-follows it. One at rest that is followed by a dwell, a tool change or a program stop acts with the last setpoint of the
-section before it, so that it is done when the dwell begins. The end of the program switches spindle and coolant off
-with the last setpoint, as M5 and M9 do; other outputs stay. Each program begins with all outputs off, so each section
-first repeats what is on.
+A command within a section acts at its place on the curve. A command at rest acts with the first setpoint of the next
+section. If a dwell, a tool change or a program stop follows it at the same rest, it acts with the last setpoint of the
+section before, so that it has acted when the wait begins. The end of the program switches spindle and coolant off with
+the last setpoint, as M5 and M9 do; other outputs stay. Each program begins with all outputs off, so each section first
+repeats what is on.
 
-In laser mode, M4 makes the value for S follow the feed: an event at each place where the programmed feed changes gives
-the value for each mm/s, so that it is S at that feed.
+In laser mode after M4, the output for S is proportional to the feed. Wherever the programmed feed changes, an event
+sets the factor that gives S at that feed.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ from .toolpath.moves import (
 )
 
 WAITS = (Dwell, ProgramStop, ToolChange)
-"""What a machine waits for at rest."""
+"""Commands at which a machine waits at rest."""
 
 
 @dataclass(frozen=True)
 class ProgrammedFeed:
-    """From an arc length on: the feed of the block, mm/s (inf: a rapid move), and its source line."""
+    """The programmed feed from an arc length on, mm/s (inf: a rapid move), and its source line."""
 
     s_mm: float
     feed_mm_s: float
@@ -54,9 +54,12 @@ class ProgrammedFeed:
 
 @dataclass(frozen=True)
 class SectionCommands:
-    """What happens at rest before a section, and on its way: arc length in mm and command; its length in mm, and its
-    programmed feeds, the first one from its start on.
-    """
+    """Commands and feeds of a section.
+
+    before      commands at rest before it
+    on_the_way  commands within it, with their arc lengths in mm
+    length_mm   its length
+    feeds       its programmed feeds; the first one from its start"""
 
     before: tuple[Command, ...]
     on_the_way: tuple[tuple[float, Command], ...]
@@ -65,7 +68,7 @@ class SectionCommands:
 
 
 def programmed_feeds(fitted: FittedPath) -> tuple[ProgrammedFeed, ...]:
-    """Where the feed of a section changes."""
+    """The programmed feeds of a section: one at its start, then one at each change."""
     reference = fitted.reference
     feed = reference.feed_mm_s
     first = np.flatnonzero(np.append(True, feed[1:] != feed[:-1]))
@@ -93,29 +96,27 @@ def section_events(
     outputs: Outputs,
     file: Path,
 ) -> list[Events]:
-    """The events of each section's program. Raises InputError: an output that the machine does not have, or a value
-    that is too large.
-    """
+    """The events of each section's program. Raises InputError: the machine lacks an output, or a value is too large."""
     maker = EventMaker(outputs, file)
     found = []
     for i, section in enumerate(sections):
         last = i + 1 == len(sections)
-        behind = after if last else sections[i + 1].before
-        own = maker.section(section, behind, is_first=i == 0, is_last=last)
+        following = after if last else sections[i + 1].before
+        own = maker.section(section, following, is_first=i == 0, is_last=last)
         found.append(events_of([*own.repeated, *own.events]))
     return found
 
 
 @dataclass(frozen=True)
 class SectionEvents:
-    """Events of a section: those at its start that repeat what is on, and its own."""
+    """Events of a section: those at its start that repeat which outputs are on, and its own."""
 
     repeated: list[Event]
     events: list[Event]
 
 
 def _split(commands: tuple[Command, ...], *, is_first: bool) -> tuple[list[Command], list[Command]]:
-    """Commands up to the first wait, and those behind it; before the first section all are behind it."""
+    """Commands before the first wait, and those from it on. Before the first section all count as after the wait."""
     waits = [i for i, command in enumerate(commands) if isinstance(command, WAITS)]
     at = 0 if is_first or not waits else waits[0]
     return list(commands[:at]), list(commands[at:])
@@ -123,32 +124,35 @@ def _split(commands: tuple[Command, ...], *, is_first: bool) -> tuple[list[Comma
 
 @dataclass
 class EventMaker:
-    """Makes the events of the sections of a toolpath, one after the other, and knows what is on."""
+    """Makes the events of the sections of a toolpath, one after the other, and keeps the state of the outputs."""
 
     outputs: Outputs
     file: Path
     last: dict[str, Event] = field(default_factory=dict)
     feed: ProgrammedFeed | None = None
     power: float | None = None
-    """S while it follows the feed."""
+    """S while its output follows the feed; None: it does not."""
 
     def section(
         self,
         section: SectionCommands,
-        behind: tuple[Command, ...],
+        after: tuple[Command, ...],
         *,
         is_first: bool = False,
         is_last: bool = False,
     ) -> SectionEvents:
-        """Of the next section, or part of one; `behind`: the commands at rest behind it. Raises InputError: an output
-        that the machine does not have, or a value that is too large.
+        """The events of the next section, or part of one.
+
+        after  the commands at rest after it
+
+        Raises InputError: the machine lacks an output, or a value is too large.
         """
         repeated = self._repeated()
-        _, rest = _split(section.before, is_first=is_first)
-        begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, rest)]
+        _, late = _split(section.before, is_first=is_first)
+        begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, late)]
         moving = self._on_the_way(section)
         end_q40 = nearest_q40(section.length_mm)
-        early = list(behind) if is_last else _split(behind, is_first=False)[0]
+        early = list(after) if is_last else _split(after, is_first=False)[0]
         return SectionEvents(repeated, [*begin, *moving, *self.changed(end_q40, early)])
 
     def _on_the_way(self, section: SectionCommands) -> list[Event]:
@@ -162,7 +166,7 @@ class EventMaker:
         return found + self._at_feeds(feeds)
 
     def _at_feeds(self, feeds: Iterable[ProgrammedFeed]) -> list[Event]:
-        """Events of changes of the feed, which matter in laser mode."""
+        """Events for changes of the programmed feed; none unless S follows the feed."""
         found = []
         channel = self.outputs.codes.speed
         for feed in feeds:
@@ -176,14 +180,14 @@ class EventMaker:
         return found
 
     def _power(self, channel: Channel, place_q40: int, line: int) -> Event:
-        """The event from which on the output follows the feed: S at that of the block."""
+        """The event that makes the output proportional to the feed, with value S at the programmed feed."""
         assert self.power is not None
         feed_mm_s = inf if self.feed is None else self.feed.feed_mm_s
         per_mm_s = self.power / feed_mm_s if feed_mm_s > 0.0 else 0.0
         return channel.proportional(place_q40, per_mm_s, f"{self.file}:{line}")
 
     def _repeated(self) -> list[Event]:
-        """Events at the start of a program that make the outputs what they were."""
+        """Events at the start of a program that restore the outputs."""
         digital = [event for event in self.last.values() if event.kind == DIGITAL]
         mask, levels = 0, 0
         for event in digital:
@@ -193,7 +197,7 @@ class EventMaker:
         return found + [event._replace(place_q40=0) for event in analogue]
 
     def changed(self, place_q40: int, commands: Iterable[Command]) -> list[Event]:
-        """Events of commands at one place; of several for one output the last."""
+        """Events of commands at one place; if several switch one output, the last one counts."""
         found: dict[str, Event] = {}
         for command in commands:
             for channel, event in self._events(place_q40, command):
@@ -232,7 +236,7 @@ class EventMaker:
         return found
 
     def _ended(self, place_q40: int, line: int) -> list[tuple[Channel, Event]]:
-        """What M5 and M9 do, of outputs that are on."""
+        """The events of M5 and M9, for outputs that are on."""
         codes = (Spindle(line, Rotation.STOPPED, 0.0), Coolant(line, mist=False, flood=False))
         return [
             (channel, event)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Runs a job on the bus: its sections one after the other, and the machine commands at rest between them.
 
-For `hodograph run` and the API; `stream/sender` uses the part for rests. Each section is one program: it is uploaded
-where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator at
-program stops and tool changes, and prints messages.
+Used by `hodograph run` and the API; `stream/sender` uses the functions for rests. Each section is one program: it is
+uploaded where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator
+at program stops and tool changes, and prints messages.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
 
 _CHECK_S = 0.1
 _START_COUNTS = 2
-"""A section begins without a move to its start if no axis is farther from it: the rounding of the last end."""
+"""If no axis is farther from the start of a section, it begins without a move there. The last end was rounded."""
 
 
 class NoRoomError(PlanError):
@@ -129,7 +129,7 @@ def run_job(
     *,
     unhomed: bool = False,
 ) -> JobRun:
-    """Runs a job from wherever the axes stand.
+    """Runs a job; the axes first move to its start.
 
     record  file for the frames; a job with several sections writes one file each: NAME.1.log, NAME.2.log, …
 
@@ -209,7 +209,7 @@ def _to_start(
 def _require_end(
     at: RunSession, section: JobSection, made: PreparedJob, program: NativeProgram, place: str
 ) -> None:
-    """Raises RunError: the axes stand, but not where the program ends."""
+    """Raises RunError: the axes stand at a place that is not the end of the program."""
     end, first = _place(section, made, program, program.ticks), section.pipeline.machine.first_axis
     if list(at.controller.targets(len(end)))[first:] != end[first:]:
         raise RunError(f"{place}: stopped before its end: the job ends here")

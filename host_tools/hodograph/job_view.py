@@ -27,9 +27,9 @@ _LONGEST_LINE = 100
 
 
 def curve_view(job: Job) -> dict[str, object]:
-    """The curves at even times of the planned feed, in machine coordinates: columns x, y, z in mm, f in mm/s, l (source
-    line), r (1: rapid move); the programmed path, and the tolerance, 0 where sections have several. Axes that turn
-    alone draw nothing.
+    """The curves at equal steps of time of the feed plan, in machine coordinates: columns x, y, z in mm, f in mm/s, l
+    (source line), r (1: rapid move); the programmed path, and the tolerance (0: sections have several). Sections of
+    rotary axes alone are left out.
 
     Plans the feed of all sections. Raises PlanError.
     """
@@ -87,7 +87,7 @@ def _programmed(job: Job, offset_mm: Real) -> dict[str, list[float]]:
 
 
 def _source_lines(job: Job, wanted: Iterable[object]) -> dict[str, str]:
-    """Source lines by number; none where the file is no text of lines, or came from standard input."""
+    """Text of source lines by number; empty where the file has no lines, or came from standard input."""
     if not is_gcode(job.file) or not job.file.is_file():
         return {}
     return dict(_lines(job, {int(str(line)) for line in wanted}))

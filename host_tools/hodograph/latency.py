@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How late the ticks of a controller are on this computer: from the time stamps of its SYNC frames, like cyclictest.
+"""How late the ticks of a controller are on this computer, from the time stamps of its SYNC frames; `hodograph
+latency`.
 
-Stamps are those of the bus: the kernel's on SocketCAN; on a local bus those of the hub, whose own wake-up they contain.
+On SocketCAN the Linux kernel stamps the frames. On a local bus the hub does, so that its own wake-up latency is
+included.
 """
 
 from __future__ import annotations
@@ -27,18 +29,20 @@ from .errors import BusError
 Real = NDArray[np.float64]
 
 EDGES_US = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
-"""Of the histogram; the last bin has no end."""
+"""Bins of the histogram in us; the last one has no end."""
 _SYNC = 0x080
 _BOOT_S = 1.0
 _AROUND = 500
-"""Ticks on both sides within which the clocks of tick and stamps do not drift apart."""
+"""Ticks before and after each one that give its due time: over so many, drift of the clocks does not count."""
 _MISSED = 2.0
-"""Periods between two ticks: a controller whose tick is a period late restarts its clock."""
+"""Periods between two ticks after which a new grid begins: a controller restarts its clock when a tick is a period
+late.
+"""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What else this computer did meanwhile."""
+    """Other load of this computer during the measurement."""
 
     cpus: int
     busy_percent: float
@@ -61,13 +65,13 @@ class Latency:
     load: Load
 
     def histogram(self) -> list[tuple[int, int | None, int]]:
-        """From, to (None: no end), number of ticks."""
+        """Bins: from, to in us (None: no end), number of ticks."""
         counts, _ = np.histogram(self.lateness_us, bins=[*EDGES_US, np.inf])
         ends = [*EDGES_US[1:], None]
         return list(zip(EDGES_US, ends, counts.tolist(), strict=True))
 
     def share_us(self, percent: float) -> float:
-        """Lateness that this share of the ticks does not exceed."""
+        """The lateness, us, that this share of the ticks does not exceed."""
         return float(np.percentile(self.lateness_us, percent))
 
     def json(self) -> dict[str, Any]:
@@ -91,7 +95,7 @@ class Latency:
 
 
 def is_realtime_kernel() -> bool:
-    """Whether this kernel is built with PREEMPT_RT."""
+    """Whether the Linux kernel of this computer is built with PREEMPT_RT."""
     try:
         return Path("/sys/kernel/realtime").read_text().strip() == "1"
     except OSError:
@@ -101,8 +105,8 @@ def is_realtime_kernel() -> bool:
 def lateness(times_us: Real, period_us: float) -> tuple[Real, int]:
     """Lateness (n,) of ticks at `times_us` (n,), and how many are missing between them.
 
-    A tick is late after the earliest one of those around it, on a grid of periods. A gap of more than a period begins
-    a new grid, as the controller's clock does.
+    The lateness of a tick counts from a grid of periods through the earliest of the ticks around it. After a gap of
+    more than a period a new grid begins, as the controller's clock does.
     """
     gaps = np.diff(times_us)
     breaks = gaps > _MISSED * period_us
@@ -115,7 +119,7 @@ def lateness(times_us: Real, period_us: float) -> tuple[Real, int]:
 
 
 def measure(address: BusAddress, period_us: int, seconds: float) -> Latency:
-    """Listens to the SYNC frames of a controller on this bus. Raises BusError when there are none."""
+    """Measures a controller on a bus by its SYNC frames. Raises BusError: there are none."""
     busy, average = _busy(), os.getloadavg()[0]
     with Recorder(address) as recorder:
         time.sleep(seconds)
@@ -129,8 +133,8 @@ def measure(address: BusAddress, period_us: int, seconds: float) -> Latency:
 
 
 def measure_own(machine: Machine, seconds: float) -> Latency:
-    """Starts a controller without drives on a local bus of its own, in real time, and listens to that. Its ticks wait
-    for nothing but its clock. Raises BusError.
+    """Measures a controller process without drives, which it starts on a local bus of its own in real time. Its ticks
+    wait for its clock only. Raises BusError.
     """
     with LocalHub(virtual=False) as hub:
         process = Process("controller", controller_command(machine, hub.address, "real-time"))
@@ -143,7 +147,7 @@ def measure_own(machine: Machine, seconds: float) -> Latency:
 
 
 def _busy() -> tuple[int, int]:
-    """Ticks of all processors: busy, all."""
+    """Clock ticks of all processors since boot: busy, all."""
     words = Path("/proc/stat").read_text().splitlines()[0].split()[1:9]
     user, nice, system, idle, io_wait, *rest = map(int, words)
     busy = user + nice + system + sum(rest)

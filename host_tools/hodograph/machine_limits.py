@@ -40,9 +40,9 @@ def axis_limits(machine: Machine) -> AxisLimits:
 
 
 def plants(machine: Machine | None, limits: Limits) -> Plants | None:
-    """The plants of the axes with the volts that their drives have, or `limits` gives them; None: neither is known.
+    """The plants of the axes, with the volts that `limits` gives or that their drives have; None: neither is known.
 
-    Raises InputError: volts are limited, and an axis has no drive file, or its friction takes them all.
+    Raises InputError: volts are limited and an axis has no drive file, or friction alone takes all volts of a drive.
     """
     known = machine is not None and all(axis.drive is not None for axis in machine.path_axes)
     if limits.volts is None and not known:
@@ -55,8 +55,8 @@ def plants(machine: Machine | None, limits: Limits) -> Plants | None:
 
 
 def drive_plants(machine: Machine) -> Plants | None:
-    """The plants of the axes with all the volts of their drives, None when one of them has no drive file, or no volts
-    left beside its friction.
+    """The plants of the axes with all volts of their drives; None: an axis has no drive file, or friction alone takes
+    all its volts.
     """
     known = [axis.drive for axis in machine.path_axes if axis.drive is not None]
     if len(known) < len(machine.path_axes) or any(
@@ -67,7 +67,7 @@ def drive_plants(machine: Machine) -> Plants | None:
 
 
 def stop_terms(machine: Machine, limits: Limits) -> StopTerms:
-    """What the stops of a program on a machine keep beside the limits of its plan, which are in `limits`."""
+    """What the stops of a program keep in addition to the limits of its plan, `limits`."""
     return StopTerms(
         plants=plants(machine, limits),
         drives=drive_plants(machine),
@@ -94,7 +94,7 @@ def _plant(drive: Drive, volts: float | None) -> Plant:
 
 
 def program_limits(machine: Machine) -> ProgramLimits:
-    """What the controller of this machine checks a program against. Raises InputError: it has one axis only."""
+    """The limits that the controller of this machine checks programs against. Raises InputError: it has one axis only."""
     axes = machine.path_axes
     return ProgramLimits(
         period_us=machine.period_us,
@@ -112,16 +112,18 @@ def program_limits(machine: Machine) -> ProgramLimits:
 
 
 def controller_verdict(program: NativeProgram, machine: Machine) -> NativeFault | None:
-    """What the controller of this machine finds in a program; None: it accepts it."""
+    """The first rule that a program breaks on the controller of this machine; None: it is accepted."""
     return program.check(NativeLimits(**asdict(program_limits(machine))))
 
 
 @dataclass(frozen=True)
 class ProvedStops:
-    """What is proved of the stops of one kind: from how many feed pieces one may begin, from how many of them all stops
-    keep the limits of the axes until standstill, and where the others begin, mm.
+    """What is proved of the stops of one kind. A piece is proved if all stops from it keep the axis limits until
+    standstill.
 
-    time_share   share of the time of the pieces from which one may begin that proved ones last: pieces differ in length
+    pieces      number of feed pieces in which a stop may begin
+    open_mm     arc lengths of the starts of those that are not proved
+    time_share  time of the proved pieces over that of all these pieces
     """
 
     kind: str
@@ -136,16 +138,14 @@ class ProvedStops:
 
     @property
     def name(self) -> str:
-        """In words."""
+        """The kind in words."""
         return "feed hold and stop" if self.kind == "hold" else "fault stop"
 
 
 def proved_stops(
     native: NativeProgram, program: Program, machine: Machine
 ) -> tuple[ProvedStops, ...]:
-    """Of feed holds and of fault stops of a program that the controller of a machine accepts
-    (firmware/core/brake_check.h).
-    """
+    """What is proved of the feed holds and of the fault stops of an accepted program (firmware/core/brake_check.h)."""
     check = BrakeCheck(native, NativeLimits(**asdict(program_limits(machine))))
     duration_s = program.pieces.duration_s
     out = []

@@ -8,20 +8,22 @@ from __future__ import annotations
 from pathlib import Path
 
 KERNELS = ("fixed", "float", "double")
-"""Number kernels, in the order of their codes in object 0x2004 sub 5."""
+"""Kernels, in the order of their codes in object 0x2004 sub 5."""
 
 AXES = ("x", "y", "z", "a", "b", "c")
-"""What the axes of a path are called where no machine names them."""
+"""Names of the axes of a path where no machine names them."""
 
 FIRST_AXIS_SHIFT = 8
-"""Where the flags of a program's header have which axis of the machine its first one is (core/first_axis.h)."""
+"""Bit of a program header's flags from which on they hold the machine's number of the program's first axis
+(core/first_axis.h).
+"""
 
 UNITS = ("mm", "deg")
-"""What an axis is measured in: an axis in degrees turns."""
+"""Units of an axis; a rotary axis has degrees."""
 
 
 def in_unit(name: str, unit: str) -> str:
-    """The name in this unit of a key or a quantity that is called `name` in mm."""
+    """The name of a key or quantity in this unit; `name` is its name in mm."""
     return "_".join(unit if word == "mm" else word for word in name.split("_"))
 
 
@@ -29,25 +31,27 @@ INTERPOLATIONS = ("linear", "cubic", "none")
 """How a simulated drive goes from setpoint to setpoint, in the order of enum drive_interpolation."""
 
 SPEEDS = ("exact", "differences")
-"""Where a simulated drive's loop has its speed from, in the order of enum drive_speed."""
+"""Source of the speed in a simulated drive's loop, in the order of enum drive_speed."""
 
 INTEGRALS = ("backward", "forward")
-"""Whether a simulated drive's integral counts the present sample, in the order of enum drive_integral."""
+"""Whether a simulated drive's integral includes the present sample ("backward") or not, in the order of enum
+drive_integral.
+"""
 
 SHELLS = ("bash", "zsh", "fish")
-"""Shells that there is completion for."""
+"""Shells with completion."""
 
 PACES = ("real-time", "fast")
-"""How a controller process of a simulated machine may tick."""
+"""How the controller process of a simulated machine ticks."""
 
 GCODE_SUFFIXES = (".ngc", ".nc", ".gcode", ".tap")
 DRAWING_SUFFIXES = (".dxf", ".svg")
 POINT_SUFFIXES = (".csv", ".txt")
 TOOLPATH_SUFFIXES = (*GCODE_SUFFIXES, *DRAWING_SUFFIXES, *POINT_SUFFIXES)
-"""Names of toolpath files end so, in any case of letters."""
+"""Endings of toolpath files, in upper or lower case."""
 
 PATH_SUFFIX = ".toml"
-"""Names of path files end so where other files are allowed too."""
+"""Ending of path files where other files are allowed too."""
 
 STANDARD_INPUT = "-"
 """Stands for G-code from standard input."""
@@ -59,4 +63,4 @@ def is_toolpath(file: Path) -> bool:
 
 
 LENGTH_UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 0.001, "in": 25.4}
-"""Units of drawings and points, as the command line has them."""
+"""Units of drawings and points, by their names on the command line."""

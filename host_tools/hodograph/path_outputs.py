@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outputs on the path: from the places that a path file gives to events of a program."""
+"""Outputs that a path file switches on its path, as events of a program; used by pipeline.py and stream/."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .fixed_point import nearest_q40
 from .spline.frames import Curve
 
 END_MM = 1e-6
-"""A place so little beyond the end is the end: a length that is computed may be short of the one meant by rounding."""
+"""A place this little beyond the end counts as the end: a computed length is rounded."""
 
 
 def events_on_path(file: PathFile, machine: Machine, curve: Curve) -> Events:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From a path file to a program: the steps that all commands share, each computed once, on request."""
+"""From a path file to an accepted program: spline, plan, program, each computed once, on request. Commands, API,
+simulation and stream use it.
+"""
 
 from __future__ import annotations
 
@@ -76,9 +78,11 @@ _Found = TypeVar("_Found", SplineResult, SpatialSplineResult)
 
 
 _MORE_RESERVE = (0.002, 0.01)
-"""Further shares of the machine's axis limits that are left free where the controller could not prove a plan."""
+"""Shares of the machine's axis limits that are left free in addition, one after the other, where the controller could
+not prove a plan.
+"""
 THOROUGH_GAIN = 1.1
-"""About how many times as long the bounds of stops are that few trials find."""
+"""Stop time bounds found with few trials are longer than those of all trials by about this factor."""
 
 _PROVED = (
     ProgramError.AXIS_VELOCITY,
@@ -91,7 +95,7 @@ _PROVED = (
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A program, and what the controller finds in it."""
+    """A program, and the first rule that it breaks (None: it is accepted)."""
 
     compilation: Compilation
     native: NativeProgram
@@ -113,17 +117,17 @@ class Pipeline:
 
     @property
     def standing_mm(self) -> tuple[float, ...]:
-        """Where the axes of the path before those of the program stand, without the work offset."""
+        """Positions of the path's axes before those of the program, which stand; without the work offset."""
         return ()
 
     @property
     def whole_machine(self) -> Machine:
-        """The machine with all axes of its path, also where the program turns some of them alone."""
+        """The machine with all axes of its path, also where the program moves rotary axes alone."""
         return self.machine
 
     @property
     def unit(self) -> str:
-        """Of lengths of the path: "mm", or "deg" where the program turns axes alone."""
+        """Unit of lengths of the path: "mm", or "deg" where rotary axes move alone."""
         return "mm"
 
     @cached_property
@@ -171,7 +175,7 @@ class Pipeline:
         from_polygon: Callable[..., _Found],
         through: Callable[..., _Found],
     ) -> _Found:
-        """The spline of a path by one of these two; their errors name the file."""
+        """The spline of a path, from its control polygon or through its points. Errors name the file."""
         extra = {"extra": path.extra} if isinstance(path, SpacePathSpec) else {}
         with _named_by(f"{self.file.file}: [path]"):
             if not path.through:
@@ -193,7 +197,7 @@ class Pipeline:
 
     @cached_property
     def curve(self) -> PHSpline | SpatialPHSpline:
-        """What the axes follow: the spline, and 0 for axes of the machine that the path does not move.
+        """The curve of all axes of the machine's path: the spline, and 0 for axes that the path does not move.
 
         Raises InputError: the machine has too few axes for the path.
         """
@@ -238,7 +242,7 @@ class Pipeline:
 
     @cached_property
     def peaks(self) -> dict[str, Peak]:
-        """Where every limited quantity of the plan comes nearest to its limit."""
+        """The peak of each limited quantity of the plan."""
         return self.peaks_of(self.plan)
 
     def peaks_of(self, plan: FeedPlan) -> dict[str, Peak]:
@@ -299,8 +303,8 @@ class Pipeline:
         return replan_optimal if self.feed.optimal else replan
 
     def _compiled(self, plan: FeedPlan) -> Compilation:
-        """The program of a plan; of one made again where a fault stop would come too late. Raises PlanError where no
-        plan is in time.
+        """The program of a plan. Where a fault stop would take too long, the program of a plan made again. Raises
+        PlanError: fault stops of no plan are in time.
         """
         try:
             return self._with_stops(plan, self.stop_terms)
@@ -317,11 +321,13 @@ class Pipeline:
             return again.in_time(plan, late)
 
     def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
-        """The plan made again with further feed zones; why goes to its notes."""
+        """The plan made again with further feed zones; `why` goes to its notes."""
         return self._replan(plan, zones, why)
 
     def _compiled_again(self, plan: FeedPlan) -> Compilation:
-        """The program of a plan made again. Only where few trials find stops that are hardly late, all are made."""
+        """The program of a plan made again. All trials are made only if few trials find stops that are late by at most
+        THOROUGH_GAIN. Raises LongStopError.
+        """
         try:
             self._searched(plan)
         except LongStopError as error:
@@ -362,7 +368,7 @@ class Pipeline:
 
     @property
     def stop_terms(self) -> StopTerms:
-        """What the stops of the program keep beside the limits of its plan."""
+        """What the stops of the program keep in addition to the limits of its plan."""
         return stop_terms(self.machine, self.file.limits)
 
     @property
@@ -407,8 +413,8 @@ class Pipeline:
 
 @dataclass(frozen=True, eq=False)
 class TurningPipeline(Pipeline):
-    """A pipeline of a path on which axes turn alone, while x, y and z rest: its machine is `Machine.turning`, and its
-    points are those of the axes that the program moves. Lengths and feeds are in degrees.
+    """The pipeline of a path of rotary axes alone, while x, y and z stand. Its machine is `Machine.turning`, its points
+    are those of the axes that the program moves. Lengths and feeds are in degrees.
     """
 
     given_whole: Machine | None = None
@@ -416,7 +422,7 @@ class TurningPipeline(Pipeline):
 
     @property
     def standing_mm(self) -> tuple[float, ...]:
-        """Where the axes before those of the program stand."""
+        """Positions of the path's axes before those of the program, which stand."""
         return self.given_standing_mm
 
     @property
@@ -426,14 +432,13 @@ class TurningPipeline(Pipeline):
 
     @property
     def unit(self) -> str:
-        """Of lengths of the path."""
+        """Unit of lengths of the path."""
         return "deg"
 
 
 def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeline:
-    """The pipeline of a path file, on its own machine or on this one.
-
-    Raises InputError: the path turns axes alone, and the machine does not have them.
+    """The pipeline of a path file, on its own machine or on this one. Raises InputError: rotary axes move alone, and
+    the machine's path lacks them.
     """
     plain, path = Pipeline(file, machine), file.given_path
     if not (isinstance(path, SpacePathSpec) and path.turns_alone):
@@ -459,7 +464,9 @@ def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeli
 
 
 def _require_one_direction(file: PathFile, moved: NDArray[np.float64], closed: bool) -> None:
-    """Raises PlanError: the only axis that turns turns back, which a smooth curve does by a loop of another axis."""
+    """Raises PlanError: the only axis that moves reverses. A smooth curve reverses only by a loop in the plane of two
+    axes.
+    """
     turning = np.flatnonzero(np.ptp(moved, axis=0))
     step = np.diff(moved[:, turning[0]])
     back = np.flatnonzero(np.sign(step) == -np.sign(step[step != 0.0][0]))
@@ -473,7 +480,7 @@ def _require_one_direction(file: PathFile, moved: NDArray[np.float64], closed: b
 
 
 def start_counts(pipeline: Pipeline, kernel: str) -> list[int]:
-    """Where all axes of the machine's path stand at the start of the program of a pipeline, in counts."""
+    """Positions of all axes of the machine's path at the start of a pipeline's program, in counts."""
     return program_start_counts(
         pipeline.accepted, pipeline.whole_machine, kernel, pipeline.standing_mm
     )
@@ -482,13 +489,13 @@ def start_counts(pipeline: Pipeline, kernel: str) -> list[int]:
 def program_start_counts(
     program: NativeProgram, whole: Machine, kernel: str, standing_mm: Sequence[float] | None = None
 ) -> list[int]:
-    """Where all axes of a machine's path stand at the start of a program, in counts.
+    """Positions of all axes of a machine's path at the start of a program, in counts.
 
     whole        the machine with all axes of its path
-    standing_mm  where axes before those of the program stand, without the work offset; None: not known
+    standing_mm  positions of the axes before those of the program, without the work offset; None: not known
 
-    Raises InputError: the program has more path axes than the machine, or turns axes alone and it is not known where
-    the others stand.
+    Raises InputError: the program has more path axes than the machine, or it moves rotary axes alone and the positions
+    of the others are not known.
     """
     if program.first_axis and not standing_mm:
         raise InputError(
@@ -511,7 +518,7 @@ def program_start_counts(
 
 
 def _drawn_by(path: SpacePathSpec, moved: NDArray[np.float64]) -> PathSpec | SpacePathSpec:
-    """A path on which axes turn alone, drawn by the axes (n, 2 or 3) of its program."""
+    """A path of rotary axes alone as a path in the plane or in space of its program's axes (n, 2 or 3)."""
     if moved.shape[1] > PLANE_AXES:
         return replace(path, points=moved, extra=np.zeros((0, 0)))
     plane = moved[:, 0] + 1j * moved[:, 1]
@@ -529,7 +536,7 @@ def _too_few_axes(file: PathFile, points: int, axes: int) -> InputError:
 
 @contextmanager
 def _named_by(place: str) -> Iterator[None]:
-    """Errors of the mathematics say first which file, or part of it, they are about."""
+    """Puts a file, or a place in it, before the messages of errors."""
     try:
         yield
     except (InputError, PlanError) as error:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """JSON schemas (draft 7) of the input files, for editors and other tools: `hodograph schema`.
 
-They say what one file may hold by itself: keys, types, ranges, and which keys go together. The readers
-(docs/reference/files.md) decide; they also compare numbers with one another and look for other files.
+A schema describes what one file may hold by itself: keys, types, ranges, and which keys go together. The readers in
+config/, faults/ and campaign/ decide (docs/reference/files.md): they also compare numbers with one another and read the
+files that are named.
 """
 
 from __future__ import annotations
@@ -109,8 +110,8 @@ def _table(
 
 
 def _table_or_list(text: str, table: Schema, tables: Schema) -> Schema:
-    """One schema rather than a choice of two: editors then mark the wrong key, not the whole table. Conditions on the
-    items of a list and on the keys of a table do not meet, but for those that combine others.
+    """One schema in place of a choice of two, so that editors mark the wrong key and not the whole table. Conditions on
+    a list and conditions on a table may stand side by side, except for those that combine other schemas.
     """
     combining = {key: table[key] for key in ("oneOf", "allOf") if key in table}
     plain = {key: each for key, each in table.items() if key not in combining}
@@ -431,7 +432,7 @@ def _controller() -> Schema:
 
 
 def _in_units(properties: dict[str, Schema]) -> dict[str, Schema]:
-    """The same for an axis that turns, whose keys are in degrees."""
+    """The same for a rotary axis, whose keys are in degrees."""
     turning = {
         in_unit(key, "deg"): one | {"description": one["description"].replace("mm", "degrees")}
         for key, one in properties.items()

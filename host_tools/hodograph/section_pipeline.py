@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The pipeline of a section of a job: its curve is fitted already, and equal sections share its plan and program.
 
-job.py makes one for each section, the API one for a fitted path. Beside what `Pipeline` does it lowers the feed where
-a plan would leave no headroom for a changing override.
+job.py makes one for each section, the API one for a fitted path. In addition to what `Pipeline` does, it lowers the
+feed where a plan would leave no headroom for a changing override.
 """
 
 from __future__ import annotations
