@@ -40,7 +40,9 @@ _REACH_MM = 8192.0
 
 @dataclass(eq=False)
 class SharedPrograms:
-    """What equal sections share: the plan, and the programs by the bytes of their events. The first section fills it."""
+    """What equal sections share: the plan, and the programs by the bytes of their events. The first section fills
+    it.
+    """
 
     plan: FeedPlan | None = None
     judged: dict[bytes, Judged] = field(default_factory=dict)

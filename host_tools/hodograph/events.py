@@ -71,9 +71,9 @@ class SwitchedOutputs:
         return events_of(found)
 
 
-def events_behind(events: Events, place_q40: int) -> tuple[Events, Events]:
+def events_after(events: Events, place_q40: int) -> tuple[Events, Events]:
     """Events up to an arc length, and those after it with places counted from there."""
     at = int(np.searchsorted(events["place"], place_q40, side="right"))
-    behind = events[at:].copy()
-    behind["place"] -= place_q40
-    return events[:at], behind
+    after = events[at:].copy()
+    after["place"] -= place_q40
+    return events[:at], after

@@ -105,7 +105,9 @@ class JobSection:
         return fitted.turning_deg if self.stands_at is None else fitted.deviation_mm
 
     def places(self, moved_mm: Real) -> Real:
-        """Positions (n, axes) of the path's axes, without the work offset, from positions (n, k) of its program's axes."""
+        """Positions (n, axes) of the path's axes, without the work offset, from positions (n, k) of its program's
+        axes.
+        """
         machine = self.pipeline.machine
         own = moved_mm - np.array(machine.offset_mm)
         stands = np.broadcast_to(self.standing_mm, (len(own), machine.first_axis))
@@ -113,7 +115,9 @@ class JobSection:
 
     @property
     def standing_mm(self) -> Real:
-        """Positions (first_axis,) of the path's axes before those of its program, which stand; without the work offset."""
+        """Positions (first_axis,) of the path's axes before those of its program, which stand; without the work
+        offset.
+        """
         first = self.pipeline.machine.first_axis
         return np.array((self.stands_at or ())[:first], dtype=np.float64)
 
@@ -226,7 +230,7 @@ class Job:
             )
         if self.sections[0].stands_at is not None:
             raise PlanError(
-                f"{self.file}: turns axes alone, while x, y and z stand: simulate and run take it, not {command}"
+                f"{self.file}: moves rotary axes alone, while x, y and z stand: simulate and run take it, not {command}"
             )
         return self.sections[0]
 
@@ -299,7 +303,7 @@ def no_such_axis(file: Path, line: int, name: str, machine: Machine) -> InputErr
     """The error for a move of a, b or c, which is no axis of the machine's path."""
     return InputError(
         f"{file}:{line}: the move turns {name.upper()}, but no axis {name} of {machine.file.name} follows the path: "
-        'name it behind "z" in path = [...] at its top, or leave it out'
+        'name it after "z" in path = [...] at its top, or leave it out'
     )
 
 
@@ -338,9 +342,9 @@ def ignored_note(file: Path, kind: str, lines: Sequence[int]) -> str:
 def _ignored_commands(path: Toolpath, file: Path, outputs: Outputs | None) -> Iterator[str]:
     """Notes on commands that the machine does not execute, one for each kind."""
     at_rest = [command for section in path.sections for command in section.before]
-    on_the_way = [event.command for section in path.sections for event in section.events]
+    within = [event.command for section in path.sections for event in section.events]
     lines: dict[str, list[int]] = {}
-    for command in [*at_rest, *path.after, *on_the_way]:
+    for command in [*at_rest, *path.after, *within]:
         kind = ignored_kind(command, outputs)
         if kind is not None:
             lines.setdefault(kind, []).append(command.line)
@@ -364,7 +368,9 @@ class SectionMaker:
     known: EqualSections | None = None
 
     def made(self, section: Section) -> Iterator[JobSection]:
-        """The fitted section; where no curve was found within the tolerance, its parts with exact stops between them."""
+        """The fitted section; where no curve was found within the tolerance, its parts with exact stops between
+        them.
+        """
         if self.feed_mm_s is not None:
             reference = section.reference
             feed = np.where(reference.feed_mm_s < inf, self.feed_mm_s, inf)
@@ -434,7 +440,9 @@ class SectionMaker:
             )
 
     def _turned(self, section: Section, fitted: FittedPath) -> FittedPath:
-        """The fitted path with the machine's rotary axes added. Raises InputError and PlanError, naming file and line."""
+        """The fitted path with the machine's rotary axes added. Raises InputError and PlanError, naming file and
+        line.
+        """
         angles = section.reference.turn_deg
         if angles is None:
             return fitted

@@ -57,12 +57,12 @@ class SectionCommands:
     """Commands and feeds of a section.
 
     before      commands at rest before it
-    on_the_way  commands within it, with their arc lengths in mm
+    within  commands within it, with their arc lengths in mm
     length_mm   its length
     feeds       its programmed feeds; the first one from its start"""
 
     before: tuple[Command, ...]
-    on_the_way: tuple[tuple[float, Command], ...]
+    within: tuple[tuple[float, Command], ...]
     length_mm: float
     feeds: tuple[ProgrammedFeed, ...] = ()
 
@@ -150,16 +150,16 @@ class EventMaker:
         repeated = self._repeated()
         _, late = _split(section.before, is_first=is_first)
         begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, late)]
-        moving = self._on_the_way(section)
+        moving = self._within(section)
         end_q40 = nearest_q40(section.length_mm)
         early = list(after) if is_last else _split(after, is_first=False)[0]
         return SectionEvents(repeated, [*begin, *moving, *self.changed(end_q40, early)])
 
-    def _on_the_way(self, section: SectionCommands) -> list[Event]:
+    def _within(self, section: SectionCommands) -> list[Event]:
         """Events of commands and of changes of the feed, in the order of their places."""
         found: list[Event] = []
         feeds = list(section.feeds[1:])
-        for s_mm, command in section.on_the_way:
+        for s_mm, command in section.within:
             passed = [feed for feed in feeds if feed.s_mm <= s_mm]
             del feeds[: len(passed)]
             found += [*self._at_feeds(passed), *self.changed(nearest_q40(s_mm), [command])]

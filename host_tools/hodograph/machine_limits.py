@@ -94,7 +94,9 @@ def _plant(drive: Drive, volts: float | None) -> Plant:
 
 
 def program_limits(machine: Machine) -> ProgramLimits:
-    """The limits that the controller of this machine checks programs against. Raises InputError: it has one axis only."""
+    """The limits that the controller of this machine checks programs against. Raises InputError: it has one axis
+    only.
+    """
     axes = machine.path_axes
     return ProgramLimits(
         period_us=machine.period_us,

@@ -453,7 +453,7 @@ def pipeline_of(file: PathFile, machine: Path | Machine | None = None) -> Pipeli
     moved = np.concatenate((points, still), axis=1)[:, first:]
     _require_one_direction(file, moved, path.closed)
     limits = replace(
-        file.limits, axis=file.limits.axis.behind(first), names=AXES[: path.axes - first]
+        file.limits, axis=file.limits.axis.from_axis(first), names=AXES[: path.axes - first]
     )
     return TurningPipeline(
         replace(file, given_path=_drawn_by(path, moved), limits=limits),
@@ -474,7 +474,7 @@ def _require_one_direction(file: PathFile, moved: NDArray[np.float64], closed: b
         return
     place = "a closed path" if closed else f"point {back[0]}"
     raise PlanError(
-        f"{file.file}: [path] the only axis that turns turns back at {place}: end the path there, and put the rest "
+        f"{file.file}: [path] the only rotary axis reverses at {place}: end the path there, and put the rest "
         "into a file of its own"
     )
 
@@ -499,7 +499,7 @@ def program_start_counts(
     """
     if program.first_axis and not standing_mm:
         raise InputError(
-            "the program turns axes alone, and does not hold where x, y and z stand: give its path file, or "
+            "the program moves rotary axes alone, and does not hold where x, y and z stand: give its path file, or "
             "hodograph run its toolpath"
         )
     if program.axis_count > len(whole.path_axes):

@@ -295,7 +295,9 @@ def _feed() -> Schema:
                 GREATEST_FEED_MM_S,
             ),
             "nominal_deg_s": _number(
-                "The same on a path that turns axes alone", LEAST_FEED_MM_S, GREATEST_FEED_MM_S
+                "The same on a path that moves rotary axes alone",
+                LEAST_FEED_MM_S,
+                GREATEST_FEED_MM_S,
             ),
             "ramp_time_s": _number("Duration of a feed ramp", LEAST_RAMP_S, GREATEST_RAMP_S),
             "n_c": {
@@ -332,7 +334,7 @@ def _limits() -> Schema:
             "feed_mm_s": _number("Greatest feed", *FEED),
             "acceleration_mm_s2": _number("Greatest acceleration along the path", *ACCELERATION),
             "jerk_mm_s3": _number("Greatest jerk along the path", *JERK),
-            "feed_deg_s": _number("Greatest feed of a path that turns axes alone", *FEED),
+            "feed_deg_s": _number("Greatest feed of a path that moves rotary axes alone", *FEED),
             "acceleration_deg_s2": _number("Greatest acceleration along it", *ACCELERATION),
             "jerk_deg_s3": _number("Greatest jerk along it", *JERK),
             "centripetal_mm_s2": _number("Greatest feed squared times curvature", *ACCELERATION),
@@ -447,7 +449,7 @@ def _axis() -> Schema:
     properties = _in_units(
         {
             "name": _text("Name of the axis, for messages and traces"),
-            "unit": _choice("mm, or deg of an axis that turns", UNITS, "mm"),
+            "unit": _choice("mm, or deg of a rotary axis", UNITS, "mm"),
             "node": _integer("Node number of its drive", 1, 127),
             "travel_mm": _vector("[least, greatest] position, mm", 2, 2, -4096, 4096),
             "velocity_mm_s": _number("Greatest velocity, mm/s", 0.01, 4000),

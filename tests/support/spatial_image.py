@@ -61,7 +61,7 @@ class Segment:
         return max(sigma) / min(sigma) if min(sigma) > 0 else Fraction(0)
 
     def beziers(self) -> list[list[Fraction]]:
-        """Bezier coefficients of all path axes, and behind them of the arc length from the start, in mm."""
+        """Bezier coefficients of all path axes, and after them of the arc length from the start, in mm."""
         out = []
         for row, start in zip(self.hodograph(), (*self.point, 0), strict=True):
             bezier = [Fraction(start, Q40)]
@@ -78,7 +78,7 @@ class Segment:
         ]
 
     def at_powers(self, axis: int) -> list[float]:
-        """A path axis, or behind the last the arc length, in powers of xi, from the start; mm."""
+        """A path axis, or after the last the arc length, in powers of xi, from the start; mm."""
         if 3 <= axis < 3 + len(self.extras):
             bezier = [Fraction(b, Q40) for b in (0, *self.extras[axis - 3].b)]
         else:

@@ -211,7 +211,7 @@ def send_blocks(by_hand: Hand, image: bytes, size: int, lose: frozenset[int] = f
 
 
 def blocks_needed(count: int, lose: set[int]) -> int:
-    """Blocks of SEGMENTS for so many segments when these are lost once: each goes on behind the last good one."""
+    """Blocks of SEGMENTS for so many segments when these are lost once: each goes on after the last good one."""
     done, blocks, lost = 0, 0, set(lose)
     while done < count:
         block = range(done, min(done + SEGMENTS, count))
@@ -238,7 +238,7 @@ def test_block_download_by_hand(controller: canopen.RemoteNode, by_hand: Hand) -
 def test_block_download_with_lost_segments(
     controller: canopen.RemoteNode, by_hand: Hand, lose: set[int]
 ) -> None:
-    """The answer at the block's end names the last good segment; the client goes on behind it."""
+    """The answer at the block's end names the last good segment; the client goes on after it."""
     image = program("line_slow")
     count = len(segments_of(image))
     assert count > 3 * SEGMENTS
@@ -485,7 +485,7 @@ def test_block_upload_in_blocks_of_any_size(by_hand: Hand, size: int) -> None:
 
 @pytest.mark.parametrize("lose", [{0}, {5}, {126}, {127}, {LAST}, {0, 100, LAST}], ids=str)
 def test_block_upload_with_lost_segments(by_hand: Hand, lose: set[int]) -> None:
-    """The server repeats from behind the last good segment, and its CRC counts each byte once."""
+    """The server repeats from after the last good segment, and its CRC counts each byte once."""
     image = program("line_tiny")
     count = len(segments_of(image))
     assert count > SEGMENTS

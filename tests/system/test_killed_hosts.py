@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from neighbour import latched
 from numpy.typing import NDArray
+from other_node import latched
 
 from bench import EXAMPLES, MakeBench
 from commands import Command, running

@@ -121,7 +121,7 @@ def _held_and_resumed(live: Live, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def _shown(name: str, status: dict[str, Any]) -> str:
-    """Whether the page shows where an axis that turns stands."""
+    """Whether the page shows where a rotary axis stands."""
     at = status["axes"][("x", "y", "z", "a", "c").index(name)]["actual_mm"]
     title = re.escape(f"Axis {name} over arc length")
     return f"Math.abs(Number((document.body.innerText.match(/{title}\\s+(-?[0-9.]+) deg/) ?? [])[1]) - {at}) < 0.002"

@@ -105,13 +105,13 @@ def say(capsys: pytest.CaptureFixture[str]) -> Say:
     return typed
 
 
-def look(say: Say, *more: str) -> dict[str, Any]:
+def status(say: Say, *more: str) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(say("status", "--json", *more))
     return found
 
 
 def homed(say: Say) -> list[bool]:
-    return [axis["homed"] for axis in look(say)["axes"]]
+    return [axis["homed"] for axis in status(say)["axes"]]
 
 
 # --- configuration ---
@@ -120,11 +120,11 @@ def homed(say: Say) -> list[bool]:
 def test_stored_parameters_and_program_are_there_again(bench: PowerBench, say: Say) -> None:
     assert "stored" in say("configure", ALPHA, "--store")
     say("upload", ALPHA)
-    before = look(say)
+    before = status(say)
     bench.off("controller")
     bench.controller_on()
     bench.until_off()
-    after = look(say)
+    after = status(say)
     assert after["configuration"]["state"] == "restored"
     assert after["configuration"]["stored"] == "whole"
     for key in ("crc32", "stored_crc32", "program_crc32"):
@@ -139,7 +139,7 @@ def test_a_program_without_its_configuration_does_not_run(bench: PowerBench, say
     bench.off("controller")
     bench.controller_on()
     bench.until_off()
-    found = look(say)
+    found = status(say)
     assert found["program"]["state"] == "ready"
     assert found["configuration"]["state"] == "none"
     for words in (["start"], ["home"]):
@@ -165,18 +165,18 @@ def test_another_machine_file_holds_until_power_off(
     bench.off("controller")
     bench.controller_on()
     bench.until_off()
-    assert look(say)["configuration"]["state"] == "restored"
+    assert status(say)["configuration"]["state"] == "restored"
     assert say("start", "--follow") == "done\n"
 
 
 def test_what_is_forgotten_does_not_come_back(bench: PowerBench, say: Say) -> None:
     say("configure", ALPHA, "--store")
     assert say("configure", "--forget") == "nothing is stored any more\n"
-    found = look(say)["configuration"]
+    found = status(say)["configuration"]
     assert (found["state"], found["stored"]) == ("confirmed", "defaults")
     bench.off("controller")
     bench.controller_on()
-    assert look(say)["configuration"]["state"] == "none"
+    assert status(say)["configuration"]["state"] == "none"
 
 
 @pytest.mark.parametrize(
@@ -215,7 +215,7 @@ def test_a_power_cycle_between_any_two_steps(
     if not runs:
         assert says in say("start", status=REFUSED)
         return
-    assert look(say)["configuration"]["state"] == says
+    assert status(say)["configuration"]["state"] == says
     assert say("start", "--follow") == "done\n"
 
 
@@ -237,16 +237,16 @@ def test_configure_without_sense(bench: PowerBench, say: Say, words: list[str]) 
 
 def test_a_stored_node_number(bench: PowerBench, say: Say) -> None:
     assert "5 after the next power-on" in say("configure", "--set-node", "5")
-    assert look(say)["node"] == 1
+    assert status(say)["node"] == 1
     bench.off("controller")
     bench.controller_on()
-    assert look(say, "--node", "5")["node"] == 5
+    assert status(say, "--node", "5")["node"] == 5
     assert "the board's own after the next power-on" in say(
         "configure", "--node", "5", "--set-node", "0"
     )
     bench.off("controller")
     bench.controller_on()
-    assert look(say)["node"] == 1
+    assert status(say)["node"] == 1
 
 
 @pytest.mark.parametrize("file", sorted(PAPER_ALPHA.parent.glob("*.toml")), ids=lambda f: f.stem)
@@ -285,7 +285,7 @@ def test_a_drive_of_another_identity(bench: PowerBench, say: Say, tmp_path: Path
     other = machine_file(tmp_path, "[axis.identity]\nproduct = 0x15\n")
     say("upload", ALPHA, "--machine", str(other))
     bench.clock.sleep(1.0)
-    trouble = look(say)["boot_trouble"]
+    trouble = status(say)["boot_trouble"]
     assert (trouble["node"], trouble["index"], trouble["sub"]) == (2, 0x1018, 2)
     for words in (trouble["text"], say("start", status=4)):
         assert (
@@ -310,7 +310,7 @@ def test_nothing_moves_before_it_is_homed(bench: PowerBench, say: Say, tmp_path:
     say("home")
     assert homed(say) == [True, False]
     assert say("start", "--follow") == "done\n"
-    assert look(say)["unhomed_nodes"] == []
+    assert status(say)["unhomed_nodes"] == []
 
 
 def test_on_purpose(bench: PowerBench, say: Say, tmp_path: Path) -> None:
@@ -318,7 +318,7 @@ def test_on_purpose(bench: PowerBench, say: Say, tmp_path: Path) -> None:
     say("goto", ALPHA, *machine, "--unhomed")
     assert "not homed" in say("start", status=REFUSED)
     say("start", "--follow", "--unhomed")
-    assert look(say)["unhomed_nodes"] == [2]
+    assert status(say)["unhomed_nodes"] == [2]
     assert "node 2 when this program was started (--unhomed)" in say("status")
     assert "not homed" in say("run", ALPHA, *machine, status=REFUSED)
     recording = tmp_path / "run.log"
@@ -386,6 +386,6 @@ def test_drives_switched_while_they_run(bench: PowerBench, say: Say, tmp_path: P
     bench.clock.sleep(0.5)
     bench.drives_on()
     bench.clock.sleep(1.0)
-    assert look(say)["state"] == "fault"
+    assert status(say)["state"] == "fault"
     say("reset")
     assert homed(say) == [False, False]

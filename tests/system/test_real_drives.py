@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from neighbour import flood, latched, neighbour, real_drives, runs_again, settled
+from other_node import flood, latched, other_node, real_drives, runs_again, settled
 
 from bench import PAPER_ALPHA, Bench, MakeAlpha, MakeBench
 from boards import EMULATE
@@ -82,7 +82,7 @@ def full_bus(bench: Bench, hub: LocalHub, path: str, seconds: float) -> tuple[in
     """
     recorder = Recorder(bench.bus)
     begin(path, bench, 1.0)
-    with neighbour(hub) as other:
+    with other_node(hub) as other:
         flood(other, 0x001, seconds)
         bench.clock.sleep(seconds)
     outcome = settled(bench)[:2]
@@ -117,7 +117,7 @@ def test_a_bus_full_of_frames_of_higher_priority(
 def test_a_bus_that_is_full_from_any_instant_on(
     real: Bench, hub: LocalHub, clock: VirtualClock, alpha_at: MakeAlpha, phase_us: int
 ) -> None:
-    """For one and a half periods: it begins before SYNC, between SYNC and setpoints, between these, and behind them."""
+    """For one and a half periods: it begins before SYNC, between SYNC and setpoints, between these, and after them."""
     clock.sleep(phase_us * 1e-6)
     state, _ = full_bus(real, hub, str(alpha_at(40)), 0.0015)
     assert state in (READY, FAULT_STATE)

@@ -96,7 +96,7 @@ class Peer:
         self.answers += 1
 
     def take(self) -> None:
-        """What has come, and what belongs behind it."""
+        """What has come, and what belongs after it."""
         text = self.stream.recv(65536)
         assert text, "the board is gone"
         *lines, self.rest = (self.rest + text).split(b"\r")
@@ -124,7 +124,7 @@ def test_no_frame_is_lost(address: tuple[str, int]) -> None:
 
 
 def test_a_flood_is_taken(address: tuple[str, int]) -> None:
-    """Frames that nobody wants as fast as the UART takes them, and behind them a question, which is answered."""
+    """Frames that nobody wants as fast as the UART takes them, and after them a question, which is answered."""
     flood = b"t12380011223344556677\r" * (FLOOD // 22)
     peer = Peer(socket.create_connection(address, timeout=HANGS_S))
     with peer.stream as stream:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError
-from neighbour import latched, settled
+from other_node import latched, settled
 
 from bench import Bench, MakeBench
 from hodograph.bus.capture.recorder import Recorder

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from neighbour import latched
+from other_node import latched
 
 from bench import EXAMPLES, VCAN0, Bench, MakeBench
 from hodograph.bus.capture.frames import Frames

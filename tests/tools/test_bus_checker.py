@@ -68,7 +68,7 @@ def test_a_good_bus_in_any_number_of_parts(parts: int) -> None:
 
 
 def put(at_tick: int, *frames: Frame) -> Callable[[list[Frame]], None]:
-    """Adds frames behind the SYNC of a tick."""
+    """Adds frames after the SYNC of a tick."""
 
     def change(bus: list[Frame]) -> None:
         at = [i for i, frame in enumerate(bus) if frame[0] == 0x080][at_tick] + 1

@@ -131,7 +131,7 @@ def test_a_failure_in_any_phase_is_recorded(root: Path) -> None:
 
 @pytest.mark.parametrize("group", ["serial", "free"])
 def test_a_test_that_hangs_fails_by_its_name(root: Path, group: str) -> None:
-    """By pytest-timeout: the tests behind it run all the same."""
+    """By pytest-timeout: the tests after it run all the same."""
     mark = "" if group == "free" else "pytestmark = pytest.mark.serial\n"
     write(
         root,

@@ -58,7 +58,7 @@ def run(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def test_parts_behind_a_failure_run_all_the_same() -> None:
+def test_parts_after_a_failure_run_all_the_same() -> None:
     done = run("--step", "one", "echo to one; false", "--tests", "two", "echo 5 passed, 0 failed")
     assert done.returncode == 1
     assert "to one" in done.stdout

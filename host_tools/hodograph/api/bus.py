@@ -88,7 +88,7 @@ class Controller:
 
         unhomed   also where axes with a homing method are not homed
 
-        Raises InputError for a loaded image that turns axes alone: it does not hold where the others stand.
+        Raises InputError for a loaded image that moves rotary axes alone: it does not hold where the others stand.
         """
         start = program._start_counts()
         distance_mm = goto(self._node, self._machine._file, start, unhomed=unhomed)
@@ -173,8 +173,8 @@ class Controller:
                 f"{job._job.file}:{line}: {code} waits for the operator: give operator= to run_job"
             )
 
-        def ask(text: str, look: Callable[[], None]) -> None:
-            del look
+        def ask(text: str, check: Callable[[], None]) -> None:
+            del check
             if operator is not None:
                 operator(text)
 

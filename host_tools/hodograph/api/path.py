@@ -141,7 +141,7 @@ class Path:
         name: str = "path",
     ) -> Path:
         """The path through points (n, A): x, y, or x, y, z, or these and up to three extra axes, in degrees where they
-        turn. Where x, y and z are the same at all points, the other axes turn alone: they draw the path, and its
+        turn. Where x, y and z are the same at all points, the other rotary axes move alone: they draw the path, and its
         lengths and feeds are in degrees.
 
         closed         the end is the start; each point is given once, 3 or more
@@ -179,7 +179,9 @@ class Path:
 
     @property
     def axes(self) -> int:
-        """A: 2 in the plane, 3 in space, 4 to 6 with extra axes; where axes turn alone, those that draw the path."""
+        """A: 2 in the plane, 3 in space, 4 to 6 with extra axes; where rotary axes move alone, those that draw the
+        path.
+        """
         return int(self.node_points_mm.shape[1])
 
     @property

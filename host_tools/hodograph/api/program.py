@@ -71,7 +71,7 @@ class Run:
 
     @property
     def following_error_um(self) -> Real:
-        """Setpoint less position (n, A); thousandths of a degree of axes that turn."""
+        """Setpoint less position (n, A); thousandths of a degree of rotary axes."""
         return self._motion.following_error_um[: self._motion.ticks]
 
     @property
@@ -131,7 +131,7 @@ class Program:
     image: bytes = field(repr=False)
     machine: Machine
     _standing_mm: tuple[float, ...] = field(default=(), repr=False)
-    """Where axes of the machine's path before those of the program stand, where the program turns axes alone."""
+    """Where axes of the machine's path before those of the program stand, where the program moves rotary axes alone."""
 
     def __post_init__(self) -> None:
         fault = controller_verdict(self._native, self._moved)
@@ -152,7 +152,9 @@ class Program:
         if not self._native.first_axis:
             return whole
         if whole.path_count <= SPACE_AXES:
-            raise InputError("program image: turns axes alone, which the machine does not have")
+            raise InputError(
+                "program image: moves rotary axes alone, which the machine does not have"
+            )
         return whole.turning
 
     @property

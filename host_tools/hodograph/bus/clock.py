@@ -36,7 +36,7 @@ _WATCHES, _VIRTUAL, _SENT, _FRAMES = 1, 2, 4, 8
 _VERSION = 3
 _HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
 _WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
-_LOOK_S = 0.05
+_NOTICE_S = 0.05
 """Of real time, while a process of ours is about to join: between two looks whether it has ended instead."""
 _WELCOME_S = 60.0
 """Of real time: a hub that works answers at once."""
@@ -253,7 +253,7 @@ class VirtualClock:
         while child.poll() is None:
             if self._has_left(name):
                 self.activate()
-                self._look()
+                self._take_soon()
             elif limit_s is not None and self.now_s() >= limit_s:
                 raise subprocess.TimeoutExpired(child.args, wait_s or 0.0)
             else:
@@ -288,11 +288,11 @@ class VirtualClock:
     def _await_notice(self, name: str, child: subprocess.Popen[bytes], *kinds: int) -> None:
         """Until the hub has reported one of these of a process, or it has ended; time stands still."""
         while child.poll() is None and not any((kind, name) in self._notices for kind in kinds):
-            self._look()
+            self._take_soon()
 
-    def _look(self) -> None:
+    def _take_soon(self) -> None:
         """Takes the next message, if one comes soon, while time stands still."""
-        if select.select([self._connection], [], [], _LOOK_S)[0]:
+        if select.select([self._connection], [], [], _NOTICE_S)[0]:
             self._take()
 
     def _has_left(self, name: str) -> bool:
@@ -378,7 +378,7 @@ def hub_clock(path: str) -> VirtualClock | None:
     Raises OSError when nobody serves the path.
     """
     connection = _connect(path)
-    hub = _process_behind(connection)
+    hub = _peer_process(connection)
     known = _clocks().get(hub)
     if known is not None:
         connection.close()
@@ -399,7 +399,7 @@ def has_virtual_time(path: str) -> bool:
         return bool(flags & _VIRTUAL)
 
 
-def _process_behind(connection: socket.socket) -> int:
+def _peer_process(connection: socket.socket) -> int:
     credentials = struct.Struct("=iII")
     data = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, credentials.size)
     return int(credentials.unpack(data)[0])

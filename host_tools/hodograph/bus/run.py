@@ -178,8 +178,8 @@ def record_program(
         controller.start(unhomed=unhomed)
         _follow(at, progress)
         took_s = controller.clock.now_s() - begun_s
-        behind = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS
-        _await_syncs(controller, behind)
+        after = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS
+        _await_syncs(controller, after)
     misses = controller.read(STATISTICS, _MISSES)  # of this run: start sets it to 0
     return Recorded(recorder.frames(), recorder.dropped, misses, took_s)
 

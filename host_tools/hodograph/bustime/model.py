@@ -107,8 +107,8 @@ class BusTime:
         return slow * _SCALE + fast * (_SCALE * self.bitrate // self.data_bitrate)
 
     def _blocking(self, message: Message) -> int:
-        behind = [m for m in self.messages if m.identifier > message.identifier]
-        return max(self._length(m) for m in (*behind, SDO))
+        lower = [m for m in self.messages if m.identifier > message.identifier]
+        return max(self._length(m) for m in (*lower, SDO))
 
     @property
     def _sync_end(self) -> int:

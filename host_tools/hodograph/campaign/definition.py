@@ -201,7 +201,7 @@ def _sources(root: Table, raw: Mapping[str, Any]) -> tuple[Source, ...]:
         if path.turns_alone:
             raise one.error(
                 "paths",
-                f"names {path.file}, which turns axes alone: a campaign takes paths of x, y and z",
+                f"names {path.file}, which moves rotary axes alone: a campaign takes paths of x, y and z",
             )
         pipeline = Pipeline(path, machine)
         pipeline.feed  # noqa: B018  (says what is missing)

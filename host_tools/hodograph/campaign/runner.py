@@ -194,11 +194,11 @@ def _cluster(address: str) -> Iterator[Any]:
             "and `dask worker ADDRESS` on each machine"
         ) from None
     with client:
-        _look_at_workers(client, address)
+        _check_workers(client, address)
         yield client
 
 
-def _look_at_workers(client: Any, address: str) -> None:
+def _check_workers(client: Any, address: str) -> None:
     try:
         client.wait_for_workers(1, timeout=WORKER_S)
         found = client.run(version)

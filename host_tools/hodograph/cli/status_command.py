@@ -120,14 +120,14 @@ def _watch(controller: Controller, meter: LoadMeter | None, to: Target, options:
                 controller.clock.sleep(LEAST_LISTEN_S)
             while True:
                 begun = controller.clock.now_s()
-                _look(controller, meter, screen)
+                _show(controller, meter, screen)
                 controller.clock.sleep(begun + options.interval - controller.clock.now_s())
     except KeyboardInterrupt as error:
         if type(error) is not KeyboardInterrupt:  # SIGTERM
             raise
 
 
-def _look(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> None:
+def _show(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> None:
     try:
         if not controller.answers(LEAST_LISTEN_S):
             raise BusError(f"no answer from {controller.who()}: still trying")

@@ -41,7 +41,7 @@ class Homing:
 class Feedforward:
     """What the controller sends beside the target: a share of its velocity, torque in per mille of the rated one.
 
-    Of an axis that turns, torque is for 1000 deg/s^2 and 1000 deg/s in place of m/s^2 and m/s.
+    Of a rotary axis, torque is for 1000 deg/s^2 and 1000 deg/s in place of m/s^2 and m/s.
     """
 
     velocity: float = 0.0
@@ -93,7 +93,7 @@ class Axis:
     """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what is written to its
     drive, and its model.
 
-    An axis that turns (`unit` "deg") has degrees where the names of its fields, and of its drive's model, say mm.
+    An rotary axis (`unit` "deg") has degrees where the names of its fields, and of its drive's model, say mm.
     No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
     before it accepts a program (docs/guides/limits.md).
 

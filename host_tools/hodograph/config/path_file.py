@@ -181,7 +181,7 @@ def load_paths(file: Path) -> tuple[ListedPath, ...]:
     tables = root.tables("path", (*_PATH, *_RESTS, "output", *_OWN))
     if root.has("output"):
         raise root.error(
-            "output", "applies to files with one [path]: put [[path.output]] behind its [[path]]"
+            "output", "applies to files with one [path]: put [[path.output]] after its [[path]]"
         )
     found = tuple(_listed(root, table, i) for i, table in enumerate(tables, 1))
     kinds = [type(one.file.given_path) for one in found]
@@ -336,7 +336,7 @@ class _Lengths:
 
     @property
     def _path(self) -> str:
-        moved = "turns axes alone" if self.unit == "deg" else "moves x, y or z"
+        moved = "moves rotary axes alone" if self.unit == "deg" else "moves x, y or z"
         return (
             f"a path that {moved}" if self.number is None else f"path {self.number}, which {moved}"
         )
@@ -345,7 +345,7 @@ class _Lengths:
         """Where a path of a list has keys for itself; "": they are there already, or there is no list."""
         if self.number is None or table.section not in _OWN:
             return ""
-        return f" in [path.{table.section}] behind its [[path]]"
+        return f" in [path.{table.section}] after its [[path]]"
 
 
 def _feed(table: Table, lengths: _Lengths) -> FeedRequest:

@@ -74,7 +74,7 @@ def load_clean_run(path: Path) -> CleanRun:
     pipeline = load_pipeline(path, allow_space=True)
     if pipeline.standing_mm:
         raise InputError(
-            f"{path}: turns axes alone: fault scenarios take paths that x, y or z draw"
+            f"{path}: moves rotary axes alone: fault scenarios take paths that x, y or z draw"
         )
     machine, image = pipeline.machine, pipeline.image
     _, setpoints = NativeProgram(image).setpoints("fixed", machine.path_counts)

@@ -100,8 +100,8 @@ def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathK
     track = _track(pieces)
     ends = [end for zone in bounds.limits.zones for end in (zone.from_mm, zone.to_mm)]
     cuts = np.unique(np.concatenate((bounds.spline.segment_starts_mm[1:-1], ends)))
-    first, behind = track.start[0], track.start[-1] + track.distance[-1].sum()
-    cells = _cells(track, cuts[(cuts > first) & (cuts < behind)])
+    first, end = track.start[0], track.start[-1] + track.distance[-1].sum()
+    cells = _cells(track, cuts[(cuts > first) & (cuts < end)])
     found = []
     for _ in range(_ROUNDS):
         samples = _evaluate(bounds.spline, track, cells)

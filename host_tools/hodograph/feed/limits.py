@@ -238,7 +238,7 @@ class AxisLimits:
         """The same limits times `share`."""
         return AxisLimits(*(_scaled(getattr(self, one.name), share) for one in fields(self)))
 
-    def behind(self, first: int) -> AxisLimits:
+    def from_axis(self, first: int) -> AxisLimits:
         """Those of the axes from number `first` on."""
         each = (getattr(self, one.name) for one in fields(self))
         return AxisLimits(*(given and given[first:] for given in each))

@@ -41,7 +41,7 @@ class ProgramPath:
     def __init__(self, image: bytes, counts_per_mm: int) -> None:
         program = NativeProgram(image)
         if program.first_axis:
-            raise InputError("the program turns axes alone: there is no path to draw")
+            raise InputError("the program moves rotary axes alone: there is no path to draw")
         self._contour = Contour(program)
         self._counts_per_mm = counts_per_mm
         self.crc32 = zlib.crc32(image[16:])
@@ -183,7 +183,7 @@ _LONGEST_GAP = 1000
 class Rows:
     """One row a tick: time since the first SYNC, positions in mm, and figures in the units of their names.
 
-    An axis that turns has degrees for mm, and thousandths of a degree for um.
+    An rotary axis has degrees for mm, and thousandths of a degree for um.
     """
 
     t_s: Floats

@@ -30,7 +30,7 @@ POINT = np.dtype(
 )
 """One interpolated point, struct interpolator_point of core/interpolator.h: unrounded output of a kernel.
 
-`position_q40` is 0 beyond the program's path axes; mm * 2^40, or degrees * 2^40 of an extra axis that turns.
+`position_q40` is 0 beyond the program's path axes; mm * 2^40, or degrees * 2^40 of an extra rotary axis.
 """
 
 
@@ -106,7 +106,7 @@ class NativeProgram:
 
     @property
     def first_axis(self) -> int:
-        """The axis of the machine that the program's first one is; more than 0: it turns axes alone."""
+        """The axis of the machine that the program's first one is; more than 0: it moves rotary axes alone."""
         return int(self.pointer.header.flags) >> FIRST_AXIS_SHIFT
 
     @property
@@ -238,7 +238,7 @@ class NativeProgram:
     ) -> tuple[NDArray[np.void], NDArray[np.int32]]:
         """Points (n,) of POINT and setpoints in counts (n, axis_count) of `count` ticks from `tick0` on.
 
-        `counts_per_mm`: of all axes, or of each; for an axis that turns those of a degree.
+        `counts_per_mm`: of all axes, or of each; for a rotary axis those of a degree.
         """
         points = self.points(kernel, self.tick_times_q42_s(tick0, count))
         return points, counts_from_q40_mm(

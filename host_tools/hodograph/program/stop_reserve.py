@@ -76,8 +76,8 @@ def stop_places(program: Program) -> StopPlaces:
     time_s, place_mm = _piece_ends(program)
     count = own_s.size
     # A piece counts that begins less than the window behind the end of the first one.
-    behind_s = time_s[1:] + WINDOW_TICKS * program.period_us * 1e-6
-    last = np.minimum(np.searchsorted(time_s[:-1], behind_s), np.arange(count) + 1 + WINDOW)
+    after_s = time_s[1:] + WINDOW_TICKS * program.period_us * 1e-6
+    last = np.minimum(np.searchsorted(time_s[:-1], after_s), np.arange(count) + 1 + WINDOW)
     lacking = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(~given)))
     first = np.flatnonzero(lacking[last] == lacking[:-1])
     last = last[first]

@@ -88,10 +88,10 @@ def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, A
 
 
 def _unit_note(pipeline: Pipeline) -> tuple[str, ...]:
-    """What mm stands for on a path that turns axes alone."""
+    """What mm stands for on a path that moves rotary axes alone."""
     if pipeline.unit == "mm":
         return ()
-    return ("axes turn alone: mm stands for degrees, µm for thousandths of a degree",)
+    return ("rotary axes move alone: mm stands for degrees, µm for thousandths of a degree",)
 
 
 def _plane_path(pipeline: Pipeline) -> Figure:

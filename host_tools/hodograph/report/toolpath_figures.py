@@ -187,7 +187,7 @@ def feed_figure(run: JobMotion) -> bytes:
     figure, axes = pyplot.subplots(figsize=(9.6, 2.8))
     begin = 0
     turns = any(section.stands_at is not None for section in run.job.sections)
-    unit = "feed, mm/s; deg/s where axes turn alone" if turns else "feed, mm/s"
+    unit = "feed, mm/s; deg/s where rotary axes move alone" if turns else "feed, mm/s"
     for motion in run.motions:
         t_s = (begin + np.arange(motion.ticks)) * run.period_s
         axes.plot(t_s, motion.feed_mm_s[: motion.ticks], color=BLUE, linewidth=1.1)

@@ -41,7 +41,7 @@ class Motion:
     is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
     the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not report their volts.
 
-    `units`, `counts_per_unit` by axis. An axis that turns has degrees where names say mm, and thousandths of a degree
+    `units`, `counts_per_unit` by axis. An rotary axis has degrees where names say mm, and thousandths of a degree
     where they say um; the greatest following error is that of the axes in mm. Axes after x, y, z have an orientation
     error: how far they are from where the curve has them beside the point nearest to the tool.
     """
@@ -64,7 +64,7 @@ class Motion:
     max_orientation_error: tuple[float, ...] = ()
     """Of each axis after x, y, z, in mm or degrees."""
     max_following_error_mdeg: float | None = None
-    """Of the axes that turn; None: there is none."""
+    """Of the rotary axes; None: there is none."""
     event_ticks: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(E,) the tick in which each event of the program acted; -1: in none."""
     events: Events = field(default_factory=no_events)
@@ -74,7 +74,7 @@ class Motion:
 
     @property
     def turns_alone(self) -> bool:
-        """Whether the path is drawn by axes that turn: its lengths are in degrees."""
+        """Whether the path is drawn by rotary axes: its lengths are in degrees."""
         return "deg" in self.units[:2]
 
     @property
@@ -236,8 +236,8 @@ class MotionTotals:
         if rows.size == 0:
             return
         self._note_events(rows)
-        behind = np.abs(rows["set_counts"][path].astype(np.int64) - rows["act_counts"][path])
-        self._following_counts = np.maximum(self._following_counts, behind.max(axis=0))
+        lags = np.abs(rows["set_counts"][path].astype(np.int64) - rows["act_counts"][path])
+        self._following_counts = np.maximum(self._following_counts, lags.max(axis=0))
         if self._contour is not None:
             error = self._contour.extra_errors(
                 rows["arc_length_q40_mm"], rows["act_counts"][path], self._counts

@@ -23,10 +23,10 @@ def halved(extra: Real) -> tuple[Real, Real]:
 def part_of_quintics(extra: Real, low: Real, high: Real) -> Real:
     """Quintics (n, E, 6) on [low, high] (n,) in their own [0, 1], by de Casteljau; low is below 1."""
     low, high = low[:, None], high[:, None]
-    return _before(_behind(extra, low), (high - low) / (1.0 - low))
+    return _part_before(_part_after(extra, low), (high - low) / (1.0 - low))
 
 
-def _behind(extra: Real, xi: Real) -> Real:
+def _part_after(extra: Real, xi: Real) -> Real:
     """Quintics (…, 6) on [xi, 1]; xi (…,)."""
     kept, rest = [extra[..., -1]], extra
     for _ in range(5):
@@ -35,6 +35,6 @@ def _behind(extra: Real, xi: Real) -> Real:
     return np.stack(kept[::-1], axis=-1)
 
 
-def _before(extra: Real, xi: Real) -> Real:
+def _part_before(extra: Real, xi: Real) -> Real:
     """Quintics (…, 6) on [0, xi]; xi (…,)."""
-    return _behind(extra[..., ::-1], 1.0 - xi)[..., ::-1]
+    return _part_after(extra[..., ::-1], 1.0 - xi)[..., ::-1]

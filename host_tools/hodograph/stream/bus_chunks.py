@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The path of a streamed job, from the chunks that pass on the bus: SDO block downloads to object 0x2060 sub 1.
+"""The path of a streamed job for the live page, from captured SDO block downloads to object 0x2060 sub 1.
 
-A block download in CiA 301: the client announces it, sends segments of 7 bytes in blocks, of which the server says how
-many came in order, and ends it with the number of bytes that do not count.
+In a block download (CiA 301) the client announces the transfer and sends segments of 7 bytes in blocks. The server
+reports for each block how many segments came in order. At the end the client gives the number of unused bytes.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class ChunkCapture:
     _ending: bool = False
 
     def feed(self, frames: Frames) -> list[Chunk]:
-        """The chunks that are complete with these frames."""
+        """The chunks that these frames complete."""
         own = frames[np.isin(frames["id"], (REQUEST + self.node, RESPONSE + self.node))]
         found: list[Chunk] = []
         for identifier, data in zip(own["id"].tolist(), own["data"], strict=True):
@@ -53,7 +53,7 @@ class ChunkCapture:
             if identifier == REQUEST + self.node:
                 self._request(one)
             elif self._response(one):
-                with suppress(InputError):  # frames were missed: the path has a gap there
+                with suppress(InputError):  # frames were lost: the path has a gap there
                     found.append(parse(bytes(self._data)))
                 self._open = False
         return found
@@ -74,7 +74,7 @@ class ChunkCapture:
                 self._last = number
 
     def _response(self, one: bytes) -> bool:
-        """Whether the controller has taken a chunk with this response."""
+        """Whether the controller accepts a chunk with this response."""
         if not self._open:
             return False
         if one[0] == _ABORT:
@@ -104,7 +104,9 @@ def _drawn(program: Program) -> tuple[Floats, Floats]:
 
 
 class JobPoints:
-    """Points of the path of a job, as far as its chunks have come; of a long job fewer of each part."""
+    """Points of the path of a job, from the chunks received so far. The longer the job, the fewer points each part
+    has.
+    """
 
     def __init__(self) -> None:
         self._job = 0
@@ -114,7 +116,7 @@ class JobPoints:
 
     def add(self, chunk: Chunk) -> None:
         """The points of another chunk, in place of the tail before it; the first of another job begins anew. Chunks
-        that turn axes alone draw nothing.
+        that move rotary axes alone are not drawn.
         """
         header, program = chunk.header, chunk.program
         if program.first_axis:

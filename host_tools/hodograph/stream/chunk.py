@@ -28,18 +28,20 @@ REST_TICKS = 8
 """The shortest rest before a chunk that begins at rest."""
 TIME_UNKNOWN = 0xFFFFFFFF
 LEAST_SHARED_PIECES = 16
-"""The largest look-ahead window of the controller: so many pieces before a joint are in both chunks."""
+"""The largest look-ahead window of the controller: this number of pieces before a joint is in both chunks."""
 
 BLOCK_HEAD = 384
-"""Bytes of the ring that the controller takes for each chunk at most, beside its own."""
+"""Most bytes of the ring that the controller uses for each chunk in addition to the chunk's own."""
 
 _HEADER = struct.Struct("<4sHH I I I I I I I I q Q q I I II".replace(" ", ""))
 _CRC_FROM = 16
 
 
 def largest_chunk(free_bytes: int) -> int:
-    """Bytes of a chunk for which there is room as soon as its predecessor is the active one, in a ring with so many
-    free bytes (object 0x2060 sub 7) without a job: a third of it, heads included; docs/reference/protocol.md 3.7.
+    """The largest chunk that always fits as soon as its predecessor is the active one: a third of the ring, heads
+    included; docs/reference/protocol.md 3.7.
+
+    free_bytes  free bytes of the ring without a job (object 0x2060 sub 7)
     """
     return max((free_bytes - 2 * BLOCK_HEAD) // 3 - 8, 0)
 
@@ -49,8 +51,8 @@ class Rest:
     """What happens at rest before a chunk that begins where its predecessor ends.
 
     dwell_ms       standstill
-    stop           it waits until it is resumed
-    optional_stop  the same where the controller makes optional stops
+    stop           the controller waits for resume
+    optional_stop  the same, only while the switch for optional stops is on
     """
 
     dwell_ms: int = 0
@@ -58,27 +60,28 @@ class Rest:
     optional_stop: bool = False
 
     def ticks(self, period_us: int) -> int:
-        """Setpoints that repeat the end of the predecessor."""
+        """Number of setpoints that repeat the end of the predecessor."""
         return max(-(-self.dwell_ms * 1000 // period_us), REST_TICKS)
 
 
 @dataclass(frozen=True)
 class ChunkHeader:
-    """What a chunk says beside its program.
+    """The header of a chunk.
 
     first, last       the job begins with it, at rest; the job ends with it
     job               number of the job, not 0
     sequence          0, 1, 2, …
-    piece_shift       index in the predecessor of piece 0 here; `segment_shift` the same of segment 0
-    shared_pieces     so many pieces from the first are those of the predecessor: the joint is the end of the last
+    piece_shift       index of this chunk's piece 0 in the predecessor; `segment_shift`: the same of segment 0
+    shared_pieces     number of pieces, from the first, that are those of the predecessor; the joint is the end of the
+                      last
     shared_segments   the same of segments
     arc_shift_q40     arc length in the predecessor of arc length 0 here
     time_shift_q32_s  program time in the predecessor of time 0 here
     job_start_q40     arc length of the job at arc length 0 here
     line              source line at its start; 0: none
-    remaining_ms      of the job, from the joint to its end; None: not known yet
-    rest              it begins at rest, after this; None: it does not, or is the first
-    joined            its end is no tail: the next chunk begins there, at rest
+    remaining_ms      time from the joint to the end of the job; None: not known yet
+    rest              what happens at rest before it; None: it begins in motion, or is the first
+    joined            it ends without a tail: the next chunk begins at its end, at rest
     """
 
     first: bool
@@ -99,7 +102,7 @@ class ChunkHeader:
 
     @property
     def flags(self) -> int:
-        """As bits."""
+        """The flags as bits."""
         return (
             FLAG_FIRST * self.first
             | FLAG_LAST * self.last
@@ -126,7 +129,7 @@ class Chunk:
         return decode(self.image)
 
     def with_remaining(self, remaining_s: float | None) -> Chunk:
-        """The same with this time from its joint to the end of the job."""
+        """The chunk with this time from its joint to the end of the job."""
         ms = None if remaining_s is None else min(round(1000.0 * remaining_s), TIME_UNKNOWN - 1)
         return replace(self, header=replace(self.header, remaining_ms=ms))
 
@@ -162,7 +165,7 @@ class Chunk:
 
 
 def _crc_of(whole: bytes) -> int:
-    """Of all bytes but the magic and the CRC itself."""
+    """CRC-32 of all bytes except the magic and the CRC."""
     return zlib.crc32(whole[_CRC_FROM:], zlib.crc32(whole[4 : _CRC_FROM - 4]))
 
 
@@ -201,7 +204,7 @@ def parse(data: bytes) -> Chunk:
 
 
 def _flags_fit(flags: int, dwell_ms: int, stops: int) -> bool:
-    """As the controller has them."""
+    """Whether flags and rest go together, by the rules of the controller."""
     if flags & ~_FLAGS or stops & ~(REST_STOP | REST_OPTIONAL):
         return False
     return bool(flags & FLAG_REST or not (dwell_ms or stops)) and not (
@@ -215,9 +218,8 @@ def make(header: ChunkHeader, program: Program) -> Chunk:
 
 
 def shared_fault(chunk: Chunk, before: Chunk | None) -> str | None:
-    """What is wrong with how a chunk follows its predecessor (None: it is the first); None: nothing.
-
-    The program itself is for `hodograph.program.check`.
+    """Why a chunk may not follow its predecessor (None: it is the first); None: it may. `program.check` checks the
+    program itself.
     """
     one = chunk.header
     if before is None:
@@ -235,7 +237,7 @@ def shared_fault(chunk: Chunk, before: Chunk | None) -> str | None:
 
 
 def _rest_fault(one: ChunkHeader, before: Chunk) -> str | None:
-    """The same of one that begins at rest."""
+    """The same for a chunk that begins at rest."""
     if one.first or one.job != before.header.job or one.sequence != before.header.sequence + 1:
         return "it is not the next chunk of the job"
     shared = (one.piece_shift, one.segment_shift, one.shared_pieces, one.shared_segments)
@@ -246,7 +248,7 @@ def _rest_fault(one: ChunkHeader, before: Chunk) -> str | None:
 
 
 def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
-    """The same of the programs."""
+    """The same for the programs of both."""
     if one.piece_shift + one.shared_pieces >= old.piece_count + 1 or not one.shared_pieces:
         return "the shared pieces are not in the predecessor"
     if own.first_axis != old.first_axis or own.axis_count != old.axis_count:
@@ -287,7 +289,7 @@ def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
 
 
 def _same_events(one: ChunkHeader, own: Program, old: Program) -> bool:
-    """Whether both have the same events up to the end of the predecessor."""
+    """Whether both have the same events on the shared part, up to the end of the predecessor."""
     theirs = old.events[old.events["place"] >= one.arc_shift_q40].copy()
     theirs["place"] -= one.arc_shift_q40
     mine = own.events[own.events["place"] <= old.length_q40 - one.arc_shift_q40]

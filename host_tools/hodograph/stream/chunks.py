@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A section as a chain of chunks: every piece is planned once, and has the same bits in all chunks that hold it."""
+"""A section as a sequence of chunks: each piece is planned once and has the same bits in all chunks that contain it;
+docs/reference/protocol.md 1.7. Used by plan.py; paths.py makes chunks of path files.
+"""
 
 from __future__ import annotations
 
@@ -41,33 +43,34 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 CHUNK_S = 1.0
-"""New motion of a chunk."""
+"""Most new motion of a chunk."""
 
 CHUNK_BYTES = 24 * 1024 - 64
-"""The largest chunk, where a third of the ring is more."""
+"""The largest chunk, however large the ring is."""
 
 _NEW_SHARE = 0.4
-"""Of these bytes, for what is new. The rest is for the repeated part and the tail, and a ring that is full has room
-sooner for a smaller chunk.
+"""Share of a chunk's bytes for its new part. The remainder is for the shared part and the tail. Smaller chunks fit
+sooner into a full ring.
 """
 
 LATENESS_S, SHARED_S = 0.02, 0.1
-"""A takeover may be so late without effect on any change of the override, and on a motion at 100 %."""
+"""A takeover may be late by this without effect: LATENESS_S on an override ramp, SHARED_S on a motion at 100 %."""
 
 RAMP_S = 0.2
-"""Fewer pieces than LEAST_SHARED_PIECES are shared where they last so long: a change of the override whose ramp takes
-longer delays the takeover.
+"""Pieces that last this long in all are shared, even if they are fewer than LEAST_SHARED_PIECES. An override ramp that
+takes longer delays the takeover.
 """
 
 FEWEST_SHARED_PIECES = 4
-"""Shared where LEAST_SHARED_PIECES take more bytes than a chunk may have: pieces that are long, with many segments. A
-change of the override that looks further then delays the takeover; a motion at 100 % is the same."""
+"""Shared pieces if LEAST_SHARED_PIECES take too many bytes because they have many segments. An override ramp with a
+larger look-ahead window then delays the takeover; a motion at 100 % is not affected.
+"""
 
 SEARCH_S, GAP_S = 0.02, 0.06
-"""Stops may begin about so often, and all pieces are searched where they may not for so long."""
+"""Stop parameters are searched for one piece in SEARCH_S. Where none are found for GAP_S, all pieces are searched."""
 
 _TAIL_SHARE = 0.8
-"""Of the last tail: a chunk for whose tail there is less room is not planned."""
+"""A chunk is planned only if its tail has room for this share of the last tail's bytes."""
 
 _LONGEST_NAME = 32
 _MOVING_FAULTS = frozenset(
@@ -82,15 +85,15 @@ _MOVING_FAULTS = frozenset(
         ProgramError.AXIS_STEP,
     )
 )
-"""What a slower feed at a piece avoids."""
+"""Faults that a lower feed at a piece avoids."""
 
 _REFUSED_TAILS = _MOVING_FAULTS | {ProgramError.SEGMENT_SHORT, ProgramError.PIECE_SHORT}
-"""What another tail avoids."""
+"""Faults that another tail avoids."""
 
 
 @dataclass(frozen=True, eq=False)
 class JobPlace:
-    """Where a section stands in its job, when others are before it.
+    """The place of a section in its job, after other sections.
 
     rest       what happens at rest before it
     sequence   of its first chunk
@@ -106,9 +109,9 @@ class JobPlace:
 
 @dataclass(frozen=True, eq=False)
 class PlannedChunk:
-    """A chunk, and what it brings.
+    """A chunk, and its new part.
 
-    new_s     motion from the joint before to its own joint; of the last one, to the end
+    new_s     motion from the joint of its predecessor to its own; of the last chunk, to the end
     line      source line at its own joint
     arc_q40   arc length of the section at its own joint
     """
@@ -121,12 +124,12 @@ class PlannedChunk:
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """What the next chunk has to know of the last one.
+    """What the next chunk needs of the last one.
 
-    first_segment, end_segment  numbers in the section of its first segment and of the one behind its last
+    first_segment, end_segment  numbers in the section of its first segment and of the one after its last
     end_q40                     arc length of the section where its program ends
-    pieces                      how many it has
-    tail, tail_codes            its pieces behind the joint, with their stop codes
+    pieces                      number of its pieces
+    tail, tail_codes            its pieces after the joint, with their stop codes
     """
 
     header: ChunkHeader
@@ -146,13 +149,13 @@ class _Kept:
     codes: Codes = field(default_factory=lambda: _no_codes(0))
 
     def with_new(self, pieces: FeedPieces, codes: Codes) -> _Kept:
-        """With pieces behind them."""
+        """These pieces and new ones after them."""
         old = [] if self.pieces is None else [self.pieces]
         return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
 
     def repeated(self, least: int) -> tuple[_Kept, int, int]:
-        """The pieces that the next chunk repeats, `least` of them and what SHARED_S asks for; how many before them it
-        does not, and their time in 2^-32 s.
+        """The pieces that the next chunk repeats: about `least` of them, more where LATENESS_S and SHARED_S need it,
+        fewer where RAMP_S allows it. Also the number of pieces before them, and the time of these in 2^-32 s.
         """
         if self.pieces is None:
             return self, 0, 0
@@ -177,7 +180,7 @@ class _Searched:
 
 
 class _RefusedPartError(PlanError):
-    """No chunk with the next part of the path is accepted."""
+    """The controller would refuse each chunk with the next part of the path."""
 
 
 class _Tails:
@@ -188,15 +191,15 @@ class _Tails:
         self._made: dict[int, Iterator[Stretch]] = {}
         self._refused: list[Stretch] = []
 
-    def behind(self, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """As SectionFeed.tails; `least_q40` is that of the first call for a joint."""
+    def after(self, joint: int, least_q40: int) -> Iterator[Stretch]:
+        """The tails of SectionFeed.tails that are not refused. The first call for a joint sets `least_q40`."""
         made = self._made.get(joint) or self._feed.tails(self.window, joint, least_q40)
         self._made[joint], own = tee(made)
         return (tail for tail in own if not any(tail is one for one in self._refused))
 
     def refuse(self, tail: Stretch) -> None:
-        """The controller would refuse the motion of a tail: it is not given again. The rest of the window is: behind it
-        there is no other one.
+        """Excludes a tail whose motion the controller would refuse. The remainder of the window is never excluded: no
+        other tail follows it.
         """
         if tail.end_q40 != self.window.stretch.end_q40:
             self._refused.append(tail)
@@ -214,14 +217,17 @@ class SectionChunks:
         most_bytes: int = CHUNK_BYTES,
         begin_q40: int = 0,
         place: JobPlace | None = None,
-        goes_on: Callable[[NDArray[np.int64]], bool] = lambda _: False,
+        continues: Callable[[NDArray[np.int64]], bool] = lambda _: False,
     ) -> None:
-        """`job`: number that the chunks carry; `most_bytes`: of a chunk, as the controller has room for; `begin_q40`:
-        arc length of the section where the path of the blocks begins; `place`: None for the first section of a job;
-        `goes_on`: whether the job goes on, after a rest, from this point (A,) in 2^-40 mm, the end of the section. It
-        is asked when all blocks have been read.
+        """name of the programs
+        job         number of the job in the chunks
+        most_bytes  greatest size of a chunk
+        begin_q40   arc length of the section where the blocks begin
+        place       place in the job; None: the section is the first one
+        continues   whether the job continues after a rest at this point (A,) in 2^-40 mm, the end of the section;
+                    called when all blocks have been read
         """
-        self._place, self._goes_on = place, goes_on
+        self._place, self._continues = place, continues
         self.machine = machine
         self._name, self._job = name[:_LONGEST_NAME], job
         self._limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
@@ -241,7 +247,7 @@ class SectionChunks:
         self._tail_bytes = 0
         self._rested_s = 0.0
         self.rest_lines: list[int] = []
-        """Source lines at which the axes come to rest although the section goes on; grows with the chunks."""
+        """Source lines at which the axes come to rest within the section; grows with the chunks."""
 
     def chunks(self) -> Iterator[PlannedChunk]:
         """The chunks in order. Raises InputError and PlanError."""
@@ -267,9 +273,9 @@ class SectionChunks:
                 self._feed.forget(self._last.first_segment)
 
     def _begin_alone(self, window: Window) -> bool:
-        """Lets the next chunk begin at rest and share nothing, where the window begins at rest. Then it needs no bytes
-        for what is before, and a short segment there does not limit the feed behind it. False: it does so already, or
-        the window begins in motion.
+        """Lets the next chunk begin at rest and share nothing, if the window begins at rest. The chunk then needs no
+        bytes for the part before, and a short segment there does not limit its feed. False: it shares nothing already,
+        or the window begins in motion.
         """
         begin_q40, last = int(window.stretch.pieces.start_q40[0]), self._last
         if last is None or self._kept.pieces is None or not self._feed.begins_at_rest:
@@ -280,8 +286,8 @@ class SectionChunks:
         return True
 
     def _rest(self) -> bool:
-        """Lets the axes rest at the end of the newest chunk, whose tail is then kept: no chunk goes on in motion. False
-        where they rest there already, or the path ends there.
+        """Lets the axes come to rest at the end of the newest chunk, whose tail is then kept, because no chunk
+        continues in motion. False: they rest there already, or the path ends there.
         """
         last, path = self._last, self._feed.path
         if last is None or not len(last.tail):
@@ -296,8 +302,8 @@ class SectionChunks:
         return True
 
     def _next(self, window: Window, first: int, joints: list[int]) -> tuple[PlannedChunk, int]:
-        """The chunk whose new pieces are those from knot `first` to the last one of these joints that there is room
-        for, and which this is.
+        """The chunk whose new pieces go from knot `first` to the last of these joints for which there is room, and the
+        number of joints that it uses. Raises PlanError.
         """
         searched, before, tails = self._searched_in(window), self._kept, _Tails(self._feed, window)
         program, fault = None, None
@@ -323,7 +329,7 @@ class SectionChunks:
         assert program is not None
         header = self._header(window, joint, program)
         if self._last is not None and header.rest is None:
-            # One piece of the predecessor at least is behind the joint (docs/reference/protocol.md 1.7).
+            # At least one piece of the predecessor is after the joint (docs/reference/protocol.md 1.7).
             shared = min(len(kept.codes), self._last.pieces - piece_shift - 1)
             header = replace(
                 header, piece_shift=piece_shift, time_shift_q32_s=time_shift, shared_pieces=shared
@@ -350,7 +356,7 @@ class SectionChunks:
 
     @property
     def end(self) -> JobPlace:
-        """The place of the next section of the job, behind all chunks, without a rest."""
+        """The place of the next section of the job, after all chunks; its rest is empty."""
         last = self._last
         assert last is not None
         header = self._in_job(last.header)
@@ -358,9 +364,9 @@ class SectionChunks:
         return JobPlace(Rest(), header.sequence + 1, arc_q40, self._feed.path.end_point_q40)
 
     def _in_job(self, header: ChunkHeader) -> ChunkHeader:
-        """A header that counts from the start of the section, as it is in the job."""
+        """The header in the job of a header that counts from the start of the section."""
         place = self._place
-        if header.last and self._goes_on(self._feed.path.end_point_q40):
+        if header.last and self._continues(self._feed.path.end_point_q40):
             header = replace(header, last=False, joined=True)
         if place is None:
             return header
@@ -373,7 +379,7 @@ class SectionChunks:
         )
 
     def _size_kept(self, window: Window, joint: int) -> int:
-        """Bytes of a chunk of the kept pieces, without its tail."""
+        """Bytes of a chunk with the kept pieces and no tail."""
         path, pieces = self._feed.path, self._kept.pieces
         assert pieces is not None
         first = path.segment_at(int(pieces.start_q40[0]))
@@ -393,7 +399,7 @@ class SectionChunks:
             )
 
     def _header(self, window: Window, joint: int, program: Program) -> ChunkHeader:
-        """The header, without what it says of shared pieces."""
+        """The header, still without its fields of shared pieces."""
         last, path = self._last, self._feed.path
         assert self._kept.pieces is not None
         begin_q40 = int(self._kept.pieces.start_q40[0])
@@ -432,9 +438,11 @@ class SectionChunks:
     def _with_tail(
         self, tails: _Tails, joint: int, thorough: bool | None
     ) -> tuple[Program, NativeFault | None]:
-        """The program of the kept pieces with the first tail that the controller accepts, and what it finds in it.
+        """The program of the kept pieces with the first tail that the controller accepts; if it accepts none, with the
+        last one tried and its fault.
 
-        `thorough`: how stops are searched that begin in the tail; None: none are. It is at rest soon anyway.
+        thorough  whether stops that begin in the tail are searched with all trials; None: they are not searched, since
+                  the tail comes to rest soon anyway
         """
         kept, codes, window = self._kept.pieces, self._kept.codes, tails.window
         assert kept is not None
@@ -442,7 +450,7 @@ class SectionChunks:
             program = self._program_with_events(Stretch(kept, window.stretch.end_q40), codes)
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
-        for tail in tails.behind(joint, least_q40):
+        for tail in tails.after(joint, least_q40):
             whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail, thorough)
             program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
@@ -459,20 +467,20 @@ class SectionChunks:
             if fault.code == ProgramError.EVENT_DENSE:
                 break
             if fault.code == ProgramError.STOP_LONG and not thorough:
-                break  # more codes are the better remedy; with them, a longer tail has more room for brakes
+                break  # more stop parameters are the better remedy; with them, a longer tail has more places for brakes
         return program, fault
 
     def _program_with_events(self, stretch: Stretch, codes: Codes) -> Program:
-        """The program of a chunk: `_program` with the events of its path."""
+        """The program of a chunk: `_program` and the events of its path."""
         program = self._program(stretch, codes)
         base_q40 = stretch.end_q40 - program.length_q40
         events = self._feed.path.events_on(base_q40, stretch.end_q40)
-        if base_q40 == self._alone_q40:  # those at its start are at the end of the chunk before
+        if base_q40 == self._alone_q40:  # events at its start are in the chunk before
             events = events[events["place"] > 0]
         return replace(program, events=events)
 
     def _program(self, stretch: Stretch, codes: Codes) -> Program:
-        """A program of pieces from inside the path in memory to an end of a segment."""
+        """A program of pieces on the path in memory, to an end of a segment."""
         pieces, path, machine = stretch.pieces, self._feed.path, self.machine
         first = path.segment_at(int(pieces.start_q40[0]))
         end = int(np.searchsorted(path.start_q40, stretch.end_q40))
@@ -503,7 +511,9 @@ class SectionChunks:
         return NativeProgram(encode(program)).check(self._limits)
 
     def _exceeded(self, stretch: Stretch) -> NDArray[np.bool_]:
-        """The pieces (M,) of a stretch that the controller would refuse for their motion, of several the first ones."""
+        """Pieces (M,) of a stretch that the controller would refuse for their motion. If there are several, the first
+        ones.
+        """
         pieces = stretch.pieces
         codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
         bad = np.asarray((codes == 0).any(axis=1))
@@ -517,10 +527,9 @@ class SectionChunks:
         return bad
 
     def _searched_in(self, window: Window) -> _Searched:
-        """Codes of the pieces of a window that are kept, good for all of the path that the window knows behind them.
-
-        Of brief pieces only some are searched: a stop that is commanded in another one begins in the next that has
-        codes, a little later.
+        """Stop codes of the kept pieces of a window. Their brakes keep the limits on the path that the window knows
+        after them. Of brief pieces only some are searched: a stop in another piece begins in the next one with codes, a
+        little later.
         """
         if self._searched is not None and self._searched.window is window:
             return self._searched
@@ -534,15 +543,15 @@ class SectionChunks:
         return searched
 
     def _add_codes(self, searched: _Searched, wanted: NDArray[np.bool_]) -> None:
-        """Searches the wanted ones of the kept pieces (count,)."""
+        """Searches stop codes for the wanted ones of the kept pieces (count,)."""
         if wanted.any():
             window, mask = searched.window, np.zeros(len(searched.codes), dtype=np.bool_)
             mask[: wanted.size] = wanted
             searched.codes[mask] = self._codes(window, window.stretch, mask, False)[mask]
 
     def _search_kept(self, window: Window, joint: int, late: int | None) -> None:
-        """Searches all kept pieces that have no codes, before the path of the window behind their joint; thoroughly
-        those from piece `late` on, whether they have codes or not.
+        """Searches stop codes for the kept pieces without any, with the window's path after the joint. With `late`: all
+        pieces from that one on, with all trials.
         """
         kept, codes = self._kept.pieces, self._kept.codes
         assert kept is not None
@@ -556,7 +565,7 @@ class SectionChunks:
         self._kept.codes = np.where(better[:, None, None], found, codes)
 
     def _tail_codes(self, window: Window, tail: Stretch, thorough: bool | None) -> Codes:
-        """Codes of a tail that takes longer than a fault stop may."""
+        """Stop codes of a tail; `thorough` as in `_with_tail`."""
         if thorough is None:
             return _no_codes(len(tail.pieces))
         return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_), thorough)
@@ -569,14 +578,14 @@ class SectionChunks:
         begin = path.segment_at(int(stretch.pieces.start_q40[0]))
         base_mm = float(path.curve.segment_starts_mm[begin])
         limits = window.plan.limits
-        zones = zones_behind(limits.zones, base_mm)
+        zones = zones_after(limits.zones, base_mm)
         plan = replace(window.plan, limits=replace(limits, zones=zones))
         terms = replace(stop_terms(self.machine, limits), quick=not thorough)
         return stop_codes(program, plan, terms, wanted)
 
 
 def _on_short_segments(program: Program) -> NDArray[np.bool_]:
-    """The pieces (M,) that reach into two neighbouring segments which a tick at 200 % could pass."""
+    """The pieces (M,) that reach into two consecutive segments which a tick at 200 % could pass."""
     ends = np.append(program.start_q40, program.length_q40)
     pairs, _, _ = brief_pairs(ends, program.pieces, program.period_us)
     starts = program.pieces.start_q40
@@ -589,7 +598,9 @@ def _on_short_segments(program: Program) -> NDArray[np.bool_]:
 
 
 def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The pieces (M,) that are searched next: one in `spacing_s`; once some are found, all in gaps of GAP_S between."""
+    """The pieces (M,) to search next: one in `spacing_s`; if that is 0, all pieces in gaps of GAP_S between found
+    ones.
+    """
     t = np.concatenate((np.zeros(1), np.cumsum(seconds)))
     if spacing_s > 0.0:
         return np.asarray(np.diff(np.floor(t / spacing_s)) > 0.0)
@@ -599,7 +610,7 @@ def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArra
 
 
 def _kinds(codes: Codes) -> Index:
-    """Of how many kinds of stops each piece (M,) has codes."""
+    """Number of kinds of stops for which each piece (M,) has codes."""
     return np.asarray(np.count_nonzero(codes[:, :, DECELERATION], axis=1))
 
 
@@ -607,8 +618,8 @@ def _no_codes(count: int) -> Codes:
     return np.zeros((count, 2, 3), dtype=np.uint8)
 
 
-def zones_behind(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """Zones of the part of a path that begins at `base_mm`, as arc lengths of that part."""
+def zones_after(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """The zones of the part of a path from `base_mm` on, as arc lengths of that part."""
     return tuple(
         FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
         for zone in zones

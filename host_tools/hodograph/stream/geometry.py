@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The part of a section's path that is in memory: integer segments as the image has them, and their curve.
+"""The part of a section's path that is in memory: integer segments as in a program image, and their curve. Used by
+windows.py and chunks.py.
 
 Blocks of segments are added at its end as they are fitted and removed from its start as they are passed. A segment
-never changes once it is here: chunks that were sent have its bits.
+never changes: chunks that were sent have its bits.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, PlanError
-from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_behind, no_events
+from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_after, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
 from ..fixed_point import MM_PER_Q40, nearest_q40
@@ -32,20 +33,21 @@ Int = NDArray[np.int64]
 Curve = PHSpline | SpatialPHSpline
 
 SEGMENT_S = 0.1
-"""A segment is halved until it takes about so long at its feed: tails end where segments do."""
+"""A segment is halved until it takes about this time at its feed, since tails end at ends of segments."""
 
 _LEAST_HALVED_MM = 0.25
 _SPEED_RATIO = 2.0
 _PAIR_SHARE = 0.997
-"""Of the feed at which a tick at 200 % crosses more than two ends of segments."""
+"""Share of the least feed at which a tick at 200 % would cross more than two ends of segments."""
 
 _PAIR_BESIDE_MM = REACH_Q40 * MM_PER_Q40 + 1e-6
-"""How far the zone of short segments reaches beyond them: the controller counts pieces that end this near as on
-them."""
+"""How far the feed zone of short segments reaches beyond them. The controller counts a piece that ends this near as one
+on them.
+"""
 
 _BESIDE_MM = 1e-6
 LEAST_REST_MM = 0.002
-"""A section of which less is left is done."""
+"""A section with a shorter remainder counts as done."""
 _FARTHEST_Q40 = 1 << 62
 
 
@@ -66,7 +68,7 @@ class Block:
 
 
 def short_segments(block: Block) -> Block:
-    """The same curve in segments that the format takes, and that are passed in about SEGMENT_S."""
+    """The block with its curve cut into segments that the format allows and that take about SEGMENT_S."""
     feed = np.minimum(block.feed_mm_s, GREATEST_FEED_MM_S)
     longest = np.clip(SEGMENT_S * feed, _LEAST_HALVED_MM, LONGEST_SEGMENT_MM)
     longest = np.minimum(2.0 ** np.floor(np.log2(longest)), LONGEST_SEGMENT_MM)
@@ -84,7 +86,9 @@ def short_segments(block: Block) -> Block:
 
 
 def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
-    """Segments first … last - 1 of a curve, in memory of their own: sums do not depend on where they come from."""
+    """Segments first … last - 1 of a curve, copied, so that the bits of sums do not depend on where the segments come
+    from.
+    """
     part = slice(first, last)
     if isinstance(curve, PHSpline):
         return PHSpline(curve.origin[part].copy(), curve.w[part].copy(), False)
@@ -109,8 +113,8 @@ def joined(curves: Sequence[Curve]) -> Curve:
 def blocks_from(
     blocks: Iterator[Block], begin_mm: float, switched: SwitchedOutputs
 ) -> Iterator[Block]:
-    """The blocks of a section from an arc length on; none where less than LEAST_REST_MM of it is left. Events up to
-    there act on `switched`. Raises InputError: it is not that long.
+    """The blocks of a section from an arc length on; none if the remainder is shorter than LEAST_REST_MM. Events before
+    it are applied to `switched`. Raises InputError: the section is shorter than that.
     """
     short: Block | None = None
     for block in blocks:
@@ -120,7 +124,7 @@ def blocks_from(
             switched.act(block.events)
             continue
         if begin_mm > 0.0:
-            block, begin_mm = _behind(block, begin_mm, switched), 0.0
+            block, begin_mm = _after(block, begin_mm, switched), 0.0
             if block.curve.length_mm < LEAST_REST_MM:
                 short = block
                 continue
@@ -135,36 +139,36 @@ def blocks_from(
 
 
 def begun_with(block: Block, events: Events) -> Block:
-    """The block with these events at its start, before its own."""
+    """The block with these events at its start, in front of its own."""
     return replace(block, events=np.concatenate((events, block.events)))
 
 
 def switching(blocks: Iterator[Block], switched: SwitchedOutputs) -> Iterator[Block]:
-    """The blocks, each of which acts on `switched`."""
+    """The blocks; the events of each are applied to `switched`."""
     for block in blocks:
         switched.act(block.events)
         yield block
 
 
-def _behind(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
-    """A block without its first part, whose events act."""
-    first, made = curve_behind(block.curve, begin_mm)
-    passed, events = events_behind(block.events, nearest_q40(begin_mm))
+def _after(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
+    """A block without its first part; the events of that part are applied."""
+    first, made = curve_after(block.curve, begin_mm)
+    passed, events = events_after(block.events, nearest_q40(begin_mm))
     switched.act(passed)
     return Block(made, block.feed_mm_s[first:], block.line[first:], events)
 
 
-def curve_behind(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
-    """A curve without its first part, and how many whole segments that has."""
+def curve_after(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
+    """A curve without its first part, after the number of whole segments in that part."""
     segment, xi = curve.locate(begin_mm)
     first, x = int(segment), float(xi)
     if isinstance(curve, PHSpline):
         start = np.append(curve.position(first, x), curve.origin[first + 1 :])
-        return first, PHSpline(start, _behind_at(curve.w[first:], x), False)
+        return first, PHSpline(start, _after_at(curve.w[first:], x), False)
     origin = np.concatenate((curve.position(first, x)[None], curve.origin[first + 1 :]))
     begin = part_of_quintics(curve.extra[first : first + 1], np.array([x]), np.ones(1))
     extra = np.concatenate((begin, curve.extra[first + 1 :]))
-    return first, SpatialPHSpline(origin, _behind_at(curve.preimage[first:], x), False, extra)
+    return first, SpatialPHSpline(origin, _after_at(curve.preimage[first:], x), False, extra)
 
 
 def with_joints(curve: Curve, at_mm: Real) -> Curve:
@@ -183,17 +187,17 @@ def with_joints(curve: Curve, at_mm: Real) -> Curve:
     return SpatialPHSpline(origin, preimage, False, extra)
 
 
-def _behind_at(w: Any, x: float) -> Any:
-    """Preimages (n, …, 3) whose first one begins at x of it."""
+def _after_at(w: Any, x: float) -> Any:
+    """Preimages (n, …, 3), of the first one only the part from parameter x on."""
     return np.concatenate((part_of(w[:1], np.array([x]), np.ones(1)), w[1:]))
 
 
 class StreamPath:
-    """The segments in memory. Arc lengths of `curve` and of zones count from their first one, those in q40 from the
+    """The segments in memory. Arc lengths of `curve` and of zones count from the first segment, those in q40 from the
     start of the section.
 
-    passed     segments of the section that are no longer here
-    start_q40  (N + 1,) of the segments and of the end
+    passed     number of segments of the section that were removed
+    start_q40  (N + 1,) starts of the segments, and the end
     point_q40  (A, N), a_q44 (2 or 4, N, 3), extra_q40 (A - 3, N, 5): as in a program
     events     outputs that switch on the path; arc lengths from the start of the section
     """
@@ -205,8 +209,9 @@ class StreamPath:
         begin_q40: int = 0,
         begin_point_q40: Int | None = None,
     ) -> None:
-        """`offset_mm`: work offset of each axis of the path; `begin_q40`: arc length of the section at its start;
-        `begin_point_q40`: where the path begins to the last bit, None: where its first block does.
+        """offset_mm work offset of each axis of the path
+        begin_q40        arc length of the section at the start of the path
+        begin_point_q40  exact start point of the path; None: that of its first block
         """
         self._offset_mm = tuple(offset_mm)
         self._period_s = 1e-6 * period_us
@@ -242,7 +247,7 @@ class StreamPath:
         made = quantise(block.curve, self._offset_mm)
         point = made.point_q40
         if self._end_point is not None:
-            # The block is moved to the last bit of the end: it follows from the ideal curve to some 1e-11 mm.
+            # The block is shifted to the exact end of the path: rounding leaves some 1e-11 mm between them.
             point = point + (self._end_point - point[:, 0])[:, None]
         self._append_events(block.events, int(made.start_q40[-1]))
         if self._curve is None:
@@ -265,7 +270,7 @@ class StreamPath:
         self.line = np.concatenate((self.line, block.line))
 
     def _append_events(self, events: Events, length_q40: int) -> None:
-        """Adds the events of a block of this length. Those at its start act a unit behind it, but for the first
+        """Adds the events of a block of this length. Events at its start are moved 2^-40 mm later, except in the first
         block: a chunk that ends there was made without them.
         """
         if not len(events):
@@ -276,14 +281,16 @@ class StreamPath:
         self.events = np.concatenate((self.events, own))
 
     def events_on(self, begin_q40: int, end_q40: int) -> Events:
-        """The events from one arc length of the section to another, both included, with places from the first on."""
+        """The events from one arc length of the section to another, both included; their places count from the
+        first.
+        """
         at = np.searchsorted(self.events["place"], begin_q40, side="left")
         own = self.events[at : self._events_until(end_q40)].copy()
         own["place"] -= begin_q40
         return own
 
     def events_before(self, s_mm: Real) -> NDArray[np.intp]:
-        """How many events there are up to places (n,) of the curve."""
+        """Number of events (n,) up to places (n,) of the curve."""
         place_mm = np.ldexp((self.events["place"] - self.start_q40[0]).astype(np.float64), -40)
         return np.searchsorted(place_mm, s_mm, side="right")
 
@@ -300,7 +307,7 @@ class StreamPath:
             feed[first : last + 1] = np.minimum(feed[first : last + 1], most[i])
 
     def drop(self, count: int) -> float:
-        """Removes the first segments. Returns by how much arc lengths of `curve` are less then."""
+        """Removes the first `count` segments. Returns their length: arc lengths of `curve` decrease by it."""
         if count == 0:
             return 0.0
         self.passed += count
@@ -322,10 +329,8 @@ class StreamPath:
         return int(self.line[self.segment_at(s_q40)])
 
     def feeds(self, most_mm_s: float) -> tuple[float, tuple[FeedZone, ...]]:
-        """The greatest feed, and zones where it is less: the programmed one, and what short segments allow.
-
-        The controller counts a piece that ends where short segments begin as one on them: their zones reach a little
-        beyond them.
+        """The greatest feed, and zones with a lower one, from the programmed feeds and from what short segments allow.
+        Zones of short segments reach a little beyond them (_PAIR_BESIDE_MM).
         """
         starts = self.curve.segment_starts_mm
         pair = (starts[2:] - starts[:-2]) * (_PAIR_SHARE / (2.0 * self._period_s))

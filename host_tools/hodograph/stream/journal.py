@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The journal of a streamed job: what `hodograph stream --continue` needs to find the place where the machine rests.
 
-A JSON document that is replaced at once, so that a loss of power leaves the old one or the new one.
+A JSON document that is replaced atomically: after a loss of power the old or the new one is there. Written by
+sender.py.
 """
 
 from __future__ import annotations
@@ -35,10 +36,10 @@ class FileMark:
 
 @dataclass(frozen=True)
 class Entry:
-    """The job and how far it has come.
+    """The job and its progress.
 
     files, machine, options  as on the command line
-    section, arc_q40         the section in motion, and arc length in it that was reported last
+    section, arc_q40         the section in motion, and the arc length in it last reported
     committed_q40            arc length of the job in the controller up to which chunks were sent
     job                      number of the job in the controller
     job0                     number that it would have if it began with section 0
@@ -73,7 +74,7 @@ class Entry:
 
 
 def mark(file: Path) -> FileMark:
-    """Raises InputError: the file is not there."""
+    """The mark of a file as it is now. Raises InputError: it cannot be read."""
     try:
         found = file.stat()
     except OSError as error:
@@ -82,12 +83,12 @@ def mark(file: Path) -> FileMark:
 
 
 JOURNAL_ELSEWHERE = "name another with hodograph stream --journal FILE, or set XDG_STATE_HOME"
-"""What to do where the usual journal cannot be written."""
+"""The remedy in messages where the usual journal cannot be written."""
 
 
 @contextmanager
 def journal_lock(file: Path) -> Iterator[None]:
-    """Keeps a journal for this process. Raises InputError: another one has it, or its folder cannot be written."""
+    """Locks a journal for this process. Raises InputError: another process has it, or its folder cannot be written."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(file.with_name(file.name + ".lock"), os.O_RDWR | os.O_CREAT, 0o666)
@@ -117,7 +118,7 @@ class Journal:
         self._write()
 
     def update(self, **changes: Any) -> None:
-        """Changes fields of the entry; written only where one changes."""
+        """Changes fields of the entry, and writes it if one of them changes."""
         entry = replace(self.entry, **changes)
         if entry != self.entry:
             self.entry = entry

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Whether a machine has the outputs that a job switches, and the axes that it turns: found before anything moves.
+"""Checks before any motion that a machine has the outputs and the rotary axes that a job uses. Used by `hodograph
+stream`.
 
-A toolpath is read part by part while the machine moves, so an output or an axis that the machine does not have would be
-found in motion. A scan of the text of G-code costs far less than reading it. It knows numbers only: where it is not
-sure that all is well (an expression, the number of an output that the machine does not have, a place that is not 0 of
-an axis that it does not have), the file is read once as it will be read in motion, which gives the message. So the scan
-may be wrong to one side only.
+A toolpath is read part by part while the machine moves, so a missing output or axis would be found in motion. A scan of
+the G-code text costs far less than reading it, but understands plain numbers only. If the scan finds an expression, an
+output that the machine lacks, or a word other than 0 for an axis that it lacks, the whole file is read, which gives the
+message. A scan that finds none of these is always right.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _DIGITAL, _ANALOGUE = (62.0, 63.0, 64.0, 65.0), (67.0, 68.0)
 
 
 def require_outputs(file: Path, machine: Machine, reading: ReadOptions) -> None:
-    """Raises InputError, naming the line: a file switches an output that the machine does not have, or to a value that
-    is too large; or it turns an axis that the machine does not have. Standard input cannot be read ahead.
+    """Raises InputError, naming the line: the machine lacks an output or a rotary axis that a file uses, or a value is
+    too large. Standard input is not checked: it cannot be read twice.
     """
     if str(file) == STANDARD_INPUT:
         return
@@ -60,7 +60,7 @@ def _read(file: Path, machine: Machine, reading: ReadOptions) -> None:
 
 
 class _Scan:
-    """What the text of a file is sure to do with outputs, and with those of A, B and C that the machine lacks."""
+    """Scans the text of a file for words that the machine may lack."""
 
     def __init__(self, machine: Machine) -> None:
         outputs = machine.outputs
@@ -77,7 +77,7 @@ class _Scan:
         self._letters = re.compile(b"[" + letters + letters.lower() + b"]" if letters else rb"(?!)")
 
     def is_sure(self, file: Path) -> bool:
-        """Whether the machine has all outputs of the file. Raises InputError: it cannot be read."""
+        """Whether the machine certainly has all outputs and axes of the file. Raises InputError: it cannot be read."""
         try:
             with file.open("rb") as lines:
                 return all(line in self._seen or self._line(line) for line in lines)

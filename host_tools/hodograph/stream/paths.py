@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files with several paths as one job: each path is a program, with what happens at rest before it."""
+"""Path files with several paths as one job: each path becomes one chunk, with a rest before it; used by plan.py."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
-from ..events import Events, SwitchedOutputs, events_behind, no_events
+from ..events import Events, SwitchedOutputs, events_after, no_events
 from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..pipeline import Pipeline, pipeline_of
 from ..program.inspection import end_point_q40
@@ -22,18 +22,18 @@ from ..spline.build import FoundSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from ..toolpath.moves import Command, Dwell, ProgramStop
 from .chunk import Chunk, ChunkHeader, Rest, make
-from .chunks import JobPlace, zones_behind
-from .geometry import LEAST_REST_MM, curve_behind
+from .chunks import JobPlace, zones_after
+from .geometry import LEAST_REST_MM, curve_after
 
 Int = NDArray[np.int64]
 
 _MEETS_Q40 = 1 << 16
-"""2^-24 mm: how far a path may begin from the end of the one before (docs/reference/protocol.md 1.7)."""
+"""2^-24 mm: greatest distance from the end of a path to the start of the next (docs/reference/protocol.md 1.7)."""
 
 
 @dataclass(frozen=True, eq=False)
 class _BegunPipeline(Pipeline):
-    """The pipeline of the path that a job begins with: from an arc length on, with these events."""
+    """The pipeline of the first path of a job: from an arc length on, with given events."""
 
     begin_mm: float = 0.0
     given_events: Events = field(default_factory=no_events)
@@ -41,7 +41,7 @@ class _BegunPipeline(Pipeline):
 
     @property
     def standing_mm(self) -> tuple[float, ...]:
-        """Where the axes before those of the program stand."""
+        """Positions of the axes before those of the program, which stand."""
         return self.given_standing_mm
 
     @property
@@ -51,11 +51,11 @@ class _BegunPipeline(Pipeline):
 
     @cached_property
     def found_spline(self) -> FoundSpline[PHSpline] | FoundSpline[SpatialPHSpline]:
-        """The curve behind that place."""
+        """The curve after that arc length."""
         found = super().found_spline
         if self.begin_mm <= 0.0:
             return found
-        curve = curve_behind(found.spline, self.begin_mm)[1]
+        curve = curve_after(found.spline, self.begin_mm)[1]
         if isinstance(curve, PHSpline):  # two branches, so that each has the type of its curve
             return FoundSpline(curve, 0)
         return FoundSpline(curve, 0)
@@ -63,9 +63,10 @@ class _BegunPipeline(Pipeline):
 
 @dataclass(frozen=True, eq=False)
 class PathChunk:
-    """A path as a chunk of its job, and what is at rest before it.
+    """A path as a chunk of its job.
 
-    standing_mm  where the axes before those of its program stand, without the work offset
+    before       commands at rest before it
+    standing_mm  positions of the axes before those of its program, without the work offset
     """
 
     chunk: Chunk
@@ -89,8 +90,8 @@ class PathsJob:
     stops: bool
 
     def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
-        """From path number `first` on, from this arc length of it. Paths on which axes turn alone, and those between
-        them, are jobs of their own in the controller: the axes of a job do not change.
+        """The chunks from path number `first` on, which begins at this arc length. All chunks of a controller's job
+        move the same axes: a new job begins where the paths change to rotary axes alone, and back.
         """
         paths = load_paths(self.file)
         if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
@@ -161,26 +162,24 @@ class PathsJob:
         return PathChunk(chunk, _commands(rest, number + 1), duration_s, pipeline.standing_mm)
 
     def _events(self, pipeline: Pipeline) -> Events:
-        """Of the whole path; a path without any is not computed for them."""
+        """The events of the whole path. If it has none, nothing is computed."""
         return pipeline.events if pipeline.file.outputs else no_events()
 
     def _begun(self, whole: Pipeline, begin_q40: int, switched: SwitchedOutputs) -> Pipeline:
-        """Of the path that a job begins with, from an arc length on; at its start the outputs become what all events
-        before made.
-        """
+        """The pipeline of the first path of a job, from an arc length on. Events at its start restore the outputs."""
         begin_mm, limits = begin_q40 * MM_PER_Q40, whole.file.limits
         events = self._events(whole)
         if begin_q40:
-            passed, events = events_behind(events, begin_q40)
+            passed, events = events_after(events, begin_q40)
             switched.act(passed)
-            limits = replace(limits, zones=zones_behind(limits.zones, begin_mm))
+            limits = replace(limits, zones=zones_after(limits.zones, begin_mm))
         begun = np.concatenate((switched.begin(), events))
         switched.act(events)
         file = replace(whole.file, limits=limits)
         return _BegunPipeline(file, whole.machine, begin_mm, begun, whole.standing_mm)
 
     def _all_axes(self, pipeline: Pipeline, point_q40: Int) -> Int:
-        """A place of a path, in machine coordinates of all axes of the machine's path."""
+        """A point of a path in machine coordinates of all axes of the machine's path."""
         stands = zip(pipeline.standing_mm, self.machine.offset_mm, strict=False)
         standing_q40 = [nearest_q40(at + offset) for at, offset in stands]
         return np.concatenate((np.array(standing_q40, dtype=np.int64), point_q40))
@@ -198,7 +197,7 @@ class PathsJob:
 
 
 def _commands(rest: Rest, number: int) -> tuple[Command, ...]:
-    """What a rest before a path is, as commands of a toolpath; their line is the number of the path."""
+    """The rest before a path as toolpath commands; their line is the number of the path."""
     made: list[Command] = []
     if rest.stop or rest.optional_stop:
         made.append(ProgramStop(number, rest.optional_stop))

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The plan of a job, made ahead by a thread and kept on the disk, so that it takes no memory."""
+"""The plan of a job: a thread makes its chunks ahead of the sender and keeps them on the disk, not in memory. Used by
+`hodograph stream`, with or without a bus.
+"""
 
 from __future__ import annotations
 
@@ -34,16 +36,17 @@ from .reading_process import ParallelReader
 from .store import PART_BYTES, RESERVE_BYTES, ChunkStore
 
 PROCESSES = 2
-"""Of a job that is planned: one reads and fits, the other plans."""
+"""Processes that plan a job: one reads and fits, the other plans."""
 
 _MEETS_MM = 1e-6
-"""A section that begins so near to the end of the one before goes on from there."""
+"""A section that begins this near to the end of the one before continues the same job of the controller."""
 _RATE_S, _FOR_EVER_S = 3.0, 1e6
 _INPUT_WAIT_S = 1.0
-"""For the end of a planner that may wait for standard input, which nothing interrupts. It ends with the process."""
+"""Wait for the end of a planner that may be reading standard input, which nothing interrupts. It ends with the
+process.
+"""
 MOST_WAITING_BYTES, _MOST_WAITING = 512 << 20, 100_000
-"""Planned chunks that wait for those who read them: where there are so many, planning waits. Each keeps its section in
-memory."""
+"""Bytes and number of planned chunks at which planning pauses. Each waiting chunk keeps its section in memory."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class Place:
 
 @dataclass(frozen=True)
 class PlanRests:
-    """Rests of the axes that no command asks for: where no chunk that fits goes on in motion, or no feed.
+    """Rests of the axes that no command programs: no chunk in motion fits there, or no feed was found.
 
     first  file and line of the first one, "part.ngc:12"; None: there is none
     """
@@ -74,23 +77,25 @@ class PlanRests:
     count: int = 0
     first: str | None = None
 
-    def behind(self, file: Path, line: int) -> PlanRests:
-        """With another one."""
+    def plus(self, file: Path, line: int) -> PlanRests:
+        """These and another one."""
         return PlanRests(self.count + 1, self.first or f"{file}:{line}")
 
     @property
     def text(self) -> str:
-        """For the user."""
+        """Number and first place, for the user."""
         return str(self.count) if self.first is None else f"{self.count}, the first at {self.first}"
 
 
 @dataclass(frozen=True, eq=False)
 class PlannedSection:
-    """A section: number in the job, file, what happens at rest before it.
+    """A section of the plan.
 
-    start_q40    arc length at its start of the job that the controller has
-    rest         what the controller does before it; None: a job of the controller begins with it
-    standing_mm  where the axes before those of its programs stand, without the work offset
+    number       in the job, over all files
+    before       commands at rest before it
+    start_q40    arc length of the controller's job at its start
+    rest         what the controller does at rest before it; None: a job of the controller begins with it
+    standing_mm  positions of the axes before those of its programs, without the work offset
     """
 
     number: int
@@ -103,7 +108,7 @@ class PlannedSection:
 
 
 class _EndedError(Exception):
-    """The plan is no longer wanted."""
+    """The plan is closed while it is being made."""
 
 
 class JobPlan:
@@ -126,10 +131,13 @@ class JobPlan:
         stops: bool = True,
         processes: int = PROCESSES,
     ) -> None:
-        """`most_bytes`: of a chunk; None: not known before `allow`, the files are only read and fitted until then.
-        `number`: of the job in the controller that begins with section 0, others have it plus the number of their first
-        section; `begin`: where it begins; `stops`: program stops and tool changes wait for the operator;
-        `processes`: 1 reads and fits in this one too. The chunks are the same.
+        """job what is streamed
+        most_bytes  of a chunk; None: set by `allow` later, until then files are only read and fitted
+        number      of the controller's job that begins with section 0; another one has it plus the number of its first
+                    section
+        begin       where the job begins
+        stops       whether program stops and tool changes wait for the operator
+        processes   1: reading and fitting run in this process too; the chunks are the same
         """
         self.stops = stops
         self._processes = processes
@@ -142,7 +150,7 @@ class JobPlan:
         self._motion_s = array("d", [0.0])
         self._waits_s = array("d", [0.0])
         self._waiting: deque[PlannedSection] = deque()
-        """Of the chunks that may still be read, one for each."""
+        """The section of each chunk that may still be read."""
         self._rate = _GreatestRate()
         self._marks = {file: mark(file) for file in job.files if str(file) != STANDARD_INPUT}
         self._error: BaseException | None = None
@@ -168,16 +176,15 @@ class JobPlan:
         return any(str(file) == STANDARD_INPUT for file in self._job.files)
 
     def allow(self, most_bytes: int) -> None:
-        """Chunks may have so many bytes."""
+        """Sets the greatest size of a chunk; planning waits for it."""
         with self._changed:
             self._most = most_bytes
             self._changed.notify_all()
 
     def item(self, index: int, wait_s: float) -> tuple[PlannedSection, Chunk, float] | None:
-        """The chunk with this index, its section and its new motion in s. None: not yet planned after `wait_s`.
-
-        Those before it cannot be read again. Raises IndexError behind the last one, and what planning raised where it
-        comes to that.
+        """The chunk with this index, its section and its new motion in s. None: it is not planned yet after `wait_s`.
+        Chunks before it cannot be read again. Raises IndexError after the last chunk, and the error of planning where
+        that ended.
         """
         with self._changed:
             self._changed.wait_for(lambda: self.chunks > index or self._done, wait_s)
@@ -195,7 +202,9 @@ class JobPlan:
             return None
 
     def by_job(self) -> Iterator[Iterator[Chunk]]:
-        """The chunks of each job of the controller, as they are planned; each is to be read to its end first."""
+        """The chunks of each job of the controller, as they are planned. Each job has to be read to its end before the
+        next.
+        """
         at = [0]
 
         def chunks() -> Iterator[Chunk]:
@@ -216,16 +225,16 @@ class JobPlan:
 
     @property
     def chunks(self) -> int:
-        """Planned so far."""
+        """Number of chunks planned so far."""
         return self._store.count
 
     @property
     def byte_count(self) -> int:
-        """Of these chunks."""
+        """Bytes of the chunks planned so far."""
         return self._store.byte_count
 
-    def behind_s(self, index: int) -> float | None:
-        """Motion and dwells behind the chunk with this index; None: not known before all is planned."""
+    def after_s(self, index: int) -> float | None:
+        """Time of motion and dwells after the chunk with this index; None: not known before all is planned."""
         with self._changed:
             if not self._done or self._error is not None:
                 return None
@@ -234,7 +243,7 @@ class JobPlan:
             return self._motion_s[-1] - self._motion_s[at] + waits_s + dwell_s(self.after)
 
     def _wait_s(self, section: PlannedSection) -> float:
-        """Standstill before a section, program stops aside."""
+        """Standstill before a section in s, without the time of program stops."""
         if section.rest is None:
             return dwell_s(section.before)
         period_us = self._job.machine.period_us
@@ -246,17 +255,17 @@ class JobPlan:
         return self._motion_s[-1]
 
     def is_longer(self, motion_s: float, wait_s: float) -> bool:
-        """Whether the motion of the job takes longer than that; False: no, or not yet known after `wait_s`."""
+        """Whether the motion of the job takes longer than `motion_s`; False: no, or not known after `wait_s`."""
         with self._changed:
             self._changed.wait_for(lambda: self.planned_s > motion_s or self._done, wait_s)
             return self.planned_s > motion_s
 
     def greatest_rate(self) -> float:
-        """Greatest bytes for each second of motion, over about _RATE_S, so far."""
+        """Greatest bytes per second of motion so far, as a mean over about _RATE_S."""
         return self._rate.worst
 
     def _allowed(self) -> int:
-        """The most bytes of a chunk, as soon as they are known. Raises _EndedError."""
+        """Waits for the greatest size of a chunk. Raises _EndedError."""
         with self._changed:
             self._changed.wait_for(lambda: self._ending or self._most is not None)
             if self._most is None:
@@ -292,7 +301,7 @@ class JobPlan:
                     self._store.forget_all()
 
     def _require_unchanged(self, file: Path) -> None:
-        """Raises InputError: the file is not what it was when the job began. Half a line of it may have been read."""
+        """Raises InputError: the file has changed since the job began, and part of a line may have been read."""
         known = self._marks.get(file)
         if known is not None and file.is_file() and mark(file) != known:
             raise InputError(
@@ -301,7 +310,9 @@ class JobPlan:
             )
 
     def _put(self, data: bytes) -> bool:
-        """Keeps a chunk as soon as there is room. False: the plan ends. Raises RunError: there will be no room."""
+        """Stores a chunk, after waiting for room. False: the plan is closed. Raises RunError: the disk is full and
+        stays so.
+        """
         store, changed = self._store, self._changed
         changed.wait_for(lambda: self._ending or not _is_full(store))
         while not self._ending and not store.put(data):
@@ -355,12 +366,12 @@ class JobPlan:
                         self._allowed(),
                         begin_q40,
                         place,
-                        partial(self._goes_on, section),
+                        partial(self._continues, section),
                     )
                     last, counted = False, 0
                     for planned in chunks.chunks():
                         for line in chunks.rest_lines[counted:]:
-                            self.rests = self.rests.behind(file, line)
+                            self.rests = self.rests.plus(file, line)
                         counted = len(chunks.rest_lines)
                         last = planned.chunk.header.last
                         yield made, planned.chunk, planned.new_s
@@ -382,7 +393,7 @@ class JobPlan:
     def _paths(
         self, file: Path, number: int, carried: tuple[Command, ...]
     ) -> Iterator[tuple[PlannedSection, Chunk, float]]:
-        """The paths of a path file, the first of which is section `number`."""
+        """The paths of a path file as sections, the first with this number."""
         begin = self._begin
         first = max(begin.section - number, 0)
         begin_q40 = begin.arc_q40 if begin.section >= number else 0
@@ -404,7 +415,7 @@ class JobPlan:
             )
             yield section, made.chunk, made.duration_s
 
-    def _goes_on(self, section: StreamSection, end_q40: NDArray[np.int64]) -> bool:
+    def _continues(self, section: StreamSection, end_q40: NDArray[np.int64]) -> bool:
         """Whether another section of the file begins where this one ends, at this point."""
         start = section.next_start()
         if start is None:
@@ -418,14 +429,14 @@ def _is_full(store: ChunkStore) -> bool:
 
 
 class _GreatestRate:
-    """The most bytes of chunks for each second of their motion, over about _RATE_S, kept up to date."""
+    """The greatest bytes per second of motion, as a mean over about _RATE_S."""
 
     def __init__(self) -> None:
         self.worst = 0.0
         self._first = 0
 
     def extend(self, store: ChunkStore, motion_s: Sequence[float]) -> None:
-        """Another chunk has come."""
+        """Takes the newest chunk into account."""
         last = store.count
         while motion_s[last] - motion_s[self._first + 1] > _RATE_S:
             self._first += 1
@@ -436,12 +447,12 @@ class _GreatestRate:
 
 
 def rest_of(commands: Sequence[Command], *, stops: bool) -> Rest:
-    """What the controller does at rest for these commands."""
+    """The rest that these commands need in the controller."""
     made = [one for one in commands if isinstance(one, (ProgramStop, ToolChange))] if stops else []
     optional = [isinstance(one, ProgramStop) and one.optional for one in made]
     return Rest(ceil(1e3 * dwell_s(commands) - 1e-9), not all(optional), any(optional))
 
 
 def dwell_s(commands: Sequence[Command]) -> float:
-    """Standstill that commands ask for."""
+    """Total time of the dwells among commands."""
     return sum(command.duration_s for command in commands if isinstance(command, Dwell))

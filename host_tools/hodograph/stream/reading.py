@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Toolpaths of any length as sections, read and fitted part by part.
+"""Toolpaths of any length as sections, read and fitted part by part; the first stage of streaming.
 
-A section that is longer than a window of chords is cut in the middle of chords where the path is nearly straight. The
-curve of each part begins and ends there in the direction of the chord with curvature 0, so they join C2.
+A section with more chords than a fitting window is cut in the middle of chords where the path is nearly straight. At a
+cut the curves of both parts have the direction of the chord and curvature 0, so they join C2.
 """
 
 from __future__ import annotations
@@ -41,14 +41,15 @@ WINDOW_CHORDS = 1500
 FIRST_CHORDS = 300
 
 _SEARCHED = 200
-"""Chords behind a window among which the cut is chosen: where none of them is straight, as many more, and so on."""
+"""Chords after a window among which the cut is chosen; if none of them is straight, as many again are searched."""
 
 _STRAIGHT = 5e-4
-"""Change of direction about a straight chord; rad. Elsewhere a cut costs time: about 30 ms, since both curves are
-straight there."""
+"""Greatest change of direction at both ends of a chord that counts as straight, rad. A cut in another chord costs about
+30 ms of motion, since both curves are straight there.
+"""
 
 _LONGEST = 3
-"""Times the length of a window, behind which the straightest chord is cut."""
+"""After this many lengths of a window, the straightest chord found is cut."""
 
 _BESIDE_MM = 1e-6
 
@@ -56,19 +57,19 @@ _LEAST_CUT_MM = 0.05
 """A segment is not cut closer to its ends where the feed changes."""
 
 _SHORT_SHARE = 0.5
-"""Of the median length: shorter chords are not cut."""
+"""Chords shorter than this share of the median length are not cut."""
 
 
 @dataclass
 class _Windows(Divider):
-    """A divider that cuts sections which become too long to be fitted at once: about every `window` chords."""
+    """A divider that also cuts sections which are too long to be fitted at once, about every `window` chords."""
 
     window: int = field(kw_only=True)
     searched: int = 0
 
     @property
     def begun(self) -> bool:
-        """Whether the next section has begun, so that `before` holds all that is at rest before it."""
+        """Whether the next section has begun, so that `before` holds all commands at rest before it."""
         return self.moved and self.builder.length_mm >= SHORTEST_MM
 
     def _move(self, move: Move) -> None:
@@ -113,15 +114,15 @@ def _turns_of_all(point: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True, eq=False)
 class StreamSection:
-    """Moves from rest to rest, as far as they are read.
+    """Moves from rest to rest, read as its blocks are read.
 
     file, first_line  where it begins
-    before            commands that happen at rest, before it starts
+    before            commands at rest, before it starts
     blocks            its path; reading them reads the file
-    next_start        where the next section starts, (A,) in mm and degrees, once all blocks are read; None: it is the
-                      last one, or the next one moves other axes
-    machine           with the axes that its programs move: of a section that turns axes alone those after x and y or z
-    standing_mm       where the axes before those of its programs stand, without the work offset
+    next_start        start of the next section, (A,) in mm and degrees, known once all blocks are read; None: this is
+                      the last one, or the next one moves other axes
+    machine           with the axes that its programs move; where rotary axes move alone, without x, y and perhaps z
+    standing_mm       positions of the axes before those of its programs, without the work offset
     """
 
     file: Path
@@ -135,10 +136,10 @@ class StreamSection:
 
 @dataclass
 class StreamReader:
-    """Reads a toolpath file; `sections` gives its sections one after the other, each to be read to its end first.
+    """Reads a toolpath file section by section. Each section has to be read to its end before the next.
 
     notes  one line for each thing that the user should know; grows while the file is read
-    after  commands that happen at rest at the end, known then
+    after  commands at rest at the end, known then
     """
 
     file: Path
@@ -149,7 +150,7 @@ class StreamReader:
     after: tuple[Command, ...] = ()
 
     def sections(self) -> Iterator[StreamSection]:
-        """Raises InputError and PlanError, naming the line."""
+        """The sections in order. Raises InputError and PlanError, naming the line."""
         if not 0.0 <= self.tolerance_mm <= GREATEST_TOLERANCE_MM:
             raise InputError(
                 f"--tolerance {self.tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
@@ -185,7 +186,7 @@ class StreamReader:
             for made, final in _with_final(sections.made(divided.section)):
                 own = events.section(
                     section_commands(made),
-                    divided.behind if final else (),
+                    divided.after if final else (),
                     is_first=first,
                     is_last=divided.is_last and final,
                 )
@@ -193,8 +194,8 @@ class StreamReader:
                 first = False
 
     def _divided(self) -> Iterator[_Divided]:
-        """Sections. What is at rest behind one is known when the next one begins: where outputs may be among it, the
-        section waits for that.
+        """Sections, or parts of them, before fitting. If the machine has outputs, a section is held back until the
+        commands at rest after it are known, when the next one begins.
         """
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
         divider = _Windows(
@@ -227,7 +228,7 @@ class StreamReader:
             yield _Divided(held, self.after, is_last=True)
 
     def _commands(self) -> Iterator[Command]:
-        """Those of the file; the first one of each kind that is passed has a note."""
+        """The commands of the file. The first one of each kind that the machine does not execute is noted."""
         noted: set[str] = set()
         for command in toolpath_commands(self.file, self.reading, self.notes):
             kind = ignored_kind(command, self.machine.outputs)
@@ -239,10 +240,10 @@ class StreamReader:
 
 @dataclass(frozen=True, eq=False)
 class _Divided:
-    """A section, or a part of one, with the commands at rest behind it; `is_last`: behind it the file ends."""
+    """A section, or a part of one, with the commands at rest after it; `is_last`: the file ends there."""
 
     section: Section
-    behind: tuple[Command, ...] = ()
+    after: tuple[Command, ...] = ()
     is_last: bool = False
 
 
@@ -255,7 +256,7 @@ class _Part:
 
 
 def _with_final(parts: Iterator[JobSection]) -> Iterator[tuple[JobSection, bool]]:
-    """Each part, and whether it is the final one."""
+    """Each part, and whether it is the last one of its section."""
     held = next(parts, None)
     for part in parts:
         assert held is not None
@@ -293,8 +294,8 @@ class _Rest:
 
 
 def block_of(section: JobSection) -> Block:
-    """The curve of a section, or of a part of one, with the feeds and lines of its segments. Segments end where the
-    programmed feed changes, but for short parts, which have the lower feed.
+    """The curve of a section, or of a part of one, with the feeds and lines of its segments. A segment ends where the
+    programmed feed changes. Where its parts would be too short, it is not cut and has the lower feed.
     """
     fitted, reference = section.fitted, section.fitted.reference
     edges = fitted.place_mm
@@ -305,7 +306,7 @@ def block_of(section: JobSection) -> Block:
     cuts = cuts[np.append(True, np.diff(cuts) > _LEAST_CUT_MM)] if cuts.size else cuts
     curve = with_joints(section.pipeline.curve, fitted.arc_length_at(cuts))
     place = np.sort(np.concatenate((edges, cuts)))
-    # A segment that ends where a chord does has nothing of the next one, whose feed may be less.
+    # The feed of the next chord, which may be lower, does not count for a segment that ends where a chord does.
     low = np.searchsorted(reference.place_mm, place[:-1] + _BESIDE_MM, side="right") - 1
     high = np.searchsorted(reference.place_mm, place[1:] - _BESIDE_MM, side="left")
     low = np.clip(low, 0, reference.count - 1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where a job goes on when the controller no longer knows it: the place of its path that is nearest to the axes."""
+"""Where `stream --continue` resumes a job that the controller has lost: the place of its path nearest to the axes."""
 
 from __future__ import annotations
 
@@ -22,18 +22,20 @@ from .reading import StreamReader
 _STEP_MM = 0.05
 _MOST_SAMPLES = 200_000
 _REFINED = (41, 3)
-"""Samples of a refinement, and how many refinements: each is finer by half of the samples."""
+"""Samples of a refinement, and number of refinements. Each refines by half the number of samples."""
 _BESIDE_MM = 0.01
-"""The part of the job that is searched is longer by this at both ends."""
+"""The searched part of the job is extended by this at both ends."""
 _ALIKE_MM = 2e-6
-"""Of two places that are so much farther the one that comes first: a part is cut twice rather than left out."""
+"""Of places whose distances differ by less than this, the first one is taken: cutting a part twice is better than
+leaving it out.
+"""
 
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """A place of a job, its source line, where it is in machine coordinates, and how far the axes are from it."""
+    """A place of a job with its source line, its point in machine coordinates, and its distance from the axes."""
 
     place: Place
     line: int
@@ -42,7 +44,7 @@ class Nearest:
 
 
 def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Nearest:
-    """The place nearest to the axes between the one that the journal has last and the end of what had been sent.
+    """The place nearest to the axes, between the last place in the journal and the end of what had been sent.
 
     at_mm  (A,) of the axes that the path moves, machine coordinates; a degree counts as a mm
     Raises InputError and PlanError as reading the job does.
@@ -86,8 +88,8 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
 
 
 def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float, ...]]]:
-    """The sections of all files, with the path of each, which may be left unread, and where the axes before those of
-    the path stand.
+    """The sections of all files: number, blocks (which may be left unread), and positions of the axes before those of
+    the path.
     """
     number = 0
     for file in job.files:
@@ -120,7 +122,7 @@ def _found(
 
 
 def _nearest_arcs(curve: Curve, target: Real, low: float, high: float) -> list[float]:
-    """Arc lengths of the places nearest to a point, of several about as near, in their order."""
+    """Arc lengths of the places nearest to a point; several, in their order, if they are about equally near."""
     count = int(np.clip(np.ceil((high - low) / _STEP_MM) + 1, 2, _MOST_SAMPLES))
     s = np.linspace(low, high, count)
     d = _distances(curve, s, target)

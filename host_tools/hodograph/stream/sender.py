@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Streams a planned job to the controller: chunks in order as there is room, start, what happens at rest, the end."""
+"""Sends a planned job to the controller: uploads chunks in order as the ring has room, starts the motion, executes
+commands at rest, and waits for the end. Used by `hodograph stream` and `run`.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +41,7 @@ from .journal import Journal
 from .plan import JobPlan, PlannedSection, PlanRests
 
 AHEAD_S = 20.0
-"""So much motion is sent ahead at most, so that a command acts on little that is already underway."""
+"""Most motion that is sent ahead, so that commands act soon."""
 
 _POLL_S = 0.05
 _PLAN_WAIT_S = 0.05
@@ -50,27 +52,26 @@ _RECORD_S = 0.5
 _UNDERRUN_S = 10.0
 _START_COUNTS = 2
 _PASSED_Q40 = 1 << 20
-"""A section is in motion when the arc length is so far behind its start, 2^-20 mm."""
+"""A section counts as in motion from this distance after its start on, 2^-20 mm."""
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
-"""A section starts at the latest when so much motion is sent, or so long after its first chunk."""
+"""A section starts as soon as this much motion is sent, or this time after its first chunk."""
 
 _LONG_WAIT_S = 1.0
-"""For the plan, which knows how long a job is."""
+"""Longest wait for the plan to report whether a job is long."""
 
 _IN_TIME = 0.7
-"""A chunk comes in time if its transfer takes this share of the motion that was sent before it."""
+"""A chunk is in time if its transfer takes at most this share of the motion that was sent before it."""
 
 
-class _GoesOnError(Exception):
+class _ResumedError(Exception):
     """A program stop is over."""
 
 
 @dataclass(frozen=True)
 class StreamProgress:
-    """Where a job is.
-
-    ahead_s      motion that the controller has before it would rest
-    remaining_s  to the end of the job; None: not all of it is planned yet, and `planned_s` of it is to come at least
+    """Progress of a job. ahead_s motion that the controller has until it would come to rest
+    remaining_s  time to the end of the job; None: not all of it is planned yet
+    planned_s    planned time to come
     """
 
     file: Path
@@ -84,7 +85,7 @@ class StreamProgress:
 
 @dataclass(frozen=True)
 class StreamedJob:
-    """A job that came to its end; `rests`: those of its plan."""
+    """Figures of a finished job; `rests`: those of its plan."""
 
     sections: int
     chunks: int
@@ -97,10 +98,11 @@ class StreamedJob:
 
 @dataclass
 class Sender:
-    """Sends a job. `progress` is called a few times a second while it moves.
+    """Sends a job.
 
-    recording  what records the bus meanwhile
-    slow       bytes a second that the bus has for chunks; None: as many as it takes
+    progress   called a few times a second while it moves
+    recording  recorder of the bus; None: the bus is not recorded
+    slow       bytes per second that the bus has for chunks; None: not limited
     """
 
     at: RunSession
@@ -122,17 +124,16 @@ class Sender:
     _underrun_s: float = field(default=-1e9)
     _percent: int = 100
     _sending_s: float = 0.0
-    """What the transfers of _bytes took."""
+    """Time that the transfers of `_bytes` took."""
     _done_s: float = 0.0
-    """Motion of jobs that are over."""
+    """Motion of finished jobs of the controller."""
     _ahead: deque[PlannedSection] = field(default_factory=deque)
     _unplanned: HodographError | None = None
-    """Why the job cannot be planned on. What was sent is still carried out."""
+    """The error that ended the planning. What was sent before it is still executed."""
 
     def run(self) -> StreamedJob:
-        """Raises RefusedError, BusError, RunError, and what planning raises, when the motion rests.
-
-        Whatever ends it early stops the axes on their path at once; nothing is waited for before.
+        """Sends the whole job and returns at its end. Raises RefusedError, BusError, RunError, and errors of planning
+        once the motion has come to rest. Any exception first stops the axes on their path.
         """
         try:
             return self._run()
@@ -166,7 +167,7 @@ class Sender:
         )
 
     def _wait_item(self) -> tuple[PlannedSection, Chunk, float] | None:
-        """The next chunk, as soon as it is planned; None: there is no more."""
+        """Waits for the next chunk to be planned; None: the job has no more."""
         while True:
             try:
                 item = self.plan.item(self._next, _PLAN_WAIT_S)
@@ -174,17 +175,18 @@ class Sender:
                 return None
             if item is not None:
                 return item
-            self._look()
+            self._check_bus()
 
     def _planned(self) -> tuple[PlannedSection, Chunk, float] | None:
-        """The next chunk, if it is planned by now. Virtual time stands still for the planner, so that the frames on the
-        bus follow from the job alone; not for standard input, which may come at any time.
+        """The next chunk; None: it is not planned yet. Virtual time stands still while the planner works, so that the
+        frames on the bus depend on the job alone. It does not stand still for standard input, which may come at any
+        time.
         """
         stands_still = self.at.controller.clock.is_virtual and not self.plan.reads_input
         return self.plan.item(self._next, _VIRTUAL_PLAN_WAIT_S if stands_still else 0.0)
 
-    def _look(self) -> None:
-        """Raises what has gone wrong on the bus meanwhile."""
+    def _check_bus(self) -> None:
+        """Raises RunError or BusError for an error on the bus since the last call; keeps recorded frames."""
         if self.at.rig is not None:
             self.at.rig.check()
         now_s = self.at.controller.clock.now_s()
@@ -193,7 +195,7 @@ class Sender:
             self.recording.keep()
 
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
-        """Sections that the controller runs as one job, from the one that begins with this chunk."""
+        """Sends sections that the controller runs as one job, beginning with this one."""
         self._to_start(section, chunk)
         execute_at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(section, chunk)
@@ -205,17 +207,17 @@ class Sender:
 
     @property
     def _section(self) -> PlannedSection:
-        """The one in motion."""
+        """The section in motion."""
         return self._ahead[0]
 
     def _note_place(self, *coming: PlannedSection, **changes: int) -> None:
-        """Writes to the journal where the job is; `coming`: a section whose first chunk is sent next."""
+        """Writes the place of the job to the journal; `coming`: a section whose first chunk is sent next."""
         if self.journal is not None:
             starts = tuple((one.number, one.start_q40) for one in (*self._ahead, *coming))
             self.journal.update(section=self._section.number, starts=starts, **changes)
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
-        """Moves the axes to where a section begins, unless they stand there."""
+        """Moves the axes to the start of a section, unless they stand there."""
         program = NativeProgram(chunk.image)
         program.check(NativeLimits(chunk=1))
         start = program_start_counts(program, self.machine, self.kernel, section.standing_mm)
@@ -231,7 +233,7 @@ class Sender:
         started = all_sent = False
         sent, first_s, self._done_s = 0, 0.0, self._motion_s
         while True:
-            self._look()
+            self._check_bus()
             status = stream_status(controller) if sent else None
             if started and status is not None:
                 self._pass_sections(status)
@@ -258,7 +260,9 @@ class Sender:
                 started = True
 
     def _may_start(self, first_s: float) -> bool:
-        """Whether enough is sent, or the first chunk has waited for long enough, or waiting is of no use."""
+        """Whether the motion may start: enough is sent, or the first chunk has waited long enough, or waiting is
+        useless.
+        """
         waited_s = self.at.controller.clock.now_s() - first_s
         return (
             waited_s > _START_WAIT_S
@@ -267,9 +271,10 @@ class Sender:
         )
 
     def _need_not_wait(self) -> bool:
-        """Whether the next chunk comes before the motion leaves the last joint, at the rate of the transfers so far.
-        Where a bus whose feed override is not lowered carries less than a job needs, the motion rests at tails anyway:
-        it need not wait either, but for a job that is over so soon that it may be sent as a whole before.
+        """Whether the motion need not wait for the next chunk: at the rate of the transfers so far, the chunk comes
+        before the motion leaves the last joint. If the bus carries fewer bytes than the job needs and the feed override
+        is not lowered, the motion comes to rest at tails anyway. Then it waits only for a job so short that all of it
+        may be sent before.
         """
         try:
             item = self._planned()
@@ -285,7 +290,7 @@ class Sender:
         return self.plan.is_longer(self._done_s + _START_AHEAD_S, _LONG_WAIT_S)
 
     def _pass_sections(self, status: StreamStatus) -> None:
-        """Goes on to the section in motion, and says what is to be said before it."""
+        """Drops the sections that are over, and prints the messages before the one in motion."""
         arc_q40 = nearest_q40(status.arc_length_mm)
         while len(self._ahead) > 1 and arc_q40 > self._ahead[1].start_q40 + _PASSED_Q40:
             self._ahead.popleft()
@@ -295,23 +300,25 @@ class Sender:
                 self.at.note(f"{section.file}:{line}: {code}: passed without waiting (--no-stops)")
 
     def _at_program_stop(self) -> None:
-        """Waits for the operator and resumes; returns as well when somebody else has resumed or stopped."""
+        """Waits for the operator, then resumes. Returns also when another client has resumed or stopped."""
         controller = self.at.controller
         section = self._ahead[1] if len(self._ahead) > 1 else self._section
 
-        def look() -> None:
-            self._look()
+        def check() -> None:
+            self._check_bus()
             controller.clock.sleep(_POLL_S)
             if stream_status(controller).state != PROGRAM_STOP:
-                raise _GoesOnError
+                raise _ResumedError
 
-        with suppress(_GoesOnError):
+        with suppress(_ResumedError):
             for line, code in operator_stops_of(section.before):
-                self.operator(f"{section.file}:{line}: {code}", look)
+                self.operator(f"{section.file}:{line}: {code}", check)
             controller.command(RESUME)
 
     def _send_one(self, status: StreamStatus | None) -> bool | None:
-        """Sends the next chunk, if it is planned and there is room: whether it is the last one of the job."""
+        """Sends the next chunk. Returns whether it is the last one of the job; None: it is not planned yet, or the ring
+        has no room.
+        """
         try:
             item = self._planned()
         except HodographError as error:
@@ -320,14 +327,14 @@ class Sender:
         if item is None:
             return None
         section, chunk, new_s = item
-        behind_s = self.plan.behind_s(self._next)
+        after_s = self.plan.after_s(self._next)
         header = chunk.header
-        data = chunk.with_remaining(None if behind_s is None else behind_s + new_s).encode()
+        data = chunk.with_remaining(None if after_s is None else after_s + new_s).encode()
         if status is not None and status.free_bytes < len(data):
             return None
         place = f"{section.file}:{header.line}"
         if header.rest is not None:
-            # Before the transfer: if this process is killed then, the motion may already be there.
+            # Before the transfer: if this process is killed during it, the motion may reach the section.
             self._note_place(section)
         begun_s = self.at.controller.clock.now_s()
         if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
@@ -342,7 +349,7 @@ class Sender:
         return header.last
 
     def _slow_down(self) -> None:
-        """Lowers the feed override where the bus has not the bytes that the job needs."""
+        """Lowers the feed override if the bus carries fewer bytes than the job needs."""
         if self.slow is None:
             return
         needed = self.plan.greatest_rate()
@@ -365,7 +372,7 @@ class Sender:
         self._note_underruns(status, now_s)
         self._slow_down()
         if self.progress is not None:
-            behind_s = self.plan.behind_s(self._next - 1)
+            after_s = self.plan.after_s(self._next - 1)
             to_come_s = self.plan.planned_s - self._motion_s + status.committed_s
             self.progress(
                 StreamProgress(
@@ -373,14 +380,14 @@ class Sender:
                     status.line,
                     section.number,
                     status.committed_s,
-                    None if behind_s is None else behind_s + status.committed_s,
+                    None if after_s is None else after_s + status.committed_s,
                     to_come_s,
                     status.underruns,
                 )
             )
 
     def _note_underruns(self, status: StreamStatus, now_s: float) -> None:
-        """Says that the motion rested for want of chunks, now and then: a slow bus may make it rest at each."""
+        """Notes underruns, at most once in _UNDERRUN_S: on a slow bus each chunk may have one."""
         if status.underruns <= self._underruns or self._unplanned is not None:
             return
         self._underruns = status.underruns
@@ -394,7 +401,7 @@ class Sender:
         )
 
     def _over(self, status: StreamStatus, *, all_sent: bool) -> bool:
-        """Whether the job came to its end. Raises RunError: it was stopped, or there is a fault."""
+        """Whether the job has ended. Raises RunError: it was stopped, or there is a fault."""
         controller = self.at.controller
         if status.state == UNDERRUN and self._unplanned is not None:
             raise self._unplanned

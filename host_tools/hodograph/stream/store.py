@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Planned chunks on disk until they are sent: temporary files of bounded size, removed as they are read."""
+"""Keeps planned chunks on disk until they are sent, in temporary files of bounded size that are removed as they are
+read. Used by plan.py.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,9 @@ from pathlib import Path
 from ..errors import RunError
 
 PART_BYTES = 4 << 20
-"""Of one file."""
+"""Size at which a new file begins."""
 RESERVE_BYTES = 64 << 20
-"""Left free on the disk: the journal and recordings may be on it too."""
+"""Bytes that stay free on the disk: the journal and recordings may be on it too."""
 
 
 def store_folder() -> Path:
@@ -28,8 +30,8 @@ def store_folder() -> Path:
 
 
 class ChunkStore:
-    """Encoded chunks, numbered from 0. Those before the newest one that was read are forgotten. The newest one is kept
-    in memory too: it is read again when it is sent again, and its file may be gone by then.
+    """Encoded chunks, numbered from 0. Chunks before the newest one that was read are forgotten. The newest one is also
+    kept in memory, since it may be sent again after its file is removed.
     """
 
     def __init__(self) -> None:

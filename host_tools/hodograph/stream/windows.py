@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The feed of a section in windows: each begins where the kept part of the last one ends, in motion, and is planned to
-rest at its own end; docs/theory/numerics.md 5.6.
+"""The feed of a section in planning windows; docs/theory/numerics.md 5.6. Used by chunks.py.
 
-Pieces that are kept never change again. What follows a joint until the next chunk comes is a tail: the fastest brake
-to rest at the end of a segment not far behind the joint.
+A window begins in motion, where the kept part of the last window ends, and is planned to rest at its own end. Kept
+pieces never change again. A chunk ends with a tail: a fast brake from its last joint to rest at the end of a segment.
 """
 
 from __future__ import annotations
@@ -44,58 +43,66 @@ Int = NDArray[np.int64]
 _Made = TypeVar("_Made")
 
 FIRST_WINDOW_S, WINDOW_S = 0.3, 3.0
-"""Motion that a window keeps: the first one of a job little, so that it starts soon, each next one twice as much until
-it is WINDOW_S.
+"""Motion that a window keeps. The first window of a job keeps little, so that the job starts soon; each next one keeps
+twice as much, up to WINDOW_S.
 """
 
 _STOPS = 4.0
-"""The rejected end of a window, in times that stopping takes."""
+"""The part of a window that is not kept, as a multiple of the stopping time."""
 
 _END_SHARE = 0.5
-"""A window takes what remains of a section when that is less than this share of it more."""
+"""A window includes the remainder of a section if that adds less than this share."""
 
 RESERVE = 0.01
-"""Share of the axis limits that windows leave free: what is kept is not planned again when a later piece needs more."""
+"""Share of the axis limits that windows leave free, since kept pieces are not planned again if a later one needs
+more.
+"""
 
 _EASED = (1e-3, 1e-2)
-"""Shares of the stopping time within which the acceleration builds up at the soonest, where nothing else is found."""
+"""Least times in which the acceleration builds up, as shares of the stopping time; tried where no feed is found
+otherwise.
+"""
 
 _BRAKE_DISTANCES = (1.1, 1.2, 1.3, 1.4, 1.5)
-"""Of brakes without a quadratic program, tried first, in times the distance that braking takes at least."""
+"""Distances of brakes without a quadratic program, which are tried first, as multiples of the least braking
+distance.
+"""
 
 _TAIL_DISTANCES = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
-"""Of tails that are tried, in times the distance that braking takes at least: some, and then those between them."""
+"""Distances of tails in the order in which they are tried, as multiples of the least braking distance."""
 
 _EFFORT = Effort(gain=1e-3, patience=9, tolerance=1e-5, spacing=2.0, fewest=24)
-"""Of windows: less than of a plan that is made once. Feeds that end a little short of their limits leave brakes more
-places to begin. Half as many pieces take half of the bytes; that costs 0.1 to 0.2 % of the time of the motion.
+"""Effort of windows, less than that of other plans. Feeds a little below their limits leave brakes more places to
+begin. Half as many pieces take half of the bytes and cost 0.1 to 0.2 % of the time of the motion.
 """
 
 _TAIL_EFFORT = replace(_EFFORT, spacing=3.0, fewest=6)
-"""Of tails, which need not be the fastest, and of parts that take few bytes rather than little time."""
+"""Effort of tails, which need not be the fastest, and of windows that have to take few bytes."""
 
 _LOWERED = (1.01, 1.01, 1.02, 1.04, 1.08)
-"""By which factors, one after the other, the limits of an interval are lowered that the controller would refuse."""
+"""Factors by which the limits of an interval that the controller would refuse are lowered, one after the other."""
 
 _TAIL_LOWERED = (1.04, 1.04)
 """The same of a tail, which need not be the fastest."""
 
 _TAIL_EXCESS = 1.0075
-"""What a tail may use of the limits less RESERVE; whether the controller takes it is found by its own check."""
+"""Greatest limit usage of a tail, of the limits less RESERVE; the controller's check decides whether the tail is
+accepted.
+"""
 _DRIFT_Q40 = 1024
 _SAME_MM = 1e-9
 
 
 JOINTS = 4
-"""Places for a joint in what is new in a chunk: the last one is taken where there is room."""
+"""Possible joints in the new part of a chunk; the last one for which there is room is taken."""
 
 _SLIGHTLY_MORE = 0.25
-"""A chunk may have this share more of what is new than is wanted, rather than that there is one more."""
+"""The new part of a chunk may exceed its wanted size by this share, to save another chunk."""
 
 
 @dataclass(frozen=True)
 class Spacing:
-    """How far joints are apart at most: in time, and in bytes of pieces and segments."""
+    """Greatest distance of joints: in time, and in bytes of pieces and segments."""
 
     time_s: float
     bytes: int
@@ -103,7 +110,7 @@ class Spacing:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """Feed pieces with arc lengths from the start of the section, and where the last one ends."""
+    """Feed pieces with arc lengths from the start of the section, and the arc length where the last one ends."""
 
     pieces: FeedPieces
     end_q40: int
@@ -113,9 +120,10 @@ class Stretch:
 class Window:
     """A planned window.
 
-    count   intervals that are kept; all of them where `rests`: the motion is at rest there
+    count   number of kept intervals; all of them if `rests`
+    rests   whether the kept part ends at rest
     joints  (j,) numbers of the knots at which tails may begin, JOINTS for a chunk; the last one is `count`
-    end_mm  where the kept part ends, in the arc length of the path in memory
+    end_mm  end of the kept part, as an arc length of the path in memory
     first   number of the solution's knot at which the stretch begins
     """
 
@@ -137,7 +145,9 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class _Estimate:
-    """Arc lengths s (n,), roughly when they are passed t (n,), and how long stopping takes."""
+    """A first estimate of the feed: arc lengths s (n,), times t (n,) at which they are passed, and the stopping
+    time.
+    """
 
     s: Real
     t: Real
@@ -145,7 +155,7 @@ class _Estimate:
 
 
 class SectionFeed:
-    """Plans the windows of a section, whose path it reads from blocks as far as it needs it."""
+    """Plans the windows of a section. It reads the path from blocks as far as a window needs it."""
 
     def __init__(
         self,
@@ -156,9 +166,11 @@ class SectionFeed:
         begin_q40: int = 0,
         begin_point_q40: NDArray[np.int64] | None = None,
     ) -> None:
-        """`joint`: how far apart joints are; `exceeded`: the pieces (M,) of a stretch that the controller would
-        refuse for their motion; `begin_q40`: arc length of the section where the blocks begin; `begin_point_q40`: the
-        very point of that, None: that of the first block.
+        """blocks the path of the section
+        joint            greatest distance of joints
+        exceeded         which pieces (M,) of a stretch the controller would refuse for their motion
+        begin_q40        arc length of the section where the blocks begin
+        begin_point_q40  exact point there; None: that of the first block
         """
         self.machine = machine
         self.path = StreamPath(machine.offset_mm, machine.period_us, begin_q40, begin_point_q40)
@@ -204,7 +216,7 @@ class SectionFeed:
 
     @property
     def begins_at_rest(self) -> bool:
-        """Whether the present window does."""
+        """Whether the present window begins at rest."""
         return self._moving is None
 
     def at_end(self, window: Window) -> bool:
@@ -212,14 +224,14 @@ class SectionFeed:
         return self.path.complete and window.stretch.end_q40 == int(self.path.start_q40[-1])
 
     def rest_at(self, end_q40: int, last_s: float) -> None:
-        """The next window begins at rest at this end of a segment, behind a piece that lasts last_s, in place of where
-        the present one ends.
+        """Lets the next window begin at rest at this end of a segment, in place of the end of the present window.
+        last_s duration of the piece before
         """
         self._rest = end_q40, last_s
 
     def halve(self, window: Window) -> bool:
-        """The present window, which begins at rest, is planned again, to a rest within half of what it kept. False:
-        it begins in motion, or keeps one segment.
+        """Lets the present window be planned again, to a rest within the first half of its kept part. False: it begins
+        in motion, or keeps one segment.
         """
         ends, low = self.path.curve.segment_starts_mm, self._low_mm + _SAME_MM
         first = int(np.searchsorted(ends, low, side="right"))
@@ -250,11 +262,11 @@ class SectionFeed:
         self._moving = State(float(found.q[count]), float(found.slope[count]))
 
     def forget(self, segment: int) -> None:
-        """The segments of the section before this one are no longer needed after the present window."""
+        """Releases the segments of the section before this one at the end of the present window."""
         self._needed = segment
 
     def _drop(self) -> None:
-        """Removes what is no longer needed."""
+        """Removes the released segments."""
         passed_mm = self.path.drop(self._needed - self.path.passed)
         self._low_mm -= passed_mm
         if self._held is not None and passed_mm > 0.0:
@@ -285,8 +297,9 @@ class SectionFeed:
         stretch_of: Callable[[_Made], tuple[Stretch, int]],
         steps: Sequence[float] = _LOWERED,
     ) -> tuple[_Made, NDArray[np.bool_]]:
-        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
-        pieces that it still would refuse. `stretch_of`: its pieces, and how many of them are kept.
+        """What `made` makes of a solution whose limits are lowered on intervals that the controller would refuse, and
+        the pieces (M,) that it would still refuse. `stretch_of` gives the pieces of that, and how many of them are
+        kept.
         """
         tight, out = np.ones(found.grid.size), made(found)
         for step in steps:
@@ -328,7 +341,7 @@ class SectionFeed:
     def _to_rest(
         self, limits: PlanLimits, given: tuple[FeedRequest, Limits, Plants | None]
     ) -> Window:
-        """The rest of the last window, to its end: nothing is found that goes on in motion."""
+        """The remainder of the last window, to its rest: no feed was found that continues in motion."""
         last, held = self._last, self._held
         assert last is not None
         assert held is not None
@@ -348,14 +361,14 @@ class SectionFeed:
         )
 
     def _read(self) -> None:
-        """Reads blocks until what is known takes longer than a window."""
+        """Reads blocks until the known path takes longer than a window."""
         while not self.path.complete:
             if self.path.count and self._ahead_s() > self._wanted_s * (1.0 + _END_SHARE):
                 return
             self.read_more()
 
     def read_more(self) -> bool:
-        """Reads a block; false: there is none."""
+        """Reads a block; False: there is none."""
         block = None if self.path.complete else next(self._blocks, None)
         if block is None:
             self.path.complete = True
@@ -364,7 +377,7 @@ class SectionFeed:
         return True
 
     def _estimate(self, limits: PlanLimits) -> _Estimate:
-        """The estimate of all of the path that is known; kept until more of it is, or the window has moved on."""
+        """The estimate for the whole known path; made again when more of it is read, or for the next window."""
         key = (self.path.passed + self.path.count, self._low_q40)
         if self._estimated is None or self._estimated[0] != key:
             self._estimated = key, self._estimate_of(limits)
@@ -384,7 +397,7 @@ class SectionFeed:
         return float(found.t[-1]) - (_STOPS + 2.0) * found.stop_s
 
     def _high(self, limits: PlanLimits) -> tuple[float, float]:
-        """Where the next window ends, at an end of a segment, and how long stopping takes."""
+        """The end of the next window, at an end of a segment, and the stopping time."""
         found = self._estimate(limits)
         s, t, stop_s = found.s, found.t, found.stop_s
         wanted_s = self._wanted_s + _STOPS * stop_s
@@ -414,11 +427,13 @@ class SectionFeed:
         return FeedPlan(request, limits, controller, machine.period_us, track, paths=(bounds,))
 
     def _solved(self, limits: PlanLimits, high: float, stop_s: float) -> Solution | None:
-        """The window to `high`; from rest, or on from the last one. None: nothing is found in motion."""
+        """The window to `high`, from rest or from the state at the end of the last one. None: no feed was found in
+        motion.
+        """
         curve, low, moving = self.path.curve, self._low_mm, self._moving
         held = self._held
         if moving is None:
-            # Zones are no slower than a feed may be, and there are many of them.
+            # Without zones: there are many of them, and none is below the least feed.
             check_feasible(curve, replace(limits, zones=()), LONGEST_S)
             limits = within_reach(curve, limits)
         limits = replace(limits, zones=_touched(limits.zones, low, high))
@@ -447,8 +462,8 @@ class SectionFeed:
         return None
 
     def _joints(self, found: Solution, count: int, first: int = 0) -> tuple[int, ...]:
-        """Knots up to `count`, counted from knot `first`: JOINTS of them for the time and the bytes of a chunk, evenly
-        in the greater one.
+        """Knots for joints up to `count`, counted from knot `first`: JOINTS of them for each chunk, at equal steps of
+        time or of bytes, whichever needs more chunks.
         """
         part = slice(first, first + count + 1)
         t = np.concatenate((np.zeros(1), np.cumsum(found.times)))[part]
@@ -464,7 +479,7 @@ class SectionFeed:
         return (*inner, count)
 
     def _stretch(self, track: Track, plan: FeedPlan, start_q40: int) -> Stretch:
-        """The pieces of a track that begins at an arc length of the section."""
+        """The feed pieces of a track that begins at an arc length of the section."""
         path = self.path
         base = int(path.start_q40[0])
         joints = path.start_q40 - base
@@ -484,9 +499,10 @@ class SectionFeed:
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
 
     def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """Tails from a joint of a window to rest, over the distances in _TAIL_DISTANCES, each to the end of a segment
-        at arc length `least_q40` of the section or behind it; each as it is planned, and then slower where the
-        controller would refuse that. The last one is the rest of the window.
+        """Tails from a joint of a window to rest. Each ends at an end of a segment, at arc length `least_q40` of the
+        section or later. First comes the shortest brake that keeps the limits, if any. For each distance in
+        _TAIL_DISTANCES a planned tail follows, and the same with lower limits where the controller would refuse it. The
+        last one is the remainder of the window.
         """
         found, curve = window.solution, self.path.curve
         knot = window.first + joint
@@ -526,7 +542,9 @@ class SectionFeed:
     def _brakes(
         self, window: Window, joint: int, state: State, low: float, least: float
     ) -> Iterator[Stretch]:
-        """The shortest of the brakes to rest, as _BRAKE_DISTANCES has them, that keeps the limits of a window."""
+        """The shortest brake to rest, over the distances in _BRAKE_DISTANCES, that keeps the limits of a window; empty:
+        none does.
+        """
         curve = self.path.curve
         for high in self._tail_ends(_BRAKE_DISTANCES, window, state, low, least):
             brake = brake_to_rest(state, low, high, self._period_s)
@@ -541,7 +559,9 @@ class SectionFeed:
     def _tail_ends(
         self, distances: Sequence[float], window: Window, state: State, low: float, least: float
     ) -> Iterator[float]:
-        """The ends of segments within a window, each once, at these distances from `low` or behind, from `least` on."""
+        """The first ends of segments within a window at each of these distances from `low` or later, and not before
+        `least`.
+        """
         ends, tried = self.path.curve.segment_starts_mm, set[int]()
         for distance in distances:
             wanted = max(low + distance * _braking_mm(state, window.limits), least - 1e-6)
@@ -553,29 +573,29 @@ class SectionFeed:
 
 
 def _whole(stretch: Stretch) -> tuple[Stretch, int]:
-    """All of its pieces are kept."""
+    """A stretch all of whose pieces are kept."""
     return stretch, len(stretch.pieces)
 
 
 def last_s(pieces: FeedPieces, count: int) -> float:
-    """How long the last of the first pieces lasts."""
+    """Duration of the last of the first `count` pieces."""
     return float(pieces.duration_q32_s[count - 1]) * 2.0**-32
 
 
 def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:
-    """The zones that a stretch of the path touches."""
+    """The zones that meet an interval of arc length."""
     return tuple(zone for zone in zones if zone.from_mm <= high and zone.to_mm >= low)
 
 
 def _begun(ends: Ends, state: State | None) -> Ends:
-    """With the very state in which what is before ends; None: at rest."""
+    """The ends, begun in exactly this state; None: at rest."""
     if state is not None:
         ends.feed[0], ends.acceleration[0] = np.sqrt(state.q), 0.5 * state.slope
     return ends
 
 
 def _braking_mm(state: State, limits: PlanLimits) -> float:
-    """About the shortest distance to rest."""
+    """Estimate of the least braking distance."""
     feed = state.q**0.5
     pull = min(0.7 * limits.least_acceleration, (limits.least_jerk * feed) ** 0.5)
     lead_s = max(0.5 * state.slope, 0.0) / limits.least_jerk
@@ -584,7 +604,7 @@ def _braking_mm(state: State, limits: PlanLimits) -> float:
 
 
 def taken(pieces: FeedPieces, part: slice) -> FeedPieces:
-    """Some of the pieces."""
+    """A part of the pieces."""
     return FeedPieces(
         pieces.duration_q32_s[part],
         pieces.start_q40[part],
@@ -606,7 +626,7 @@ def chained(parts: list[FeedPieces]) -> FeedPieces:
 
 
 def _shifted(found: Solution, passed_mm: float) -> Solution:
-    """The same solution on a curve whose first `passed_mm` are removed."""
+    """The solution on a curve whose first `passed_mm` are removed."""
     grid = found.grid
     x0 = np.where(grid.grade == 0, grid.x0 - passed_mm, grid.x0)
     return replace(found, grid=replace(grid, s=grid.s - passed_mm, x0=x0))

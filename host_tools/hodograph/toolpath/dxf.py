@@ -46,21 +46,21 @@ def read_dxf(path: Path, options: DrawingOptions) -> Iterator[Command]:
     yield from drawing.commands()
 
 
-class _Look(NamedTuple):
+class _Style(NamedTuple):
     """Layer and colour as an entity gives them; `rgb` is a true colour or empty."""
 
     layer: str
     colour: int = _BY_LAYER
     rgb: str = ""
 
-    def inside(self, insert: _Look | None) -> _Look:
-        """The look of an entity of a block that is inserted with another look."""
+    def inside(self, insert: _Style | None) -> _Style:
+        """The style of an entity of a block that is inserted with another style."""
         if insert is None:
             return self
         layer = insert.layer if self.layer == "0" else self.layer
         if self.rgb or self.colour != _BY_BLOCK:
-            return _Look(layer, self.colour, self.rgb)
-        return _Look(layer, insert.colour, insert.rgb)
+            return _Style(layer, self.colour, self.rgb)
+        return _Style(layer, insert.colour, insert.rgb)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +79,18 @@ class _Insert:
 
     block: str
     maps: tuple[Affine, ...]
-    look: _Look
+    style: _Style
     handle: str
     line: int
 
 
 @dataclass(slots=True)
 class _Block:
-    """What a block holds: contours, whose groups are numbers of `looks`, copies of others, and what is left out."""
+    """What a block holds: contours, whose groups are numbers of `styles`, copies of others, and what is left out."""
 
     base: Point
     contours: Contours = field(default_factory=Contours)
-    looks: list[tuple[_Look, str]] = field(default_factory=list)
+    styles: list[tuple[_Style, str]] = field(default_factory=list)
     inserts: list[_Insert] = field(default_factory=list)
     left_out: list[tuple[str, int]] = field(default_factory=list)
 
@@ -219,21 +219,21 @@ class _Reader:
         is_hidden = is_hidden or record.integer(290, 1) == 0
         self._layers[name.lower()] = _Layer(name, abs(colour), _rgb(record), is_hidden)
 
-    def _look(self, entity: Entity) -> _Look:
+    def _style(self, entity: Entity) -> _Style:
         layer = "".join(self._text(tag) for tag in entity.all(8)[:1]) or "0"
         known = self._layers.get(layer.lower())
-        return _Look(known.name if known else layer, entity.integer(62, _BY_LAYER), _rgb(entity))
+        return _Style(known.name if known else layer, entity.integer(62, _BY_LAYER), _rgb(entity))
 
-    def _group(self, look: _Look) -> Group:
-        layer = self._layers.get(look.layer.lower())
-        colour, rgb = look.colour, look.rgb
+    def _group(self, style: _Style) -> Group:
+        layer = self._layers.get(style.layer.lower())
+        colour, rgb = style.colour, style.rgb
         if not rgb and colour == _BY_LAYER and layer is not None:
             colour, rgb = layer.colour, layer.rgb
         if rgb:
-            return Group(look.layer, rgb)
+            return Group(style.layer, rgb)
         number = colour if 1 <= colour <= 255 else _WHITE
         return Group(
-            look.layer, "#" + bytes(ezdxf_module("colors").aci2rgb(number)).hex(), str(number)
+            style.layer, "#" + bytes(ezdxf_module("colors").aci2rgb(number)).hex(), str(number)
         )
 
     # ---- blocks
@@ -266,8 +266,8 @@ class _Reader:
             elif entity.kind == "INSERT":
                 block.inserts.append(self._insert(entity, block.left_out))
             else:
-                block.contours.group = len(block.looks)
-                block.looks.append((self._look(entity), _handle(entity)))
+                block.contours.group = len(block.styles)
+                block.styles.append((self._style(entity), _handle(entity)))
                 self._draw(entity, block.contours, Affine(), block.left_out)
 
     def _insert(self, entity: Entity, left_out: list[tuple[str, int]]) -> _Insert:
@@ -289,7 +289,7 @@ class _Reader:
             for row in range(rows)
             for column in range(columns)
         )
-        return _Insert(name.lower(), maps, self._look(entity), _handle(entity), entity.line)
+        return _Insert(name.lower(), maps, self._style(entity), _handle(entity), entity.line)
 
     # ---- entities
 
@@ -322,27 +322,27 @@ class _Reader:
                 self._copy(self._insert(entity, left_out), self._placement, None, (), 1)
             elif entity.kind not in CURVES:
                 left_out.append((entity.kind, entity.line))
-            elif self._begin(self._look(entity), (_handle(entity),), entity.line):
+            elif self._begin(self._style(entity), (_handle(entity),), entity.line):
                 self._draw(entity, drawing.contours, self._placement, left_out)
             for what, line in left_out:
                 drawing.leave_out(what, line)
 
-    def _begin(self, look: _Look, handles: Iterable[str], line: int) -> bool:
-        """Whether an entity with this look is drawn; its group is selected then."""
-        if not self._drawing.takes(look.layer, handles):
+    def _begin(self, style: _Style, handles: Iterable[str], line: int) -> bool:
+        """Whether an entity with this style is drawn; its group is selected then."""
+        if not self._drawing.takes(style.layer, handles):
             return False
-        layer = self._layers.get(look.layer.lower())
+        layer = self._layers.get(style.layer.lower())
         if layer is not None and layer.is_hidden:
             self._drawing.leave_out(f'entity of the hidden layer "{layer.name}"', line)
             return False
-        self._drawing.select(self._group(look))
+        self._drawing.select(self._group(style))
         return True
 
     def _copy(
         self,
         insert: _Insert,
         outer: Affine,
-        above: _Look | None,
+        above: _Style | None,
         handles: tuple[str, ...],
         depth: int,
     ) -> None:
@@ -350,22 +350,22 @@ class _Reader:
         drawing, block = self._drawing, self._blocks[insert.block]
         if depth > _DEEPEST_INSERT:
             raise ShapeError(f'block "{insert.block}" is inside more than {_DEEPEST_INSERT} others')
-        look = insert.look.inside(above)
+        style = insert.style.inside(above)
         handles = (*handles, insert.handle)
         for each in insert.maps:
             affine = outer.after(each)
             for what, line in block.left_out:
                 drawing.leave_out(what, line)
             for index in range(len(block.contours)):
-                inner, handle = block.looks[block.contours.group_of(index)]
+                inner, handle = block.styles[block.contours.group_of(index)]
                 drawing.count_copies(block.contours.length_of(index), insert.line)
                 if self._begin(
-                    inner.inside(look), (*handles, handle), block.contours.line_of(index)
+                    inner.inside(style), (*handles, handle), block.contours.line_of(index)
                 ):
                     _draw_copy(drawing.contours, affine, block.contours, index)
             for nested in block.inserts:
                 drawing.count_copies(1, insert.line)
-                self._copy(nested, affine, look, handles, depth + 1)
+                self._copy(nested, affine, style, handles, depth + 1)
 
     def _draw(
         self, entity: Entity, contours: Contours, outer: Affine, left_out: list[tuple[str, int]]

@@ -46,7 +46,7 @@ def motion(pipeline: Pipeline) -> Motion:
 
 
 def run_of(motion: Motion) -> tuple[Counts, Counts, Counts]:
-    """Targets, positions, volts of standing, the run, standing; positions two SYNCs behind their setpoints."""
+    """Targets, positions, volts of standing, the run, standing; positions two SYNCs after their setpoints."""
     rows = motion.rows
     targets = padded(rows["set_counts"][:, :2], STANDING, STANDING)
     actual = padded(rows["act_counts"][:, :2], STANDING + 2, STANDING - 2)
@@ -54,9 +54,9 @@ def run_of(motion: Motion) -> tuple[Counts, Counts, Counts]:
     return targets, actual, volts
 
 
-def padded(values: NDArray[np.int32], before: int, behind: int) -> Counts:
+def padded(values: NDArray[np.int32], before: int, after: int) -> Counts:
     first, last = values[:1].astype(np.int64), values[-1:].astype(np.int64)
-    return np.concatenate([np.repeat(first, before, 0), values, np.repeat(last, behind, 0)])
+    return np.concatenate([np.repeat(first, before, 0), values, np.repeat(last, after, 0)])
 
 
 def frame(identifier: int, data: bytes) -> Frames:

@@ -181,7 +181,7 @@ def test_a_sync_without_setpoint_in_full_motion_is_a_jump(
     assert jumps(braking_without(*lost, axes=axes), limits)
 
 
-def test_a_jump_behind_a_sync_without_setpoint_is_found() -> None:
+def test_a_jump_after_a_sync_without_setpoint_is_found() -> None:
     stream = standing()
     for k in range(1, 6):
         stream.tick(50 * k, 0)

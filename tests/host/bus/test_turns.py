@@ -89,7 +89,7 @@ def test_turns_of_another_node_are_free(other: Turns) -> None:
     mine.close()
 
 
-def test_whoever_asks_again_at_once_comes_behind_who_waits(
+def test_whoever_asks_again_at_once_comes_after_who_waits(
     other: Turns, clock: SteppedClock
 ) -> None:
     """The other gives its turn back and asks for the next one while we wait: ours is before it."""

@@ -50,7 +50,7 @@ def on_the_wire(identifier: int, size: int, data: bytes) -> str:
 
 
 def unstuffed(sent: str) -> str:
-    """What a receiver has after taking out the bit behind each five equal ones."""
+    """What a receiver has after taking out the bit after each five equal ones."""
     out, run, last, skip = "", 0, "", False
     for bit in sent:
         run = run + 1 if bit == last else 1

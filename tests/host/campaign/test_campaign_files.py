@@ -64,7 +64,7 @@ BAD = [
     ),
     (
         'paths = ["{examples}/index.toml"]',
-        r"turns axes alone: a campaign takes paths of x, y and z",
+        r"moves rotary axes alone: a campaign takes paths of x, y and z",
     ),
     (PATHS + "[[gains]]\nk_vf = 1", r"\[gains 1\] name is missing"),
     (

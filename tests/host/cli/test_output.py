@@ -250,7 +250,7 @@ def command(*words: str, before: str = "", after: str = "") -> subprocess.Comple
     )
 
 
-def test_a_full_disk_behind_stdout_is_one_message() -> None:
+def test_a_full_disk_after_stdout_is_one_message() -> None:
     done = command("schema", "path", after="> /dev/full")
     assert done.returncode == 2
     assert done.stderr == "hodograph: output: cannot be written: No space left on device\n"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hodograph.bus.clock import REAL_CLOCK
-from hodograph.cli.status_command import _look, _Screen
+from hodograph.cli.status_command import _Screen, _show
 from hodograph.errors import BusError
 
 
@@ -42,6 +42,6 @@ def test_what_is_heard_meanwhile_is_not_kept(
     meter: Any = Meter(down)
     away: Any = Away()
     for _ in range(3):
-        _look(away, meter, _Screen((), as_json=True, clock=REAL_CLOCK))
+        _show(away, meter, _Screen((), as_json=True, clock=REAL_CLOCK))
     assert meter.taken == [0.0, 0.0, 0.0]
     assert capsys.readouterr().out.count("no answer from node 1") == 3

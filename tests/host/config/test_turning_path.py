@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files on which axes turn alone: the program moves these axes only, and mistakes get one line."""
+"""Path files on which rotary axes move alone: the program moves these axes only, and mistakes get one line."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_other_mistakes_have_one_line(tmp_path: Path) -> None:
         pipeline_of(load_path_file(file), load_machine(FIVE.with_name("mill.toml")))
     back = path_file(tmp_path, "[[1, 2, 3, 0, 0], [1, 2, 3, 30, 0], [1, 2, 3, 10, 0]]")
     with pytest.raises(
-        PlanError, match="the only axis that turns turns back at point 1: end the path there"
+        PlanError, match="the only rotary axis reverses at point 1: end the path there"
     ):
         _ = load_pipeline(back, allow_space=True).image
     beyond = path_file(tmp_path, "[[1, 2, 3, 0, 0], [1, 2, 3, 130, 0]]")
@@ -141,7 +141,7 @@ def test_a_path_of_a_list_has_feed_and_limits_of_its_own(tmp_path: Path) -> None
     [
         (
             "",
-            r"\[feed\] nominal_mm_s .* path 2, which turns axes alone: give nominal_deg_s in \[path.feed\]",
+            r"\[feed\] nominal_mm_s .* path 2, which moves rotary axes alone: give nominal_deg_s in \[path.feed\]",
         ),
         (
             "[path.feed]\nprofile = 'optimal'\nnominal_mm_s = 3",
@@ -162,9 +162,7 @@ def test_tables_of_a_path_that_are_wrong(tmp_path: Path, own: str, words: str) -
 def test_limits_of_the_file_that_a_turning_path_cannot_have(tmp_path: Path) -> None:
     file = listed(tmp_path, feed="")
     file.write_text(file.read_text() + "[limits]\ncentripetal_mm_s2 = 3\n")
-    with pytest.raises(
-        InputError, match=r"path 2, .*: give other limits in \[path.limits\] behind"
-    ):
+    with pytest.raises(InputError, match=r"path 2, .*: give other limits in \[path.limits\] after"):
         load_paths(file)
 
 
@@ -194,7 +192,7 @@ def test_the_api_runs_it_on_a_bus(tmp_path: Path) -> None:
     program.save(tmp_path / "index.hdgp")
     loaded = hg.load_program(tmp_path / "index.hdgp", program.machine)
     with hg.local_bus() as bus, hg.connect(program.machine, bus) as controller:
-        with pytest.raises(hg.InputError, match="turns axes alone"):
+        with pytest.raises(hg.InputError, match="moves rotary axes alone"):
             controller.run(loaded)
         run = controller.run(program)
         axes = controller.status()["axes"]

@@ -250,7 +250,7 @@ def test_effort_grows_in_proportion_to_the_path(monkeypatch: pytest.MonkeyPatch)
 def test_an_interval_that_is_too_brief_with_its_neighbour_is_joined_to_it() -> None:
     times = np.array([3.0, 3.0, 0.5, 1.0, 3.0, 0.5])
     assert _long_enough(times, None, 2.01).tolist() == [True, True, True, False, True, True, True]
-    # Where other pieces come before and behind the window, its own ends count too.
+    # Where other pieces come before and after the window, its own ends count too.
     times = np.array([0.5, 3.0, 3.0, 3.0, 0.5, 0.5])
     kept = _long_enough(times, 1.0, 2.01)
     assert kept.tolist() == [True, False, True, True, True, False, True]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Answers that come behind the next SYNC, as on a host that other work keeps busy; and answers that are lost."""
+"""Answers that come after the next SYNC, as on a host that other work keeps busy; and answers that are lost."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_what_is_not_passed_is_not_marked() -> None:
     )
     nan = np.nan
     assert passed.feed(np.arange(3.0), np.array([nan, 6.0, 7.0])) == [], (
-        "it came to the path behind b"
+        "it came to the path after b"
     )
     assert passed.feed(np.arange(3.0, 6.0), np.array([7.0, 4.0, 4.5])) == [], "backwards"
     assert passed.feed(np.arange(6.0, 9.0), np.array([nan, 0.0, 0.0])) == [], (

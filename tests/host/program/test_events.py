@@ -302,11 +302,11 @@ def test_holds_and_an_override_of_0_beside_an_event(space: Pipeline, stop: str, 
     straight = moved([])
     at = int((straight["arc_length_q40_mm"] >= place).argmax())
     assert straight["arc_length_q40_mm"][at] == place, "the event lies at a setpoint"
-    begin, goes_on = at - ahead, at - ahead + 1000
+    begin, continues = at - ahead, at - ahead + 1000
     if stop == "hold":
-        orders = [OfflineOrder("hold", begin), OfflineOrder("resume", goes_on)]
+        orders = [OfflineOrder("hold", begin), OfflineOrder("resume", continues)]
     else:
-        orders = [OfflineOrder("override", begin, 0), OfflineOrder("override", goes_on, 100)]
+        orders = [OfflineOrder("override", begin, 0), OfflineOrder("override", continues, 100)]
     rows = moved(orders)
     arc = rows["arc_length_q40_mm"]
     assert arc[begin + 990] == arc[begin + 980] < end, "at rest"

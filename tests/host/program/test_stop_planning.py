@@ -80,7 +80,7 @@ def test_stops_on_a_path_of_micrometres_are_never_late(tmp_path: Path) -> None:
 
 
 def test_a_feed_zone_that_is_used_fully_does_not_keep_a_hold_from_braking(tmp_path: Path) -> None:
-    """Ten seconds at the feed of the zone: a hold begins at once, not behind its end."""
+    """Ten seconds at the feed of the zone: a hold begins at once, not after its end."""
     points = "control_points = [[0, 0], [40, 5], [80, 40], [60, 90], [10, 80], [-20, 40]]"
     zone = "[[limits.cap]]\nfrom_mm = 20\nto_mm = 160\nfeed_mm_s = 12\n"
     made = pipeline(tmp_path, points, 'profile = "optimal"\n', zone)

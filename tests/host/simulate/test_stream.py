@@ -36,7 +36,7 @@ def chunk(image: bytes, flags: int, sequence: int = 0, job: int = JOB) -> bytes:
     return Chunk(header, image).encode()
 
 
-def behind_piece(program: Program, first: int) -> tuple[Program, ChunkHeader]:
+def after_piece(program: Program, first: int) -> tuple[Program, ChunkHeader]:
     """The program from this piece on, in motion, and what it shares; the predecessor may end as it does."""
     pieces, stops = program.pieces, program.stops
     start = int(pieces.start_q40[first])
@@ -104,7 +104,7 @@ def test_any_number_of_axes_goes_on_bit_for_bit(name: str, kernel: str) -> None:
     step = max(program.piece_count // 5, 1)
     for sequence in range(1, 4):
         made.append(stream.run(expected.size // 5))
-        program, header = behind_piece(program, step)
+        program, header = after_piece(program, step)
         job_start += header.arc_shift_q40
         header = replace(header, sequence=sequence, last=sequence == 3, job_start_q40=job_start)
         assert stream.give(Chunk(header, encode(program)).encode()) is None
@@ -121,7 +121,7 @@ def test_both_checks_accept_a_program_in_motion_in_a_chunk_only(name: str) -> No
         python = check(program, chunk=in_chunk)
         return {one.code if one else 0 for one in (native, python)}
 
-    moving, _ = behind_piece(decode((DATA / f"{name}.hdgp").read_bytes()), 10)
+    moving, _ = after_piece(decode((DATA / f"{name}.hdgp").read_bytes()), 10)
     assert codes(moving, in_chunk=True) == {0}
     assert codes(moving, in_chunk=False) == {ProgramError.FLAGS}
     resting = replace(moving, moving=False)

@@ -274,7 +274,7 @@ def test_a_piece_that_ends_beside_short_segments_has_their_feed(
         _verify(chunks, machine, shared=1, rests=True)
 
 
-def test_a_plunge_behind_a_rapid_move_in_its_direction_takes_its_time(
+def test_a_plunge_after_a_rapid_move_in_its_direction_takes_its_time(
     tmp_path: Path, machine: Machine
 ) -> None:
     file = tmp_path / "drill.ngc"

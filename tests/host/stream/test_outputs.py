@@ -177,7 +177,7 @@ RESTS = [
 
 
 def test_outputs_at_rests(tmp_path: Path, machine: Machine) -> None:
-    """Before a dwell with the last setpoint, behind it with the first one; at an exact stop with the first; at the end
+    """Before a dwell with the last setpoint, after it with the first one; at an exact stop with the first; at the end
     with the last.
     """
     chunks = _chunks(_file(tmp_path, iter(RESTS)), machine)
@@ -404,5 +404,5 @@ def test_outputs_of_a_list_are_checked(tmp_path: Path, machine: Machine) -> None
     ):
         require_outputs(file, machine, ReadOptions())
     file.write_text('[[output]]\nname = "valve"\nat_mm = 1.0\non = true\n' + PATHS)
-    with pytest.raises(InputError, match=r"put \[\[path.output\]\] behind its \[\[path\]\]"):
+    with pytest.raises(InputError, match=r"put \[\[path.output\]\] after its \[\[path\]\]"):
         load_paths(file)

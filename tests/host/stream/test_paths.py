@@ -134,7 +134,7 @@ def test_a_job_goes_on_where_axes_turn_alone(five: Machine) -> None:
 
 
 def test_paths_with_outputs_about_a_turn(tmp_path: Path, five: Machine) -> None:
-    """What is on stays on while axes turn alone, in jobs of their own in the controller."""
+    """What is on stays on while rotary axes move alone, in jobs of their own in the controller."""
     outputs = (
         (ROOT / "examples" / "machines" / "dispenser.toml")
         .read_text()

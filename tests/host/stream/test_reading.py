@@ -43,10 +43,10 @@ def test_an_output_has_its_place(tmp_path: Path, word: str, places: list[float])
 
 
 @pytest.mark.parametrize(("machine", "moves"), [("mill.toml", 1), ("dispenser.toml", 3)])
-def test_a_section_waits_for_what_is_at_rest_behind_it(
+def test_a_section_waits_for_what_is_at_rest_after_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, moves: int
 ) -> None:
-    """Where outputs may be behind it; a move that is too short for a section does not count as the next one."""
+    """Where outputs may be after it; a move that is too short for a section does not count as the next one."""
     found = reader(tmp_path, machine, "G1 X10\nM65 P0\nG4 P1\nG1 X10.0001\nM62 P0\nG1 X20")
     read_moves: list[Move] = []
 

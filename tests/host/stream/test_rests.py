@@ -62,10 +62,10 @@ def jobs(tmp_path_factory: pytest.TempPathFactory, machine: Machine) -> list[lis
         ticks = sum(chunk.program.duration_q32_s for chunks in made for chunk in chunks) / 2**32
         assert abs(plan.planned_s - ticks) < 1e-9
         waits_s = sum(rest.ticks(machine.period_us) for rest in RESTS) * 1e-6 * machine.period_us
-        behind_s = plan.behind_s(0)
-        assert behind_s is not None
+        after_s = plan.after_s(0)
+        assert after_s is not None
         first_s = made[0][0].program.duration_q32_s / 2**32
-        assert abs(behind_s - (plan.planned_s - first_s + waits_s)) < 1e-9
+        assert abs(after_s - (plan.planned_s - first_s + waits_s)) < 1e-9
         return made
 
 

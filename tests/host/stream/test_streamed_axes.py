@@ -24,7 +24,7 @@ from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream import reading
 from hodograph.stream.chunk import Chunk, shared_fault
 from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
-from hodograph.stream.geometry import Block, blocks_from, curve_behind, with_joints
+from hodograph.stream.geometry import Block, blocks_from, curve_after, with_joints
 from hodograph.stream.journal import Entry
 from hodograph.stream.output_check import require_outputs
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlannedSection
@@ -174,8 +174,8 @@ def test_a_job_goes_on_inside_a_section(tmp_path: Path, machine: Machine) -> Non
     file = _written(tmp_path, _walk(2, 16, 1.0, 10.0))
     blocks = _blocks(file, machine)
     begin_mm = 0.41 * sum(block.curve.length_mm for block in blocks)
-    behind = blocks_from(iter(blocks), begin_mm, SwitchedOutputs())
-    made = SectionChunks(machine, "walk", behind, 1, MOST, round(begin_mm * 2**40))
+    after = blocks_from(iter(blocks), begin_mm, SwitchedOutputs())
+    made = SectionChunks(machine, "walk", after, 1, MOST, round(begin_mm * 2**40))
     chunks = [one.chunk for one in made.chunks()]
     first, curve = chunks[0].program, blocks[0].curve
     assert isinstance(curve, SpatialPHSpline)
@@ -195,7 +195,7 @@ def test_parts_of_a_curve_have_its_extra_axes(tmp_path: Path, machine: Machine) 
     assert cut.segment_count == curve.segment_count + 4
     assert np.abs(cut.axes_point(s) - curve.axes_point(s)).max() < 1e-10
     begin_mm = 0.37 * curve.length_mm
-    _, rest = curve_behind(curve, begin_mm)
+    _, rest = curve_after(curve, begin_mm)
     assert isinstance(rest, SpatialPHSpline)
     own = s[s > begin_mm]
     assert np.abs(rest.axes_point(own - begin_mm) - curve.axes_point(own)).max() < 1e-10

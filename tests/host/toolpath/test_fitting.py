@@ -309,7 +309,7 @@ def fitted_sections(points: np.ndarray) -> list[FittedPath]:
 def test_stretches_beside_a_vertex_without_room_do_not_overlap(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A point on a straight line, at the end of an arc: the leg behind it belongs to the next stretch too."""
+    """A point on a straight line, at the end of an arc: the leg after it belongs to the next stretch too."""
 
     def without_room(*given: object) -> Outline:
         found = outline(*given)  # type: ignore[arg-type]

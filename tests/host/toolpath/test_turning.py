@@ -232,7 +232,7 @@ def test_three_turning_axes_draw_a_path_in_space(tmp_path: Path, five: Machine) 
 
 def test_turning_alone_is_one_program_that_only_run_takes(tmp_path: Path, five: Machine) -> None:
     job = load_job(program(tmp_path, "G0 C-90\n"), five)
-    with pytest.raises(PlanError, match=r"turns axes alone.*not compile"):
+    with pytest.raises(PlanError, match=r"moves rotary axes alone.*not compile"):
         job.only_section("compile")
     with pytest.raises(PlanError, match=r":1: c goes to -4000 … 0 deg"):
         load_job(program(tmp_path, "G0 C-4000\n"), five)

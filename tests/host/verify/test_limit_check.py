@@ -203,7 +203,7 @@ def test_rates_beyond_all_bounds_are_refused() -> None:
 def with_a_step_of_curvature(program: Program, segment: int, share: float) -> Program:
     """The middle control point of w of one segment is moved so that its length stays.
 
-    The directions at its ends stay, the curvatures do not. What comes behind moves with its end.
+    The directions at its ends stay, the curvatures do not. What comes after moves with its end.
     """
     w = 2.0**-44 * (program.a_q44[0, segment] + 1j * program.a_q44[1, segment])
 

@@ -46,16 +46,16 @@ class BusRecording:
         self._recorder.stop()
         try:
             self._take(self._recorder.take())
-            self._look(self._watch.close())
+            self._check_steps(self._watch.close())
         finally:
             self._writer.close()
 
     def _take(self, frames: Frames) -> None:
         self.unhomed_starts += unhomed_starts(frames)
         self._writer.write(frames)
-        self._look(self._watch.feed(frames))
+        self._check_steps(self._watch.feed(frames))
 
-    def _look(self, steps: list[Step]) -> None:
+    def _check_steps(self, steps: list[Step]) -> None:
         for step in steps:
             kind = step.rule, step.axes, step.group
             known = self._worst.get(kind)

@@ -52,7 +52,7 @@ class SetpointWatch:
         sync_at = np.flatnonzero(kept["id"] == SYNC_ID)
         while sync_at.size >= WINDOW:
             until = sync_at[WINDOW] if sync_at.size > WINDOW else kept.size
-            found += self._look(kept[:until], range(self._first, _EDGE + _STEP))
+            found += self._check(kept[:until], range(self._first, _EDGE + _STEP))
             kept, sync_at = kept[sync_at[_STEP] :], sync_at[_STEP:] - sync_at[_STEP]
             self._before += _STEP
         self._kept, self._frame_count, self._sync_count = [kept], kept.size, sync_at.size
@@ -63,7 +63,7 @@ class SetpointWatch:
         if not self._kept:
             return []
         kept = np.concatenate(self._kept)
-        return self._look(kept, range(self._first, self._sync_count + 1))
+        return self._check(kept, range(self._first, self._sync_count + 1))
 
     @property
     def _first(self) -> int:
@@ -73,7 +73,7 @@ class SetpointWatch:
         self._before += self._sync_count
         self._kept, self._frame_count, self._sync_count = [], 0, 0
 
-    def _look(self, frames: Frames, syncs: range) -> list[Step]:
+    def _check(self, frames: Frames, syncs: range) -> list[Step]:
         found = np.unique(frames["id"][_is_of(frames, RPDO1)] - RPDO1).tolist()
         self._seen |= set(found)
         nodes = found if self._nodes is None else self._nodes

@@ -94,7 +94,7 @@ def feedforward_bits(machine: Machine) -> int:
 
 
 def configured_counts(controller: Node, axes: int) -> tuple[int, ...]:
-    """Counts of a mm, or of a degree of an axis that turns, for each axis as they are now. Raises BusError."""
+    """Counts of a mm, or of a degree of a rotary axis, for each axis as they are now. Raises BusError."""
     common = controller.read(CONFIGURATION, 7)
     return tuple(
         controller.read(objects.COUNTS_PER_UNIT, axis) or common for axis in range(1, axes + 1)

@@ -22,7 +22,7 @@ _SHORT_MM = 1e-4
 
 
 def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
-    """The curve with axes that have `values` (nodes, E) at its joints; mm, or degrees of an axis that turns.
+    """The curve with axes that have `values` (nodes, E) at its joints; mm, or degrees of a rotary axis.
 
     curve  not yet split: one segment for each span
     values of an open path at its N + 1 joints, of a closed one at the N joints without the repeated first

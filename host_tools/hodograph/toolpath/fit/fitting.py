@@ -58,7 +58,7 @@ class FittedPath:
 
     curve         at most `certificate.worst_mm` from the reference, and the reference from it
     place_mm      (segments + 1,) places of the reference at the joints of the curve
-    turning_deg   bound of how far the axes that turn along are from the programmed angles at the same share of the way
+    turning_deg   bound of how far the rotary axes along are from the programmed angles at the same share of the way
                   between two points; None: none turns along
     """
 

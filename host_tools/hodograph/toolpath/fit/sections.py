@@ -142,7 +142,7 @@ class Divider:
 
     def _without_stop(self, command: Command) -> None:
         if self.moved:
-            self._on_the_way(command)
+            self._within(command)
         else:
             self.before.append(command)
 
@@ -257,11 +257,11 @@ class Divider:
 
     def _output(self, command: DigitalOutput | AnalogOutput) -> None:
         if command.synchronised:
-            self._on_the_way(command)
+            self._within(command)
         else:
             self._stopped_for(command)
 
-    def _on_the_way(self, command: Command) -> None:
+    def _within(self, command: Command) -> None:
         self.events.append(PathEvent(self.builder.length_mm, command))
 
     def add(self, reference: Reference, *, ends_tied: bool) -> None:

@@ -252,10 +252,10 @@ class Flow:
     _do = _endif
 
     def _while(self, index: int, o_line: OLine, scanner: Scanner) -> int:
-        goes_on = self._condition(o_line, scanner)
+        continues = self._condition(o_line, scanner)
         if o_line.opener >= 0:
-            return o_line.opener + 1 if goes_on else index + 1
-        return index + 1 if goes_on else o_line.closer + 1
+            return o_line.opener + 1 if continues else index + 1
+        return index + 1 if continues else o_line.closer + 1
 
     def _endwhile(self, index: int, o_line: OLine, scanner: Scanner) -> int:
         _check_end(o_line, scanner)

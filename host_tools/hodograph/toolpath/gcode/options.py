@@ -23,7 +23,7 @@ class Options:
     g28, g30        reference points, as machine positions
     tools           offset of each tool by its number. None: every tool has offset 0, so that positions are those of
                     the tool's tip. With a table, a tool that is not in it is refused.
-    feed_mm_s       feed of moves that have none of their own, in degrees per second where axes turn alone; None:
+    feed_mm_s       feed of moves that have none of their own, in degrees per second where rotary axes move alone; None:
                     such moves are refused. What F gives is replaced by those who ask for it (job.py).
     block_delete    whether lines that begin with "/" are left out
     optional_stops  whether M1 stops; False: it is left out

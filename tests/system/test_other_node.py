@@ -10,13 +10,13 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from canopen_bench import BUSY, Hand, hand, object_bytes
-from neighbour import (
+from other_node import (
     PRE_OPERATIONAL,
     RESET_NODE,
     STOP,
-    Neighbour,
+    OtherNode,
     flood,
-    neighbour,
+    other_node,
     runs_again,
     settled,
 )
@@ -46,8 +46,8 @@ LEADS_TO = {"stop": READY, "hold": HELD, "quick-stop": OFF}
 
 
 @pytest.fixture
-def other(hub: LocalHub, clock: VirtualClock) -> Iterator[Neighbour]:
-    with neighbour(hub) as made:
+def other(hub: LocalHub, clock: VirtualClock) -> Iterator[OtherNode]:
+    with other_node(hub) as made:
         yield made
 
 
@@ -79,7 +79,7 @@ def moving(make_bench: MakeBench, alpha_at: MakeAlpha) -> Iterator[Moving]:
 
 @pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(2.4)])
 def test_setpoints_switched_off_at_a_drive(
-    moving: Moving, other: Neighbour, seconds: float
+    moving: Moving, other: OtherNode, seconds: float
 ) -> None:
     """0x1400 sub 1: it receives no setpoints any more, reports nothing, and stands still."""
     bench, path = moving(seconds)
@@ -90,7 +90,7 @@ def test_setpoints_switched_off_at_a_drive(
 
 
 def test_setpoints_from_another_node(
-    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: OtherNode
 ) -> None:
     """Some millimetres away, in between those of the controller, for 0.1 s: the recording shows them as jumps."""
     bench, path = make_bench(), str(alpha_at(20))
@@ -108,7 +108,7 @@ def test_setpoints_from_another_node(
 
 
 def test_setpoints_switched_off_at_a_drive_that_stands(
-    make_bench: MakeBench, alpha_at: MakeAlpha, other: Neighbour
+    make_bench: MakeBench, alpha_at: MakeAlpha, other: OtherNode
 ) -> None:
     """What is wrong shows in the next motion; and `reset` finds it without one."""
     bench, path = make_bench(), str(alpha_at(50))
@@ -121,7 +121,7 @@ def test_setpoints_switched_off_at_a_drive_that_stands(
 
 
 @pytest.mark.parametrize("seconds", [long(0.05), 2.0, long(2.4)])
-def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float) -> None:
+def test_a_drive_stopped_by_nmt(moving: Moving, other: OtherNode, seconds: float) -> None:
     """STOPPED, it answers no SDO: it is made pre-operational before it is asked anything."""
     bench, path = moving(seconds)
     other.nmt(STOP, DRIVE)
@@ -132,14 +132,14 @@ def test_a_drive_stopped_by_nmt(moving: Moving, other: Neighbour, seconds: float
 
 @pytest.mark.parametrize("node", [0, DRIVE])
 @pytest.mark.parametrize("command", [PRE_OPERATIONAL, RESET_NODE, long(0x82)])
-def test_nmt_to_drives_in_motion(moving: Moving, other: Neighbour, command: int, node: int) -> None:
+def test_nmt_to_drives_in_motion(moving: Moving, other: OtherNode, command: int, node: int) -> None:
     bench, path = moving(2.0)
     other.nmt(command, node)
     assert settled(bench)[0] == FAULT_STATE
     runs_again(path)
 
 
-def remap(other: Neighbour, communication: int, entries: tuple[int, ...], cob: int) -> None:
+def remap(other: OtherNode, communication: int, entries: tuple[int, ...], cob: int) -> None:
     """A PDO with another mapping, as CiA 301 prescribes it."""
     mapping = communication + 0x200
     other.write(DRIVE, communication, 1, OFF_BIT | cob, 4)
@@ -157,7 +157,7 @@ CONTROLWORD, TARGET = 0x60400010, 0x607A0020
 @pytest.mark.parametrize(
     "entries", [(POSITION, STATUSWORD), (INPUTS, STATUSWORD), (STATUSWORD, INPUTS), (STATUSWORD,)]
 )
-def test_tpdo1_mapped_otherwise(moving: Moving, other: Neighbour, entries: tuple[int, ...]) -> None:
+def test_tpdo1_mapped_otherwise(moving: Moving, other: OtherNode, entries: tuple[int, ...]) -> None:
     """What comes under its identifier is no statusword any more, or no position; the reset writes the mapping anew."""
     bench, path = moving(2.0)
     remap(other, 0x1800, entries, 0x40000180 + DRIVE)
@@ -165,7 +165,7 @@ def test_tpdo1_mapped_otherwise(moving: Moving, other: Neighbour, entries: tuple
     runs_again(path)
 
 
-def test_rpdo1_with_its_objects_swapped(moving: Moving, other: Neighbour) -> None:
+def test_rpdo1_with_its_objects_swapped(moving: Moving, other: OtherNode) -> None:
     """Target and controlword change places: what the drive takes for a controlword is half a position."""
     bench, path = moving(2.0)
     remap(other, 0x1400, (TARGET, CONTROLWORD), 0x200 + DRIVE)
@@ -173,7 +173,7 @@ def test_rpdo1_with_its_objects_swapped(moving: Moving, other: Neighbour) -> Non
     runs_again(path)
 
 
-def test_tpdo1_switched_off(moving: Moving, other: Neighbour) -> None:
+def test_tpdo1_switched_off(moving: Moving, other: OtherNode) -> None:
     bench, path = moving(2.0)
     other.write(DRIVE, 0x1800, 1, OFF_BIT | 0x40000180 + DRIVE, 4)
     assert settled(bench) == (FAULT_STATE, LOST, DRIVE)
@@ -189,7 +189,7 @@ def test_tpdo1_switched_off(moving: Moving, other: Neighbour) -> None:
     ],
 )
 def test_transmission_types_of_tpdo1(
-    moving: Moving, other: Neighbour, kind: int, outcome: tuple[int, int]
+    moving: Moving, other: OtherNode, kind: int, outcome: tuple[int, int]
 ) -> None:
     """1 is the type that it has: an answer to every SYNC. With any other type the drive is lost."""
     bench, path = moving(2.0)
@@ -202,7 +202,7 @@ def test_transmission_types_of_tpdo1(
 
 @pytest.mark.parametrize("period_ms", [0, 1001, 65535])
 def test_the_controllers_heartbeat_cannot_be_switched_off(
-    moving: Moving, other: Neighbour, period_ms: int
+    moving: Moving, other: OtherNode, period_ms: int
 ) -> None:
     """The drives watch it: they stop by themselves when it stays away for two seconds."""
     bench, _ = moving(1.0, 20.0)  # for four seconds more
@@ -212,7 +212,7 @@ def test_the_controllers_heartbeat_cannot_be_switched_off(
     assert settled(bench) == (READY, 0, 0)
 
 
-def test_another_heartbeat_with_the_number_of_a_drive(moving: Moving, other: Neighbour) -> None:
+def test_another_heartbeat_with_the_number_of_a_drive(moving: Moving, other: OtherNode) -> None:
     """Two that say they are node 2: a boot-up message of one is a restart."""
     bench, path = moving(1.0, 25.0)
     for _ in range(20):
@@ -225,7 +225,7 @@ def test_another_heartbeat_with_the_number_of_a_drive(moving: Moving, other: Nei
 
 
 def test_another_heartbeat_with_the_number_of_the_controller(
-    moving: Moving, other: Neighbour
+    moving: Moving, other: OtherNode
 ) -> None:
     bench, path = moving(1.0)
     for state in (0x00, 0x04, 0x7F, 0x05):
@@ -244,7 +244,7 @@ def asked_by_hand(other: Hand, request: bytes) -> int:
 
 
 def test_answers_to_another_client_and_frames_that_are_no_answers(
-    moving: Moving, other: Neighbour
+    moving: Moving, other: OtherNode
 ) -> None:
     """What the controller refuses another computer is no refusal of ours, and an SDO has eight bytes."""
     bench, path = moving(1.0)
@@ -364,7 +364,7 @@ def test_the_commands_to_stop_while_another_computer_goes_on_reading(
 
 @pytest.mark.parametrize("identifier", [long(0x7FF), 0x6FF])
 def test_a_bus_that_is_full_of_what_matters_less(
-    moving: Moving, other: Neighbour, identifier: int
+    moving: Moving, other: OtherNode, identifier: int
 ) -> None:
     """All that matters has right of way: the program runs to its end at a load of 100 %."""
     bench, path = moving(1.0)
@@ -376,7 +376,7 @@ def test_a_bus_that_is_full_of_what_matters_less(
 
 @pytest.mark.parametrize("seconds", [long(0.0005), 0.002, long(0.05)])
 def test_a_bus_that_is_full_of_what_matters_more(
-    moving: Moving, other: Neighbour, seconds: float
+    moving: Moving, other: OtherNode, seconds: float
 ) -> None:
     """Nothing else gets through: setpoints wait, and answers. Simulated drives wait too."""
     bench, path = moving(1.0)
@@ -388,7 +388,7 @@ def test_a_bus_that_is_full_of_what_matters_more(
 
 @pytest.mark.parametrize("phase_us", [0, long(250), long(500), long(750)])
 def test_simulated_drives_wait_from_any_instant_on(
-    moving: Moving, other: Neighbour, phase_us: int
+    moving: Moving, other: OtherNode, phase_us: int
 ) -> None:
     """Whether or not the drives have answered the SYNC whose setpoints wait."""
     bench, path = moving(1.0)
@@ -405,7 +405,7 @@ def test_simulated_drives_wait_from_any_instant_on(
 def test_a_bus_that_is_full_for_longer_than_simulated_drives_are_waited_for(
     make_bench: MakeBench,
     alpha_at: MakeAlpha,
-    other: Neighbour,
+    other: OtherNode,
     seconds: float,
     outcome: tuple[int, int],
 ) -> None:

@@ -42,7 +42,7 @@ LATE_US = 7000
 
 
 @dataclass(frozen=True)
-class Heard:
+class AxisFrames:
     """The commands to one axis and the answers of its drive, in time order; times in us."""
 
     reported_us: NDArray[np.int64]
@@ -71,7 +71,7 @@ class Heard:
         return max(int(self.reported_us[steps[-1] + 1]), after_us) if steps.size else after_us
 
 
-def heard(frames: Frames, node: int) -> Heard:
+def axis_frames(frames: Frames, node: int) -> AxisFrames:
     """The part of a recording that is about one axis."""
 
     def of(identifier: int) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
@@ -82,13 +82,13 @@ def heard(frames: Frames, node: int) -> Heard:
         return frames["time_us"][at].astype(np.int64), words, values
 
     reported_us, word, target = of(0x200)
-    return Heard(reported_us, word, target, *of(0x180))
+    return AxisFrames(reported_us, word, target, *of(0x180))
 
 
 def never_coasts(frames: Frames) -> None:
     """Asserts that no drive whose axis moves is commanded to take its power away."""
     for node in NODES:
-        axis = heard(frames, node)
+        axis = axis_frames(frames, node)
         falls = np.flatnonzero(
             (axis.word[1:] & ENABLE_VOLTAGE == 0) & (axis.word[:-1] & ENABLE_VOLTAGE != 0)
         )
@@ -147,7 +147,7 @@ def signalled(way: Way, end: signal.Signals, again_s: float | None = None) -> tu
 
 def switched_off(frames: Frames, at_us: int) -> bool:
     """Whether both drives were commanded to switch off after an instant."""
-    return all(heard(frames, node).first_us(0, at_us) is not None for node in NODES)
+    return all(axis_frames(frames, node).first_us(0, at_us) is not None for node in NODES)
 
 
 INSTANTS_S = (0.0, 0.004, 0.03, 0.111, 0.25, 0.4, 0.585, 0.64, 0.8, 1.0, 1.2, 1.27)
@@ -165,7 +165,7 @@ def test_a_signal_stops_on_the_path_within_the_bound(
     never_coasts(frames)
     assert switched_off(frames, at_us)
     for node in NODES:
-        axis = heard(frames, node)
+        axis = axis_frames(frames, node)
         assert axis.last_step_us(at_us) - at_us <= heart.stops.worst_us[0] + LATE_US
         assert axis.first_us(QUICK_STOP, at_us) is None
 
@@ -180,7 +180,7 @@ def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s
     never_coasts(frames)
     assert switched_off(frames, at_us)
     for node in NODES:
-        reported_us = heard(frames, node).first_us(QUICK_STOP, at_us)
+        reported_us = axis_frames(frames, node).first_us(QUICK_STOP, at_us)
         assert reported_us is not None
         assert reported_us - at_us <= again_s * 1e6 + LATE_US
 
@@ -212,7 +212,7 @@ def test_a_lost_host_stops_the_axes_on_the_path(
     never_coasts(frames)
     assert switched_off(frames, silent_us)
     for node in NODES:
-        axis = heard(frames, node)
+        axis = axis_frames(frames, node)
         reported_us = axis.last_step_us(silent_us) - silent_us - SILENT_MS * 1000
         assert reported_us <= heart.stops.worst_us[1] + 20_000 + LATE_US
         assert axis.first_us(QUICK_STOP, silent_us) is None

@@ -26,7 +26,7 @@ START, STOP, PRE_OPERATIONAL, RESET_NODE = 0x01, 0x02, 0x80, 0x81
 LIMIT_S = 20.0
 
 
-class Neighbour:
+class OtherNode:
     """A node that sends what it likes, in the time of the test."""
 
     def __init__(self, channel: str) -> None:
@@ -50,9 +50,9 @@ class Neighbour:
 
 
 @contextmanager
-def neighbour(hub: LocalHub) -> Iterator[Neighbour]:
+def other_node(hub: LocalHub) -> Iterator[OtherNode]:
     """A second node on the bus."""
-    made = Neighbour(hub.address.channel)
+    made = OtherNode(hub.address.channel)
     try:
         yield made
     finally:
@@ -63,7 +63,7 @@ FRAME_BITS_LEAST = 111
 """Of a frame of eight bytes, without stuff bits; at 1 Mbit/s as many microseconds."""
 
 
-def flood(other: Neighbour, identifier: int, seconds: float) -> None:
+def flood(other: OtherNode, identifier: int, seconds: float) -> None:
     """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
     for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
         other.send(identifier, b"\xaa" * 8)
