@@ -10,7 +10,7 @@ import time
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -39,7 +39,7 @@ from ..stream.chunk import BLOCK_HEAD, largest_chunk
 from ..stream.chunks import CHUNK_BYTES
 from ..stream.journal import JOURNAL_ELSEWHERE, Entry, Journal, journal_lock, load, mark
 from ..stream.output_check import require_outputs
-from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place
+from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place, PlanRests
 from ..stream.resuming import nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
@@ -211,18 +211,7 @@ def _run(
             begin = _nearest(at, job, entry, unhomed=options.unhomed)
         if continued:
             assert entry is not None
-            note(
-                f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * MM_PER_Q40)} mm of it"
-            )
-            entry = replace(
-                entry,
-                job0=job_number,
-                section=begin.section,
-                arc_q40=begin.arc_q40,
-                committed_q40=begin.arc_q40,
-                first=begin.section,
-                starts=((begin.section, 0),),
-            )
+            entry = _continued(entry, job_number, begin)
         journal = None if entry is None else Journal(journal_file(options), entry)
         close_stream(at.controller)
         most = min(largest_chunk(at.controller.read(STREAM, 7)), CHUNK_BYTES)
@@ -245,6 +234,20 @@ def _run(
         for line in plan.notes:
             note(line)
     _print(done, options)
+
+
+def _continued(entry: Entry, job_number: int, begin: Place) -> Entry:
+    """The entry of a job that continues as another job of the controller; notes where it continues."""
+    note(f"goes on in section {begin.section + 1} at {number(begin.arc_q40 * MM_PER_Q40)} mm of it")
+    return replace(
+        entry,
+        job0=job_number,
+        section=begin.section,
+        arc_q40=begin.arc_q40,
+        committed_q40=begin.arc_q40,
+        first=begin.section,
+        starts=((begin.section, 0),),
+    )
 
 
 @contextmanager
@@ -365,11 +368,65 @@ def _processes(options: Namespace) -> int:
     return int(getattr(options, "jobs", PROCESSES))
 
 
+@dataclass(frozen=True)
+class _SimulatedJob:
+    """Figures of a job that was planned and simulated.
+
+    motions      the jobs of the controller
+    rate         greatest bytes for each second of motion, over 3 s
+    """
+
+    motions: tuple[StreamedMotion, ...]
+    motion_s: float
+    took_s: float
+    rate: float
+    chunks: int
+    bytes: int
+    rests: PlanRests
+
+    def summary(self) -> dict[str, object]:
+        """The keys that tools may rely on in `stream --simulate --json`."""
+        return {
+            "duration_s": self.motion_s,
+            "wall_s": self.took_s,
+            "greatest_bytes_per_s": self.rate,
+            "chunks": self.chunks,
+            "bytes": self.bytes,
+            "rests": asdict(self.rests),
+            "job": [asdict(one) for one in self.motions],
+        }
+
+
 def _simulate(job: JobFiles, options: Namespace) -> None:
     """All chunks through the controller's core, without a bus."""
+    found = _simulated(job, options)
+    if options.json:
+        print_json(found.summary())
+        return
+    print_rows(
+        [
+            ("sections", str(sum(one.sections for one in found.motions))),
+            ("chunks", f"{found.chunks}, {size_text(found.bytes)}"),
+            (
+                "motion",
+                f"{duration_text(found.motion_s)}, planned and simulated in {duration_text(found.took_s)}",
+            ),
+            ("bytes a second", f"{number(found.rate)} at most, over 3 s"),
+            ("rests of the plan", found.rests.text),
+        ]
+    )
+    for k, one in enumerate(found.motions, 1):
+        many = f" with {one.sections} sections" if one.sections > 1 else ""
+        print(f"job {k}{many}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
+        if job.machine.outputs is not None:
+            print(f"    outputs SHA-256 {one.outputs_sha256}")
+
+
+def _simulated(job: JobFiles, options: Namespace) -> _SimulatedJob:
+    """Plans and simulates a job; prints the notes of its plan."""
     machine = job.machine
     kernel = options.kernel or machine.kernel
-    found: list[StreamedMotion] = []
+    motions: list[StreamedMotion] = []
     begin_s = time.perf_counter()
     most = largest_chunk(RING_BYTES - BLOCK_HEAD)
     with (
@@ -380,43 +437,22 @@ def _simulate(job: JobFiles, options: Namespace) -> None:
             first = next(chunks)
             moved = machine.turning if first.program.first_axis else machine
             limits = NativeLimits(**asdict(program_limits(moved)), chunk=1)
-            found.append(simulate_chunks(chain([first], chunks), limits, kernel, moved.path_counts))
-            bar(len(found))
-        motion_s, notes, rate = plan.planned_s, plan.notes, plan.greatest_rate()
-        counted = {"chunks": plan.chunks, "bytes": plan.byte_count}
-        rests = plan.rests
-    took_s = time.perf_counter() - begin_s
+            every = chain([first], chunks)
+            motions.append(simulate_chunks(every, limits, kernel, moved.path_counts))
+            bar(len(motions))
+        notes = plan.notes
+        found = _SimulatedJob(
+            tuple(motions),
+            plan.planned_s,
+            time.perf_counter() - begin_s,
+            plan.greatest_rate(),
+            plan.chunks,
+            plan.byte_count,
+            plan.rests,
+        )
     for line in notes:
         note(line)
-    if options.json:
-        print_json(
-            {
-                "duration_s": motion_s,
-                "wall_s": took_s,
-                "greatest_bytes_per_s": rate,
-                **counted,
-                "rests": asdict(rests),
-                "job": [asdict(one) for one in found],
-            }
-        )
-        return
-    print_rows(
-        [
-            ("sections", str(sum(one.sections for one in found))),
-            ("chunks", f"{counted['chunks']}, {size_text(counted['bytes'])}"),
-            (
-                "motion",
-                f"{duration_text(motion_s)}, planned and simulated in {duration_text(took_s)}",
-            ),
-            ("bytes a second", f"{number(rate)} at most, over 3 s"),
-            ("rests of the plan", rests.text),
-        ]
-    )
-    for k, one in enumerate(found, 1):
-        many = f" with {one.sections} sections" if one.sections > 1 else ""
-        print(f"job {k}{many}: {one.ticks} ticks, setpoints SHA-256 {one.setpoints_sha256}")
-        if machine.outputs is not None:
-            print(f"    outputs SHA-256 {one.outputs_sha256}")
+    return found
 
 
 COMMANDS = {"stream": stream}

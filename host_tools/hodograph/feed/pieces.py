@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 from math import comb
 
 import numpy as np
@@ -96,6 +96,10 @@ class FeedPieces:
         """Duration of the program, exactly."""
         return int(self.duration_q32_s.sum(dtype=np.int64))
 
+    def part(self, taken: slice) -> FeedPieces:
+        """Some consecutive pieces."""
+        return FeedPieces(*(getattr(self, one.name)[taken] for one in fields(self)))
+
     def slower_zones(self, chosen: Bool, share: float, length_q40: int) -> list[FeedZone]:
         """Feed zones over the chosen (M,) pieces of a path of this length. Each has a share, below 1, of the mean feed
         of its piece, but LEAST_FEED_MM_S at least. Pieces that are no faster than that, or have no length, have none.
@@ -108,6 +112,12 @@ class FeedPieces:
             FeedZone(float(ends_mm[k]), float(ends_mm[k + 1]), float(slower[k]))
             for k in np.flatnonzero(chosen & faster)
         ]
+
+
+def joined_pieces(parts: Sequence[FeedPieces]) -> FeedPieces:
+    """Pieces one after the other."""
+    columns = ([getattr(part, one.name) for part in parts] for one in fields(FeedPieces))
+    return FeedPieces(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field, replace
-from itertools import tee
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from ..config import Machine
 from ..errors import PlanError
 from ..events import EVENT
 from ..feed import FeedZone
-from ..feed.pieces import FeedPieces
+from ..feed.pieces import FeedPieces, joined_pieces
 from ..fixed_point import nearest_q40
 from ..machine_limits import program_limits, stop_terms
 from ..native.program import NativeFault, NativeLimits, NativeProgram
@@ -27,15 +26,14 @@ from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
 from ..program.stops import DECELERATION, no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
+from .tails import Tails
 from .windows import (
     JOINTS,
     SectionFeed,
     Spacing,
     Stretch,
     Window,
-    chained,
     last_s,
-    taken,
 )
 
 Codes = NDArray[np.uint8]
@@ -151,7 +149,7 @@ class _Kept:
     def with_new(self, pieces: FeedPieces, codes: Codes) -> _Kept:
         """These pieces and new ones after them."""
         old = [] if self.pieces is None else [self.pieces]
-        return _Kept(chained([*old, pieces]), np.concatenate((self.codes, codes)))
+        return _Kept(joined_pieces([*old, pieces]), np.concatenate((self.codes, codes)))
 
     def repeated(self, least: int) -> tuple[_Kept, int, int]:
         """The pieces that the next chunk repeats: about `least` of them, more where LATENESS_S and SHARED_S need it,
@@ -165,7 +163,7 @@ class _Kept:
         looked = min(max(looked, times[-1] - round(RAMP_S * 2**32)), fewest)
         late = min(looked - round(LATENESS_S * 2**32), times[-1] - round(SHARED_S * 2**32))
         shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
-        kept = _Kept(taken(self.pieces, slice(shift, None)), self.codes[shift:])
+        kept = _Kept(self.pieces.part(slice(shift, None)), self.codes[shift:])
         return kept, shift, int(times[shift])
 
 
@@ -183,26 +181,41 @@ class _RefusedPartError(PlanError):
     """The controller would refuse each chunk with the next part of the path."""
 
 
-class _Tails:
-    """Tails of a window, each planned once."""
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A chunk that was tried.
 
-    def __init__(self, feed: SectionFeed, window: Window) -> None:
-        self._feed, self.window = feed, window
-        self._made: dict[int, Iterator[Stretch]] = {}
-        self._refused: list[Stretch] = []
+    fault             why the controller would refuse it; None: it accepts it
+    used              number of joints that it uses
+    repeated          the pieces that it repeats of its predecessor
+    piece_shift       number of pieces before these, and `time_shift_q32_s` their time
+    kept_bytes        its size without the tail
+    new_q32_s         time of its new pieces
+    """
 
-    def after(self, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """The tails of SectionFeed.tails that are not refused. The first call for a joint sets `least_q40`."""
-        made = self._made.get(joint) or self._feed.tails(self.window, joint, least_q40)
-        self._made[joint], own = tee(made)
-        return (tail for tail in own if not any(tail is one for one in self._refused))
+    program: Program
+    fault: NativeFault | None
+    used: int
+    repeated: _Kept
+    piece_shift: int
+    time_shift_q32_s: int
+    kept_bytes: int
+    new_q32_s: int
 
-    def refuse(self, tail: Stretch) -> None:
-        """Excludes a tail whose motion the controller would refuse. The remainder of the window is never excluded: no
-        other tail follows it.
-        """
-        if tail.end_q40 != self.window.stretch.end_q40:
-            self._refused.append(tail)
+
+def _require_accepted(fault: NativeFault | None, line: int) -> None:
+    """Raises PlanError: the controller would refuse a chunk for this fault."""
+    if fault is None:
+        return
+    if fault.code == ProgramError.EVENT_DENSE:
+        raise PlanError(
+            f"line {line}: more than 16 outputs switch within the distance of a tick at 200 %: "
+            "lower the feed there, or switch fewer outputs at one place"
+        )
+    raise _RefusedPartError(
+        f"line {line}: the controller would refuse this part: {fault.text} "
+        f"(code {fault.code}): lower the feed there, and please report this file"
+    )
 
 
 class SectionChunks:
@@ -297,7 +310,7 @@ class SectionChunks:
         self._rested_s += last.tail.total_q32_s * 2.0**-32
         self.rest_lines.append(path.line_at(last.end_q40))
         self._kept = self._kept.with_new(last.tail, last.tail_codes)
-        self._last = replace(last, tail=taken(last.tail, slice(0, 0)))
+        self._last = replace(last, tail=last.tail.part(slice(0, 0)))
         self._feed.rest_at(last.end_q40, last_s(last.tail, len(last.tail)))
         return True
 
@@ -305,54 +318,65 @@ class SectionChunks:
         """The chunk whose new pieces go from knot `first` to the last of these joints for which there is room, and the
         number of joints that it uses. Raises PlanError.
         """
-        searched, before, tails = self._searched_in(window), self._kept, _Tails(self._feed, window)
-        program, fault = None, None
+        tried = self._largest(window, first, joints)
+        program, joint = tried.program, joints[tried.used - 1]
+        header = self._header(window, joint, program)
+        if self._last is not None and header.rest is None:
+            # At least one piece of the predecessor is after the joint (docs/reference/protocol.md 1.7).
+            shared = min(len(tried.repeated.codes), self._last.pieces - tried.piece_shift - 1)
+            header = replace(
+                header,
+                piece_shift=tried.piece_shift,
+                time_shift_q32_s=tried.time_shift_q32_s,
+                shared_pieces=shared,
+            )
+        self._require_room(program, header.line)
+        _require_accepted(tried.fault, header.line)
+        self._last = self._made(header, program)
+        self._tail_bytes = program.image_size + HEADER_SIZE - tried.kept_bytes
+        joint_q40 = window.joint_q40(joint)
+        line = self._feed.path.line_at(joint_q40)
+        new_s, self._rested_s = self._rested_s + tried.new_q32_s * 2.0**-32, 0.0
+        return PlannedChunk(
+            Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
+        ), tried.used
+
+    def _largest(self, window: Window, first: int, joints: list[int]) -> _Tried:
+        """The chunk with the most of these joints that fits and that the controller accepts; if there is none, the last
+        one tried. `self._kept` has its pieces then.
+        """
+        searched, before, tails = self._searched_in(window), self._kept, Tails(self._feed, window)
+        tried = None
         for used, least in [
             *((count, LEAST_SHARED_PIECES) for count in range(len(joints), 0, -1)),
             (1, FEWEST_SHARED_PIECES),
         ]:
-            kept, piece_shift, time_shift = before.repeated(least)
+            repeated, piece_shift, time_shift = before.repeated(least)
             joint, new = joints[used - 1], slice(first, joints[used - 1])
-            pieces = taken(window.stretch.pieces, new)
-            self._kept = kept.with_new(pieces, searched.codes[new])
+            pieces = window.stretch.pieces.part(new)
+            self._kept = repeated.with_new(pieces, searched.codes[new])
             kept_bytes = self._size_kept(window, joint)
             if used > 1 and kept_bytes + _TAIL_SHARE * self._tail_bytes > self._most:
                 continue
-            program, fault = self._with_tail(tails, joint, None)
-            for thorough in (False, True):
-                if fault is None or fault.code != ProgramError.STOP_LONG:
-                    break
-                self._search_kept(window, joint, fault.index if thorough else None)
-                program, fault = self._with_tail(tails, joint, thorough)
+            program, fault = self._with_stops(tails, joint)
+            new_q32_s = pieces.total_q32_s
+            tried = _Tried(
+                program, fault, used, repeated, piece_shift, time_shift, kept_bytes, new_q32_s
+            )
             if fault is None and program.image_size + HEADER_SIZE <= self._most:
                 break
-        assert program is not None
-        header = self._header(window, joint, program)
-        if self._last is not None and header.rest is None:
-            # At least one piece of the predecessor is after the joint (docs/reference/protocol.md 1.7).
-            shared = min(len(kept.codes), self._last.pieces - piece_shift - 1)
-            header = replace(
-                header, piece_shift=piece_shift, time_shift_q32_s=time_shift, shared_pieces=shared
-            )
-        self._require_room(program, header.line)
-        if fault is not None and fault.code == ProgramError.EVENT_DENSE:
-            raise PlanError(
-                f"line {header.line}: more than 16 outputs switch within the distance of a tick at 200 %: "
-                "lower the feed there, or switch fewer outputs at one place"
-            )
-        if fault is not None:
-            raise _RefusedPartError(
-                f"line {header.line}: the controller would refuse this part: {fault.text} "
-                f"(code {fault.code}): lower the feed there, and please report this file"
-            )
-        self._last = self._made(header, program)
-        self._tail_bytes = program.image_size + HEADER_SIZE - kept_bytes
-        joint_q40 = window.joint_q40(joint)
-        line = self._feed.path.line_at(joint_q40)
-        new_s, self._rested_s = self._rested_s + pieces.total_q32_s * 2.0**-32, 0.0
-        return PlannedChunk(
-            Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
-        ), used
+        assert tried is not None
+        return tried
+
+    def _with_stops(self, tails: Tails, joint: int) -> tuple[Program, NativeFault | None]:
+        """`_with_tail`; where fault stops would be late, with more stop parameters."""
+        program, fault = self._with_tail(tails, joint, None)
+        for thorough in (False, True):
+            if fault is None or fault.code != ProgramError.STOP_LONG:
+                break
+            self._search_kept(tails.window, joint, fault.index if thorough else None)
+            program, fault = self._with_tail(tails, joint, thorough)
+        return program, fault
 
     @property
     def end(self) -> JobPlace:
@@ -429,14 +453,14 @@ class SectionChunks:
         end_q40 = header.job_start_q40 + program.length_q40
         end = first + program.segment_count
         tail = slice(len(self._kept.codes), None)
-        pieces = taken(program.pieces, tail)
+        pieces = program.pieces.part(tail)
         pieces = replace(pieces, start_q40=pieces.start_q40 + header.job_start_q40)
         return _Made(
             header, first, end, end_q40, program.piece_count, pieces, program.stops.codes[tail]
         )
 
     def _with_tail(
-        self, tails: _Tails, joint: int, thorough: bool | None
+        self, tails: Tails, joint: int, thorough: bool | None
     ) -> tuple[Program, NativeFault | None]:
         """The program of the kept pieces with the first tail that the controller accepts; if it accepts none, with the
         last one tried and its fault.
@@ -451,7 +475,7 @@ class SectionChunks:
             return program, self._fault(program)
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in tails.after(joint, least_q40):
-            whole = Stretch(chained([kept, tail.pieces]), tail.end_q40)
+            whole = Stretch(joined_pieces([kept, tail.pieces]), tail.end_q40)
             own = self._tail_codes(window, tail, thorough)
             program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
@@ -555,8 +579,8 @@ class SectionChunks:
         """
         kept, codes = self._kept.pieces, self._kept.codes
         assert kept is not None
-        rest = taken(window.stretch.pieces, slice(joint, None))
-        whole = Stretch(chained([kept, rest]), window.stretch.end_q40)
+        rest = window.stretch.pieces.part(slice(joint, None))
+        whole = Stretch(joined_pieces([kept, rest]), window.stretch.end_q40)
         count = _kinds(codes)
         wanted = count < codes.shape[1] if late is None else np.arange(len(codes)) >= late
         mask = np.concatenate((wanted, np.zeros(len(rest), dtype=np.bool_)))

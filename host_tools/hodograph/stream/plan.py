@@ -8,7 +8,7 @@ from __future__ import annotations
 import threading
 from array import array
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -332,58 +332,81 @@ class JobPlan:
         return self._ending or self._store.waiting < waiting
 
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
+        """The chunks of all files, with their sections and their new motion in s."""
         number = 0
         for file in self._job.files:
-            if not is_toolpath(file):
-                carried, self.after = self.after, ()
+            carried, self.after = self.after, ()
+            if is_toolpath(file):
+                number = yield from self._toolpath(file, number, carried)
+                if self._ending:
+                    return
+            else:
                 yield from self._paths(file, number, carried)
                 number += len(load_paths(file))
-                continue
-            place: JobPlace | None = None
-            first = number
-            reader = self._reader(file)
-            carried, switched = self.after, SwitchedOutputs()
-            for section in reader.sections():
-                begin_q40 = self._begin.arc_q40 if number == self._begin.section else 0
-                blocks = blocks_from(section.blocks, begin_q40 * MM_PER_Q40, switched)
-                block = next(blocks, None) if number >= self._begin.section else None
-                if block is not None:
-                    before = () if begin_q40 else (*carried, *section.before)
-                    made = PlannedSection(
-                        number, file, section.first_line, before, standing_mm=section.standing_mm
-                    )
-                    if place is None:
-                        first = number
-                        block = begun_with(block, switched.begin())
-                    else:
-                        place = replace(place, rest=rest_of(before, stops=self.stops))
-                        made = replace(made, start_q40=place.arc_q40, rest=place.rest)
-                    chunks = SectionChunks(
-                        section.machine,
-                        file.stem,
-                        switching(chain([block], blocks), switched),
-                        self._number + first,
-                        self._allowed(),
-                        begin_q40,
-                        place,
-                        partial(self._continues, section),
-                    )
-                    last, counted = False, 0
-                    for planned in chunks.chunks():
-                        for line in chunks.rest_lines[counted:]:
-                            self.rests = self.rests.plus(file, line)
-                        counted = len(chunks.rest_lines)
-                        last = planned.chunk.header.last
-                        yield made, planned.chunk, planned.new_s
-                    place = None if last else chunks.end
+
+    def _toolpath(
+        self, file: Path, number: int, carried: tuple[Command, ...]
+    ) -> Generator[tuple[PlannedSection, Chunk, float], None, int]:
+        """The chunks of a toolpath, the first section of which is `number`. Returns the number after the last.
+
+        carried  commands at rest before its first section, from the file before
+        """
+        place: JobPlace | None = None
+        first = number
+        reader, switched = self._reader(file), SwitchedOutputs()
+        for section in reader.sections():
+            begin_q40 = self._begin.arc_q40 if number == self._begin.section else 0
+            blocks = blocks_from(section.blocks, begin_q40 * MM_PER_Q40, switched)
+            block = next(blocks, None) if number >= self._begin.section else None
+            if block is not None:
+                before = () if begin_q40 else (*carried, *section.before)
+                made = PlannedSection(
+                    number, file, section.first_line, before, standing_mm=section.standing_mm
+                )
+                if place is None:
+                    first = number
+                    block = begun_with(block, switched.begin())
                 else:
-                    for block in section.blocks:
-                        switched.act(block.events)
-                        if self._ending:
-                            return
-                carried = ()
-                number += 1
-            self.after = reader.after
+                    place = replace(place, rest=rest_of(before, stops=self.stops))
+                    made = replace(made, start_q40=place.arc_q40, rest=place.rest)
+                chunks = SectionChunks(
+                    section.machine,
+                    file.stem,
+                    switching(chain([block], blocks), switched),
+                    self._number + first,
+                    self._allowed(),
+                    begin_q40,
+                    place,
+                    partial(self._continues, section),
+                )
+                place = yield from self._chunks_of(made, chunks)
+            elif not self._skip(section, switched):
+                return number
+            carried = ()
+            number += 1
+        self.after = reader.after
+        return number
+
+    def _chunks_of(
+        self, section: PlannedSection, chunks: SectionChunks
+    ) -> Generator[tuple[PlannedSection, Chunk, float], None, JobPlace | None]:
+        """The chunks of a section. Returns the place of the next section in the same job; None: the job ends."""
+        last, counted = False, 0
+        for planned in chunks.chunks():
+            for line in chunks.rest_lines[counted:]:
+                self.rests = self.rests.plus(section.file, line)
+            counted = len(chunks.rest_lines)
+            last = planned.chunk.header.last
+            yield section, planned.chunk, planned.new_s
+        return None if last else chunks.end
+
+    def _skip(self, section: StreamSection, switched: SwitchedOutputs) -> bool:
+        """Reads the remainder of a section that is not planned, whose events are applied. False: the plan is closed."""
+        for block in section.blocks:
+            switched.act(block.events)
+            if self._ending:
+                return False
+        return True
 
     def _reader(self, file: Path) -> StreamReader | ParallelReader:
         job = self._job

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RunError
-from ..feed.pieces import FeedPieces
+from ..feed.pieces import FeedPieces, joined_pieces
 from ..native.feed_override import State
 from ..native.program import Counts, NativeLimits, counts_from_q40_mm
 from ..native.stream import OfflineStream
@@ -19,7 +19,6 @@ from ..program.image import Program
 from ..program.stop_planning import with_bounds
 from ..program.stops import no_stops
 from .chunk import Chunk
-from .windows import chained, taken
 
 _SLICE_TICKS = 50
 """Less than a takeover may be late (LATENESS_S), at the shortest period."""
@@ -116,7 +115,7 @@ class Concatenation:
             self._base_q40 = header.job_start_q40
         begin_q40 = header.job_start_q40 - self._base_q40
         new = slice(header.shared_pieces, next_shared_end)
-        part = taken(own.pieces, new)
+        part = own.pieces.part(new)
         self._pieces.append(replace(part, start_q40=part.start_q40 + begin_q40))
         self._codes.append(own.stops.codes[new])
         fresh = slice(header.shared_segments, None)
@@ -135,7 +134,7 @@ class Concatenation:
         assert self._before is not None
         assert self._base_q40 is not None
         chunk, own = self._before
-        pieces = chained(self._pieces)
+        pieces = joined_pieces(self._pieces)
         codes = np.concatenate(self._codes)
         whole = replace(
             own,

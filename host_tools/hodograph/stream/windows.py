@@ -22,18 +22,17 @@ from ..events import EVENT
 from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
 from ..feed.limits import Plants
-from ..feed.optimal.brake import brake_to_rest
 from ..feed.optimal.feasible import check_feasible, within_reach
 from ..feed.optimal.knots import first_estimate
 from ..feed.optimal.plan_limits import PlanLimits, gather
 from ..feed.optimal.sequence import kept, measured, stopping_s, trusted_to
-from ..feed.optimal.track import Ends, Track, ends_of, make_track, piece_usage
+from ..feed.optimal.track import Ends, Track, ends_of, make_track
 from ..feed.optimal.window import Effort, Solution, State, plan_window, tightened
 from ..feed.override import with_override
 from ..feed.pieces import FeedPieces, RawPieces, round_pieces
 from ..feed.plan import FeedCurve
 from ..feed.request import LONGEST_S, OPTIMAL
-from ..fixed_point import MM_PER_Q40, to_q40
+from ..fixed_point import to_q40
 from ..machine_limits import axis_limits, controller_limits, plants
 from ..program.image import COMPACT_PIECE_BYTES, segment_size
 from .geometry import Block, StreamPath
@@ -63,32 +62,17 @@ _EASED = (1e-3, 1e-2)
 otherwise.
 """
 
-_BRAKE_DISTANCES = (1.1, 1.2, 1.3, 1.4, 1.5)
-"""Distances of brakes without a quadratic program, which are tried first, as multiples of the least braking
-distance.
-"""
-
-_TAIL_DISTANCES = (1.15, 1.5, 2.2, 3.3, 1.3, 1.85, 2.7)
-"""Distances of tails in the order in which they are tried, as multiples of the least braking distance."""
-
 _EFFORT = Effort(gain=1e-3, patience=9, tolerance=1e-5, spacing=2.0, fewest=24)
 """Effort of windows, less than that of other plans. Feeds a little below their limits leave brakes more places to
 begin. Half as many pieces take half of the bytes and cost 0.1 to 0.2 % of the time of the motion.
 """
 
-_TAIL_EFFORT = replace(_EFFORT, spacing=3.0, fewest=6)
+TAIL_EFFORT = replace(_EFFORT, spacing=3.0, fewest=6)
 """Effort of tails, which need not be the fastest, and of windows that have to take few bytes."""
 
 _LOWERED = (1.01, 1.01, 1.02, 1.04, 1.08)
 """Factors by which the limits of an interval that the controller would refuse are lowered, one after the other."""
 
-_TAIL_LOWERED = (1.04, 1.04)
-"""The same of a tail, which need not be the fastest."""
-
-_TAIL_EXCESS = 1.0075
-"""Greatest limit usage of a tail, of the limits less RESERVE; the controller's check decides whether the tail is
-accepted.
-"""
 _DRIFT_Q40 = 1024
 _SAME_MM = 1e-9
 
@@ -180,11 +164,11 @@ class SectionFeed:
         self._effort = replace(
             _EFFORT,
             fewest=int(
-                np.clip(joint.bytes // COMPACT_PIECE_BYTES, _TAIL_EFFORT.fewest, _EFFORT.fewest)
+                np.clip(joint.bytes // COMPACT_PIECE_BYTES, TAIL_EFFORT.fewest, _EFFORT.fewest)
             ),
         )
         self._exceeded = exceeded
-        self._period_s = 1e-6 * machine.period_us
+        self.period_s = 1e-6 * machine.period_us
         self._estimated: tuple[tuple[int, int], _Estimate] | None = None
         self._held: Solution | None = None
         self._last: Window | None = None
@@ -281,7 +265,7 @@ class SectionFeed:
         found = self._solved(limits, high, stop_s)
         if found is None:
             return self._to_rest(limits, given)
-        made, bad = self._lowered(
+        made, bad = self.lowered(
             found,
             lambda one: self._window(one, limits, given, high, stop_s),
             lambda window: (window.stretch, window.count),
@@ -290,7 +274,7 @@ class SectionFeed:
             return self._to_rest(limits, given)
         return made
 
-    def _lowered(
+    def lowered(
         self,
         found: Solution,
         made: Callable[[Solution], _Made],
@@ -329,12 +313,12 @@ class SectionFeed:
         joints = self._joints(found, count)
         marks = found.grid.s[list(joints)]
         track = make_track(
-            _begun(ends_of(found, found.grid.size), self._moving),
+            begun(ends_of(found, found.grid.size), self._moving),
             1.0,
             np.concatenate((self.path.curve.segment_starts_mm, marks)),
         )
         plan = self._plan(given, track)
-        stretch = self._stretch(track, plan, self._low_q40)
+        stretch = self.stretch(track, plan, self._low_q40)
         end_mm = float(found.grid.s[count])
         return Window(found, limits, plan, stretch, count, joints, rests, end_mm)
 
@@ -346,7 +330,7 @@ class SectionFeed:
         assert last is not None
         assert held is not None
         first = last.first + last.count
-        pieces = taken(last.stretch.pieces, slice(last.count, None))
+        pieces = last.stretch.pieces.part(slice(last.count, None))
         stretch, count = Stretch(pieces, last.stretch.end_q40), len(pieces)
         return Window(
             held,
@@ -389,7 +373,7 @@ class SectionFeed:
         if length - self._low_mm < 1e-6:
             return _Estimate(np.array([self._low_mm, length]), np.zeros(2), 0.0)
         q = None if moving is None else moving.q
-        found = first_estimate(curve, limits, self._low_mm, length, q, self._period_s)
+        found = first_estimate(curve, limits, self._low_mm, length, q, self.period_s)
         return _Estimate(found.s, found.t, stopping_s(limits, float(np.sqrt(found.q.max()))))
 
     def _ahead_s(self) -> float:
@@ -436,10 +420,10 @@ class SectionFeed:
             # Without zones: there are many of them, and none is below the least feed.
             check_feasible(curve, replace(limits, zones=()), LONGEST_S)
             limits = within_reach(curve, limits)
-        limits = replace(limits, zones=_touched(limits.zones, low, high))
+        limits = replace(limits, zones=touched(limits.zones, low, high))
         known_to = 0.0 if held is None else trusted_to(held, stop_s)
         for share in (0.0, *_EASED):
-            tried = limits if share == 0.0 else limits.eased(max(self._period_s, share * stop_s))
+            tried = limits if share == 0.0 else limits.eased(max(self.period_s, share * stop_s))
             with suppress(FloatingPointError):
                 found = plan_window(
                     curve,
@@ -447,11 +431,11 @@ class SectionFeed:
                     low,
                     high,
                     moving,
-                    self._period_s,
+                    self.period_s,
                     held,
                     known_to,
                     before_s=self._before_s,
-                    effort=self._effort if self._rest_mm is None else _TAIL_EFFORT,
+                    effort=self._effort if self._rest_mm is None else TAIL_EFFORT,
                 )
                 if found is not None:
                     return measured(curve, found)
@@ -478,7 +462,7 @@ class SectionFeed:
         inner = [int(k) for k in np.unique(at) if 2 < k < count - 2]
         return (*inner, count)
 
-    def _stretch(self, track: Track, plan: FeedPlan, start_q40: int) -> Stretch:
+    def stretch(self, track: Track, plan: FeedPlan, start_q40: int) -> Stretch:
         """The feed pieces of a track that begins at an arc length of the section."""
         path = self.path
         base = int(path.start_q40[0])
@@ -492,89 +476,11 @@ class SectionFeed:
         starts[0] = start_q40 - base
         c = round_pieces(track.t_q32, starts, track.shape)
         raw = RawPieces(np.diff(track.t_q32), starts[:-1], c, 0.0, 0.0)
-        zones = _touched(plan.limits.zones, float(track.s[0]), float(track.s[-1]))
+        zones = touched(plan.limits.zones, float(track.s[0]), float(track.s[-1]))
         limits = replace(plan.limits, zones=zones)
         paths = [replace(one, limits=replace(one.limits, zones=zones)) for one in plan.paths]
         own = with_override(raw, plan.controller, limits, paths)
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
-
-    def tails(self, window: Window, joint: int, least_q40: int) -> Iterator[Stretch]:
-        """Tails from a joint of a window to rest. Each ends at an end of a segment, at arc length `least_q40` of the
-        section or later. First comes the shortest brake that keeps the limits, if any. For each distance in
-        _TAIL_DISTANCES a planned tail follows, and the same with lower limits where the controller would refuse it. The
-        last one is the remainder of the window.
-        """
-        found, curve = window.solution, self.path.curve
-        knot = window.first + joint
-        low = float(found.grid.s[knot])
-        state = State(float(found.q[knot]), float(found.slope[knot]))
-        least = (least_q40 - int(self.path.start_q40[0])) * MM_PER_Q40
-        ends = curve.segment_starts_mm
-        yield from self._brakes(window, joint, state, low, least)
-        before_s = last_s(window.stretch.pieces, joint)
-        for high in self._tail_ends(_TAIL_DISTANCES, window, state, low, least):
-            limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
-            one = plan_window(
-                curve,
-                limits,
-                low,
-                high,
-                state,
-                self._period_s,
-                hurried=True,
-                before_s=before_s,
-                effort=_TAIL_EFFORT,
-            )
-            one = None if one is None else measured(curve, one)
-            if one is None or one.excess > _TAIL_EXCESS - 1.0:
-                continue
-            begin_q40 = window.joint_q40(joint)
-
-            def made(found: Solution) -> Stretch:
-                own = _begun(ends_of(found, found.grid.size), state)
-                return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
-
-            yield made(one)
-            yield self._lowered(one, made, _whole, _TAIL_LOWERED)[0]
-        pieces = taken(window.stretch.pieces, slice(joint, None))
-        yield Stretch(pieces, window.stretch.end_q40)
-
-    def _brakes(
-        self, window: Window, joint: int, state: State, low: float, least: float
-    ) -> Iterator[Stretch]:
-        """The shortest brake to rest, over the distances in _BRAKE_DISTANCES, that keeps the limits of a window; empty:
-        none does.
-        """
-        curve = self.path.curve
-        for high in self._tail_ends(_BRAKE_DISTANCES, window, state, low, least):
-            brake = brake_to_rest(state, low, high, self._period_s)
-            if brake is None:
-                continue
-            limits = replace(window.limits, zones=_touched(window.limits.zones, low, high))
-            track = make_track(brake, 1.0, curve.segment_starts_mm)
-            if piece_usage(curve, limits, track).max() <= 1.0:
-                yield self._stretch(track, window.plan, window.joint_q40(joint))
-                return
-
-    def _tail_ends(
-        self, distances: Sequence[float], window: Window, state: State, low: float, least: float
-    ) -> Iterator[float]:
-        """The first ends of segments within a window at each of these distances from `low` or later, and not before
-        `least`.
-        """
-        ends, tried = self.path.curve.segment_starts_mm, set[int]()
-        for distance in distances:
-            wanted = max(low + distance * _braking_mm(state, window.limits), least - 1e-6)
-            at = int(np.searchsorted(ends, wanted))
-            if at in tried or at >= ends.size or ends[at] >= window.solution.grid.s[-1]:
-                continue
-            tried.add(at)
-            yield float(ends[at])
-
-
-def _whole(stretch: Stretch) -> tuple[Stretch, int]:
-    """A stretch all of whose pieces are kept."""
-    return stretch, len(stretch.pieces)
 
 
 def last_s(pieces: FeedPieces, count: int) -> float:
@@ -582,47 +488,16 @@ def last_s(pieces: FeedPieces, count: int) -> float:
     return float(pieces.duration_q32_s[count - 1]) * 2.0**-32
 
 
-def _touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:
+def touched(zones: tuple[FeedZone, ...], low: float, high: float) -> tuple[FeedZone, ...]:
     """The zones that meet an interval of arc length."""
     return tuple(zone for zone in zones if zone.from_mm <= high and zone.to_mm >= low)
 
 
-def _begun(ends: Ends, state: State | None) -> Ends:
+def begun(ends: Ends, state: State | None) -> Ends:
     """The ends, begun in exactly this state; None: at rest."""
     if state is not None:
         ends.feed[0], ends.acceleration[0] = np.sqrt(state.q), 0.5 * state.slope
     return ends
-
-
-def _braking_mm(state: State, limits: PlanLimits) -> float:
-    """Estimate of the least braking distance."""
-    feed = state.q**0.5
-    pull = min(0.7 * limits.least_acceleration, (limits.least_jerk * feed) ** 0.5)
-    lead_s = max(0.5 * state.slope, 0.0) / limits.least_jerk
-    peak = feed + 0.25 * state.slope * lead_s if state.slope > 0.0 else feed
-    return float(peak * (lead_s + 0.5 * (peak / pull + pull / limits.least_jerk)))
-
-
-def taken(pieces: FeedPieces, part: slice) -> FeedPieces:
-    """A part of the pieces."""
-    return FeedPieces(
-        pieces.duration_q32_s[part],
-        pieces.start_q40[part],
-        pieces.c_q40[part],
-        pieces.override_factor_q14[part],
-        pieces.override_rate_codes[part],
-        pieces.override_second_codes[part],
-    )
-
-
-def chained(parts: list[FeedPieces]) -> FeedPieces:
-    """Pieces one after the other."""
-    return FeedPieces(
-        *(
-            np.concatenate([getattr(one, name) for one in parts])
-            for name in FeedPieces.__dataclass_fields__
-        )
-    )
 
 
 def _shifted(found: Solution, passed_mm: float) -> Solution:
