@@ -148,14 +148,8 @@ def run_job(
         place = f"{job.file}:{section.first_line}: section {number} of {len(job.sections)}"
         # No move, unless an operator moved the axes during the stop.
         _to_start(at, section, made, program, unhomed)
-        done = passed
-        recorded = record_program(
-            at,
-            job.machine,
-            program.image,
-            None if progress is None else _shifted(progress, done),
-            unhomed=unhomed,
-        )
+        own = None if progress is None else _shifted(progress, passed)
+        recorded = record_program(at, job.machine, program.image, own, unhomed=unhomed)
         _require_end(at, section, made, program, place)
         passed += program.ticks
         report_messages(at, job.file, [command for _, command in section.events])

@@ -20,7 +20,7 @@ from ..spline.frames import Curve, frames
 from ..spline.spatial import SpatialPHSpline
 from .check import LEAST_FEED_MM_S, Fault, boxes_q40, brief_pairs, check
 from .codes import ProgramError
-from .geometry import quantise
+from .geometry import Geometry, quantise
 from .image import NAME_SIZE, Program, ProgramLimits
 from .stop_planning import StopTerms, plan_stops
 from .stops import no_stops
@@ -85,26 +85,43 @@ def compile_path(
 ) -> Compilation:
     """Compiles `plan` along `spline`, shifted by the work offset into machine coordinates.
 
-    Under policy "respect" the feed is lowered, by `replan`, where two consecutive segments would pass within one tick
-    at 200 %. Raises InputError (period, offset) and PlanError (travel left, segments too short, a fault stop longer
-    than it may be, and whatever `check` finds).
+    Under policy "respect" the feed is lowered, by `replan`, where a tick at 200 % would cross two consecutive segments.
+    Raises InputError (period, offset) and PlanError (the path leaves the travel, segments are too short, a fault stop
+    is too long, or `check` finds another fault).
     """
-    name, offset_mm, period_us = options.name, options.offset_mm, options.period_us
+    period_us = options.period_us
     if period_us is not None and period_us != plan.period_us:
         raise InputError(
             f"period_us {period_us} differs from the plan's {plan.period_us}: plan again"
         )
-    if len(name.encode()) > NAME_SIZE:
-        name = name.encode()[:NAME_SIZE].decode(errors="ignore")
-    geometry = quantise(spline, offset_mm)
+    geometry = quantise(spline, options.offset_mm)
     length_q40 = int(geometry.start_q40[-1])
     if abs(length_q40 * MM_PER_Q40 - plan.length_mm) > 1e-6:
         raise InputError(
             f"the plan is for {plan.length_mm:.9g} mm, the path has {length_q40 * MM_PER_Q40:.9g} mm"
         )
     plan, pieces = _fit_feed(plan, geometry.start_q40, spline, replan)
-    program = Program(
-        name=name,
+    program = _program(spline, geometry, plan, pieces, options)
+    _require_override_headroom(program, spline)
+    program = plan_stops(program, plan, options.stops)
+    fault = check(program, options.limits)
+    if fault is not None:
+        raise PlanError(_advice(fault, program, options.limits, spline, plan.limits.names))
+    return Compilation(program, plan, plan.notes, geometry.drift_mm)
+
+
+def _program(
+    spline: PHSpline | SpatialPHSpline,
+    geometry: Geometry,
+    plan: FeedPlan,
+    pieces: FeedPieces,
+    options: ProgramOptions,
+) -> Program:
+    """The program without stops. A name that is too long is cut."""
+    name, offset_mm = options.name.encode()[:NAME_SIZE], options.offset_mm
+    length_q40 = int(geometry.start_q40[-1])
+    return Program(
+        name=name.decode(errors="ignore"),
         period_us=plan.period_us,
         closed=spline.closed,
         duration_q32_s=pieces.total_q32_s,
@@ -122,12 +139,6 @@ def compile_path(
         events=_on_path(options.events, length_q40),
         first_axis=options.first_axis,
     )
-    _require_override_headroom(program, spline)
-    program = plan_stops(program, plan, options.stops)
-    fault = check(program, options.limits)
-    if fault is not None:
-        raise PlanError(_advice(fault, program, options.limits, spline, plan.limits.names))
-    return Compilation(program, plan, plan.notes, geometry.drift_mm)
 
 
 def _require_override_headroom(program: Program, spline: Curve) -> None:

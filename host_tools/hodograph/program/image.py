@@ -175,8 +175,8 @@ class Program:
 
 
 def encode(program: Program) -> bytes:
-    """The image. Writes what it is given, right or wrong (`check` judges); raises InputError for
-    values that the fields cannot hold.
+    """The image. Numbers are written as they are, right or wrong (`check` judges them). Raises InputError: a field
+    cannot hold its value.
     """
     layout, own = program._layout, program.pieces
     pieces = np.zeros(program.piece_count, dtype=layout.piece)
@@ -190,13 +190,18 @@ def encode(program: Program) -> bytes:
     _put(stops["bound_us"], program.stops.bound_us)
     segments = _segments(program)
     body = segments.tobytes() + pieces.tobytes() + stops.tobytes() + program.events.tobytes()
+    return with_crc(_header(program) + body)
+
+
+def _header(program: Program) -> bytes:
+    """The header with a CRC of 0. Raises InputError: a field cannot hold its value."""
     name = program.name.encode()
     if len(name) > NAME_SIZE:
         raise InputError(
             f"program: name {program.name!r} is longer than {NAME_SIZE} bytes of UTF-8"
         )
     try:
-        head = _HEADER.pack(
+        return _HEADER.pack(
             MAGIC,
             VERSION,
             header_size(program.axis_count),
@@ -225,11 +230,10 @@ def encode(program: Program) -> bytes:
         ) + struct.pack(f"<{program.axis_count - PLANE_AXES}q", *program.offset_q40[PLANE_AXES:])
     except struct.error as error:
         raise InputError(f"program: a header field does not fit the format: {error}") from None
-    return with_crc(head + body)
 
 
 def with_crc(image: bytes) -> bytes:
-    """The image with its CRC-32 (bytes 12 … 15) made right."""
+    """The image with its CRC-32 (bytes 12 … 15) computed."""
     crc = zlib.crc32(image[_CRC_FROM:])
     return image[: _CRC_FROM - 4] + struct.pack("<I", crc) + image[_CRC_FROM:]
 
