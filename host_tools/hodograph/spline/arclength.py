@@ -20,7 +20,8 @@ EXACT = 2.0**-52
 
 
 class ArcLengthChain(ABC):
-    """Segments whose parametric speed is a polynomial of degree 4: what their arc length alone decides.
+    """Segments whose parametric speed is a polynomial of degree 4; base of PHSpline and SpatialPHSpline with all that
+    depends on arc length only.
 
     All methods take arrays of any one shape (or scalars) and give arrays of that shape. Arc lengths outside 0 …
     length_mm, beyond rounding, raise InputError.
@@ -38,7 +39,7 @@ class ArcLengthChain(ABC):
     @property
     @abstractmethod
     def chain(self) -> PhChain:
-        """Its coefficients, as the native module takes them."""
+        """The coefficients of sigma for the native module."""
 
     @cached_property
     def _arc_coefficients(self) -> Real:

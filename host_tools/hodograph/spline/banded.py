@@ -9,7 +9,7 @@ from .bernstein import Complex
 
 
 class SingularSystem(Exception):
-    """The matrix is singular to working precision; the solver falls back to something safer."""
+    """The matrix is singular to working precision; the caller changes to a safer method."""
 
 
 def solve_tridiagonal(lower: Complex, diagonal: Complex, upper: Complex, rhs: Complex) -> Complex:
@@ -21,7 +21,7 @@ def solve_tridiagonal(lower: Complex, diagonal: Complex, upper: Complex, rhs: Co
         if diagonal[0] == 0.0:
             raise SingularSystem
         return np.asarray(rhs / diagonal[0])
-    # Here, since its import takes a quarter of the time in which a command that solves nothing starts.
+    # Here, since its import takes a quarter of the start time of a command that solves nothing.
     from scipy.linalg import lapack
 
     _, _, _, x, info = lapack.zgtsv(lower[1:], diagonal, upper[:-1], rhs)

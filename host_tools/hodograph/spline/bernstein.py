@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Small Bernstein-form helpers, vectorised over spans (last axis: coefficients).
+"""Small functions for polynomials in Bernstein form, vectorised over spans (last axis: coefficients).
 
 Everything here is exact algebra on polynomials over [0, 1]; docs/theory/numerics.md section 4.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Public functions of the package: from points or a control polygon to a PHSpline."""
+"""From points or a control polygon to a PHSpline; docs/theory/numerics.md sections 1 to 3. For the pipeline and the
+API.
+"""
 
 from __future__ import annotations
 
@@ -25,14 +27,13 @@ Spline = TypeVar("Spline")
 class FoundSpline(Generic[Spline]):
     """A spline in the plane or in space, how it was found and how good it is; docs/theory/numerics.md 3.5.
 
-    newton_iterations  linear systems of the whole spline solved, those of continuation and of
-                       polishing after changes included
-    trial_iterations   linear systems solved beside those in trials of the other side of near-cusps,
-                       on windows of 17 spans at most; 0 for smooth input
-    changed_sides      near-cusps passed on the other side than the guide's, for less bending
+    newton_iterations  linear systems of the whole spline that were solved, including continuation and polishing
+    trial_iterations   linear systems that were solved in trials of the other side of near-cusps, on windows of at most
+                       17 spans; 0 for smooth input
+    changed_sides      near-cusps that the spline passes on the other side than its guide, for less bending
     extra_turning_rad  greatest total turning beyond the guide's within three spans that also bend
                        more
-    bending_ratio      bending energy beside the guide's (cubic B-spline or cubic spline)
+    bending_ratio      bending energy over that of the guide (cubic B-spline or cubic spline)
     notes              one line each, for stderr
     """
 
@@ -69,7 +70,7 @@ def through_points(
     end_tangent: complex | None = None,
     knots: str = "chord",
 ) -> SplineResult:
-    """C2 PH quintic spline through given points, one span between neighbours.
+    """C2 PH quintic spline through given points, one span from each point to the next.
 
     `points`: complex (n,) or real (n, 2), mm; open from 2 points on, closed from 3 on (each point
     once; a repeated last point is dropped with a note). Ends of an open path:
@@ -78,8 +79,8 @@ def through_points(
         ends = "natural"    no curvature at the ends
         start_tangent, end_tangent   direction there (any length), instead of `ends` at that end
 
-    A closed path is periodic and takes no tangents. `knots`, a name of KNOT_NAMES, says how long a span lasts in the
-    spline's parameter: chord-length knots suit points at any distances. Raises InputError and PlanError as above.
+    A closed path is periodic and takes no tangents. `knots`, a name of KNOT_NAMES, sets the parameter length of spans:
+    chord-length knots suit points at any distances. Raises InputError and PlanError as above.
     """
     p, notes = checked_points(points, closed, 3 if closed else 2, "through point")
     start = EndCondition.chosen(ends, start_tangent, "start_tangent", closed)
@@ -117,7 +118,7 @@ def _solved(
     notes: tuple[str, ...],
     knots: KnotSpans | None = None,
 ) -> SplineResult:
-    """`first`, `last`: derivative by the parameter there, or the rule that takes its place (open paths)."""
+    """`first`, `last`: derivative by the parameter there, or the rule in place of it (open paths)."""
     length = np.ones((1, 1)) if knots is None else knots.length[:, None]
     hodograph = without_rests(guide.hodograph / length, guide.closed)
     branch = followed_branch(hodograph)

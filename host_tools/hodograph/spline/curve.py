@@ -102,7 +102,7 @@ class PHSpline(ArcLengthChain):
 
     @property
     def chain(self) -> PhChain:
-        """Its coefficients, as the native module takes them."""
+        """The coefficients of sigma for the native module."""
         return PhChain(
             self.segment_starts_mm, self._arc_coefficients, self.speed_coefficients, self.w
         )
@@ -136,12 +136,11 @@ class PHSpline(ArcLengthChain):
         return greatest_curvature(self.w)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> PHSpline:
-        """The same curve in shorter segments, as a program wants them (docs/reference/protocol.md 1.2).
+        """The same curve in shorter segments, as a program needs them (docs/reference/protocol.md 1.2).
 
-        Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm`
-        long and the largest Bernstein coefficient of its speed is (1e-9 less than) at most
-        `max_speed_ratio` times the smallest, which is positive. Raises PlanError naming the
-        segment where the curve all but stops.
+        Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm` long and the largest
+        Bernstein coefficient of its speed is (1e-9 less than) at most `max_speed_ratio` times the smallest, which is
+        positive. Raises PlanError naming the segment where the curve nearly stops.
         """
         origin, w, _ = split_segments(self.origin, self.w, max_length_mm, max_speed_ratio)
         return PHSpline(origin, w, self.closed)

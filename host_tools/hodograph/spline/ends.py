@@ -68,12 +68,12 @@ def end_spans(knots: KnotSpans | None) -> tuple[float, float]:
 
 
 def end_shares(knots: KnotSpans | None) -> tuple[float, float]:
-    """What `cubic_end` wants to know at the start and at the end."""
+    """The argument `share` of `cubic_end` at the start and at the end."""
     return (0.5, 0.5) if knots is None else (float(knots.after[0]), float(knots.before[-1]))
 
 
 def end_speed(free: float, chord: float) -> float:
-    """Speed at an end whose direction is given: that of the free end, but 1/4 to 1 times the chord's."""
+    """Speed at an end with a given direction: that of the free end, limited to 1/4 to 1 times the chord's."""
     return min(max(free, chord / 4.0), chord)
 
 

@@ -31,7 +31,7 @@ def greatest_curvature(
 ) -> float:
     """Greatest |curvature| (1/mm) over segments with w (N, 3), to 1e-13 relative.
 
-    In space, with preimages (N, 4, 3) and what becomes of them: curvature is |numerator| / speed^2.
+    In space, with preimages (N, 4, 3) and their image, curvature is |numerator| / speed^2.
 
     Branch and bound: |kappa| = |A| / sigma^2 lies below max |A_k| / min(sigma_k)^2 of the
     Bernstein coefficients, a bound whose gap shrinks with the square of the interval. Infinite

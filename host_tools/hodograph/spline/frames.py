@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A curve as the feed sees it, in the plane or in space: its derivatives by arc length, by axis;
-docs/theory/numerics.md 5.6."""
+"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/numerics.md 5.6. Used by
+feed/ and verify/.
+"""
 
 from __future__ import annotations
 

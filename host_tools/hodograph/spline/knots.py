@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Knots of a path through points: parameter lengths of its spans; docs/theory/spatial-splines.md 1.
 
-Uniform knots, as the paper has them, make every span last 1, whatever its length: a short span beside a long one is
-then passed slowly, and the curve overshoots. Spans that last as long as their chords keep the parametric speed even.
+With uniform knots, as in the paper, each span has parameter length 1. A short span next to a long one is then passed
+slowly, and the curve overshoots. Parameter lengths equal to the chords keep the parametric speed even.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class KnotSpans:
         return KnotSpans(length, length / (before + length), length / (length + after))
 
     def part(self, low: int, high: int) -> KnotSpans:
-        """Spans low … high - 1, with the neighbours that they have here."""
+        """Spans low … high - 1, with the shares at their ends that they have here."""
         return KnotSpans(self.length[low:high], self.before[low:high], self.after[low:high])
 
 

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Getting rid of loops: the other side of a near-cusp; docs/theory/numerics.md 3.3.
+"""Removes loops by passing a near-cusp on the other side; docs/theory/numerics.md 3.3. Used by solve.py.
 
-Where the guide all but stops, the continuous square root is a matter of luck: the tangent may
-turn by a or by a - 2 pi. The two choices differ in the sign of all z after that place, and the
-influence of either dies out within a few spans. So each sharply turning span is solved again on a
-window of neighbours with the sign changed before it or after it, and the choice with the least
-bending energy is kept.
+Where the guide nearly stops, rounding decides the branch of the continuous square root: the tangent may turn by a or by
+a - 2 pi. The two choices differ in the sign of all z after that place, and their influence decays within a few spans.
+So each sharply turning span is solved again on a window around it, with the sign changed before it or after it. The
+choice with the least bending energy is kept.
 """
 
 from __future__ import annotations
@@ -41,11 +40,10 @@ class Unlooped:
 
 
 def suspects(w: Complex, guide_turning: Real) -> list[int]:
-    """Spans that turn so sharply that the other side has to be tried, the sharpest first.
+    """Spans for which the other side has to be tried, the sharpest turn first.
 
-    Those are spans that turn by more than 225 degrees, and spans with a root of w close by that
-    turn by 90 degrees more or less than the guide or whose bending energy times length exceeds
-    100 (ten times that of an even half turn).
+    These are spans that turn by more than 225 degrees. In addition, spans near a root of w if they turn by 90 degrees
+    more or less than the guide, or if bending energy times length exceeds 100 (ten times that of an even half turn).
     """
     shape = Shape(w, 2)
     sharp, turned = shape.sharpest, np.abs(shape.turning)
@@ -61,9 +59,9 @@ def suspects(w: Complex, guide_turning: Real) -> list[int]:
 
 
 def without_loops(system: System, z: Complex, guide_turning: Real) -> Unlooped:
-    """Try the other side at every suspect span of the solution `z`, up to three passes.
+    """Try the other side at every suspect span of the solution `z`, in up to three passes.
 
-    The result is near a solution (windows are joined as they are): polish it with `newton`.
+    The result is only near a solution, since windows are joined unchanged: polish it with `newton`.
     """
     changes = iterations = 0
     seen: set[int] = set()

@@ -39,11 +39,11 @@ class InterpolationSystem(Protocol):
         ...
 
     def residual(self, z: Unknowns) -> Unknowns:
-        """By how much the equations are missed; 0 for the solution."""
+        """The residual of the equations; 0 for the solution."""
         ...
 
     def residual_mm(self, z: Unknowns) -> Unknowns:
-        """By how much each span misses its chord."""
+        """The error of each span's chord, mm."""
         ...
 
     def sizes(self, residual: Unknowns) -> Real:

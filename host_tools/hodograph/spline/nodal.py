@@ -22,7 +22,7 @@ _REPEATED = 1e-12
 
 _NEAREST_MM = 1e-9
 _FARTHEST_MM = 1e9
-"""Points nearer to each other, or farther away, are no path for a machine (and would overflow)."""
+"""Least distance of points and greatest coordinate; beyond them numbers would overflow."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def _size(p: Complex | Real) -> Real:
 
 
 def _ordinary(p: P, what: str) -> P:
-    """`p`; raises InputError where a number is not finite or absurdly large."""
+    """`p`; raises InputError: a number is not finite, or too large."""
     bad = np.flatnonzero(~np.isfinite(_size(p)))
     if bad.size:
         raise InputError(f"{what} {bad[0]} is not finite: give ordinary numbers")

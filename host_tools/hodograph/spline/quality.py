@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How good a solution is: turning of the tangent and bending energy; docs/theory/numerics.md 3.2.
+"""Quality of a solution: turning of the tangent and bending energy; docs/theory/numerics.md 3.2. Used by loops.py and
+verdict.py.
 
-The same figures are wanted of the spline (hodograph w^2, w quadratic) and of its guide (quadratic
-hodograph), so `Shape` takes the quadratic and the number of times it is multiplied.
+The spline has hodograph w^2 with a quadratic w, its guide a quadratic hodograph. `Shape` handles both: it takes the
+quadratic and its power.
 """
 
 from __future__ import annotations
@@ -72,9 +73,9 @@ class Shape:
     def bending(self) -> Real:
         """Integral of curvature^2 over arc length (1/mm).
 
-        Gauss quadrature of 6 points; of 2 panels of 12, or 8 of 16, where a root is so close that its
-        factor turns by more than 90, or 135, degrees. A figure of merit: good to two digits and more
-        except next to a cusp, where it is huge anyway.
+        Gauss quadrature of 6 points; of 2 panels of 12, or 8 of 16, where a root is so close that its factor turns by
+        more than 90, or 135, degrees. The result has two correct digits or more, except next to a cusp, where it is
+        very large anyway.
         """
         out = self._quadrature(slice(None), _SMOOTH)
         for angle, rule in _SHARPER:

@@ -20,9 +20,9 @@ _ROUNDS = 3
 class Solution:
     """w (M, 3) of the spline and how it was found.
 
-    newton_iterations  linear systems of the whole spline solved, continuation and polishing included
-    trial_iterations   linear systems solved in trials on windows of 17 spans at most, not among those
-    changed_sides      near-cusps that were passed on the other side to get rid of a loop
+    newton_iterations  linear systems of the whole spline that were solved, including continuation and polishing
+    trial_iterations   linear systems that were solved in trials on windows of at most 17 spans
+    changed_sides      near-cusps that the spline passes on the other side to avoid a loop
     """
 
     w: Complex
@@ -42,9 +42,9 @@ class _State:
 
 
 def solve(system: System, z: Complex, guide_hodograph: Complex) -> Solution:
-    """The good solution near the starting values `z` (M,), judged beside the guide (M, 3).
+    """The accepted solution near the starting values `z` (M,), compared with the guide (M, 3).
 
-    Raises PlanError naming the span: nothing found, or nothing without a loop or cusp of its own.
+    Raises PlanError naming the span: no solution was found, or each has a loop or cusp that the guide lacks.
     """
     guide = Shape(guide_hodograph, 1)
     state = _converged(_State(system, z))

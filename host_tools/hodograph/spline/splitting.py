@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Parts of segments: halved until they suit the program format (docs/theory/numerics.md 4.5), or cut at places."""
+"""Parts of segments: halves them until they fit the program format (docs/theory/numerics.md 4.5), or cuts them at
+places. Used by both curve classes and stream/.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +21,12 @@ _HAIR = 1.0 - 2.0**-20
 _SHORTEST_MM = 2.0**-20
 _MOST_ROUNDS = 64
 _MOST_EXTRA = 127.0
-"""How far an extra axis may move in a segment; the format ends at 128 mm or degrees."""
+"""Greatest move of an extra axis in a segment; the format allows 128 mm or degrees."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """What becomes of preimages: Bernstein coefficients, five of them last, of r' and of sigma."""
+    """The image of preimages: Bernstein coefficients of r' and of sigma; last axis: the five coefficients."""
 
     hodograph: Callable[[Any], Any]
     speed: Callable[[Any], Real]
@@ -47,9 +49,9 @@ def split_segments(
     max_component  greatest magnitude of a component of the preimage, mm^(1/2)
     extra          (N, E, 6), Bezier coefficients of extra axes, which are halved too and come back (K, E, 6)
 
-    In space, origins (K, 3) and preimages (K, 4, 3) with their `image`. The pieces of one segment carry on from its
-    own origin: each start is origin + integral of r', so nothing drifts along the path. Raises InputError for limits
-    that no halving can reach and PlanError where a piece of 1 nm is still uneven (a cusp in all but name).
+    In space, origins (K, 3) and preimages (K, 4, 3) with their `image`. Each start of a part is the origin of its
+    segment + the integral of r', so no error accumulates along the path. Raises InputError: no halving can reach the
+    limits. Raises PlanError: the speed within a part of 1 nm is still uneven, as near a cusp.
     """
     if not (max_length_mm > 0.0 and max_speed_ratio > 1.0):
         raise InputError("split: max_length_mm must be above 0 and max_speed_ratio above 1")
@@ -77,8 +79,8 @@ def split_segments(
 
 
 def cut_segments(w: Any, segment: NDArray[np.intp], xi: Real) -> tuple[NDArray[np.intp], Real, Any]:
-    """Segments with joints at further places too: of each part the segment (K,) that it is of, the xi (K,) of that at
-    which it begins, and its preimage.
+    """Segments cut at places. For each part: its segment (K,), the xi (K,) of that segment at which it begins, and its
+    preimage.
 
     w            (N, 3) in the plane, (N, 4, 3) in space
     segment, xi  (n,) of the places, xi inside 0 … 1

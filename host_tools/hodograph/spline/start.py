@@ -16,8 +16,8 @@ _NUDGE = 1e-3
 def without_rests(hodograph: Complex, closed: bool) -> Complex:
     """The hodograph (M, 3) with zeros at the joints moved aside by a thousandth, to the left.
 
-    A guide that stops and turns back exactly at a joint (legs that retrace each other) has no
-    tangent there to follow. For judging and starting only, never for end tangents.
+    A guide that stops and reverses exactly at a joint has no tangent there. For quality and starting values only, never
+    for end tangents.
     """
     before = hodograph if closed else hodograph[:-1]
     after = np.roll(hodograph, -1, axis=0) if closed else hodograph[1:]

@@ -70,7 +70,7 @@ def _mixed(x: Complex, knots: KnotSpans) -> tuple[Complex, Complex, Complex]:
 class System:
     """Chords q_i - q_(i-1) (M,) with end rules, or `cyclic_sign` e for a closed curve (0: open).
 
-    Without `knots`, spans have parameter length 1. z is then what the paper has, to the last bit.
+    Without `knots`, spans have parameter length 1, and z is exactly that of the paper.
     """
 
     chords: Complex
@@ -117,7 +117,7 @@ class System:
         return System(self.chords[low:high], start, end, knots=knots)
 
     def residual_mm(self, z: Complex) -> Complex:
-        """By how much each span misses its chord."""
+        """The error of each span's chord, mm."""
         share = 60.0 if self.knots is None else 60.0 / self.knots.length
         return np.asarray(self.residual(z) / share)
 

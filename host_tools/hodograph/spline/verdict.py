@@ -27,11 +27,11 @@ between the samples.
 
 @dataclass(frozen=True)
 class Verdict:
-    """Figures of a solution beside its guide.
+    """Figures of a solution compared with its guide.
 
     extra_turning_rad   greatest excess of total turning over the guide's, in windows of three spans
                         that bend more than the guide does
-    bending_ratio       bending energy of the whole beside the guide's; 1 where that bends by less than 1e-3 rad
+    bending_ratio       bending energy of the whole over that of the guide; 1 if the guide bends by less than 1e-3 rad
     loops, cusps        middle spans of windows with a loop of their own, spans that turn on the
                         spot; the worst first
     """
@@ -87,7 +87,7 @@ def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
 
 
 def windows(figure: Real, closed: bool) -> Real:
-    """Sums over a span and its neighbours."""
+    """Sums over each span and the spans next to it."""
     if figure.size < 3:
         return np.full(figure.size, figure.sum())
     before, after = np.roll(figure, 1), np.roll(figure, -1)

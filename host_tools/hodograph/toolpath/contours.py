@@ -2,7 +2,8 @@
 """Contours of a drawing: lines, arcs and splines that follow each other, kept in little memory.
 
 A reader of drawings calls `move_to` and then the methods that draw, in the coordinates of the drawing; the affine map
-`Contours.affine` takes them to mm. Contours may then be looked through in any order and direction (`steps`).
+`Contours.affine` takes them to mm. Contours may then be read in any order and direction (`steps`). Used by `svg`,
+`dxf`, `drawing` and `ordering`.
 
 A contour takes 60 bytes, a step of it 30 to 80, so that a drawing of any size takes a few times the memory of its file.
 """
@@ -29,7 +30,7 @@ _FLAT_MM = 1e-9
 """An arc that is nowhere farther from its chord is a line."""
 
 _ROUND = 1e-9
-"""By which part of its radius an ellipse may differ from a circle that stands for it."""
+"""Share of the radius by which the radii of an ellipse may differ if a circle replaces it."""
 
 
 class ShapeError(ValueError):
@@ -70,19 +71,19 @@ class Affine:
         return Affine(shift=(x, y, z))
 
     def direction(self, vector: Point) -> Point:
-        """Where a vector, which has no place, goes."""
+        """The image of a vector, which is not shifted."""
         x, y, z = vector
         rows = (self.x, self.y, self.z)
         first, second, third = (row[0] * x + row[1] * y + row[2] * z for row in rows)
         return first, second, third
 
     def point(self, point: Point) -> Point:
-        """Where a point goes."""
+        """The image of a point."""
         x, y, z = self.direction(point)
         return x + self.shift[0], y + self.shift[1], z + self.shift[2]
 
     def after(self, first: Affine) -> Affine:
-        """The map that takes a point by `first`, and then by this one."""
+        """The map that applies `first`, and then this one."""
         columns = [self.direction((first.x[k], first.y[k], first.z[k])) for k in range(3)]
         x, y, z = zip(*columns, strict=True)
         return Affine(x, y, z, self.point(first.shift))
@@ -141,13 +142,13 @@ class Step(NamedTuple):
 class Contours:
     """Contours in the order in which they were drawn.
 
-    `affine` maps what is drawn from now on; `group` is a number that the contours begun from now on carry.
+    `affine` maps everything drawn from now on; `group` is the number of contours begun from now on.
     """
 
     def __init__(self) -> None:
         self.affine = Affine()
         self.group = 0
-        self.pen: Point = (0.0, 0.0, 0.0)  # in mm, as all that is kept
+        self.pen: Point = (0.0, 0.0, 0.0)  # in mm, like all stored values
         self._begin: tuple[Point, int] | None = None
         self._kinds = bytearray()
         self._lines = array("q")
@@ -164,13 +165,13 @@ class Contours:
 
     @property
     def step_count(self) -> int:
-        """How many steps all contours have."""
+        """Number of steps of all contours."""
         return len(self._kinds) - len(self)
 
     # ---- drawing: points in the coordinates of the drawing
 
     def move_to(self, point: Point, line: int) -> None:
-        """Begin a contour. One that nothing is drawn in does not come to be."""
+        """Begin a contour. A contour without steps is not kept."""
         self.pen = self._mapped(point)
         self._begin = (self.pen, line)
 
@@ -231,7 +232,9 @@ class Contours:
         return True
 
     def close(self, line: int) -> None:
-        """Draw a line to where the contour begins, unless the pen is there. What follows is another contour."""
+        """Draw a line to the start of the contour, unless the pen is there. Steps after it belong to another
+        contour.
+        """
         if self._begin is None and len(self):
             self._line_to(self._point(self._first_triple[-1]), line)
         self._begin = (self.pen, line)
@@ -285,7 +288,7 @@ class Contours:
         for point in points:
             self._triples.extend(point)
 
-    # ---- looking through
+    # ---- reading
 
     def group_of(self, index: int) -> int:
         """The group of a contour."""
@@ -296,7 +299,7 @@ class Contours:
         return self._lines[self._first_step[index] + 1]
 
     def length_of(self, index: int) -> int:
-        """How many steps a contour has."""
+        """Number of steps of a contour."""
         after = self._first_step[index + 1] if index + 1 < len(self) else len(self._kinds)
         return after - self._first_step[index] - 1
 
@@ -326,7 +329,7 @@ class Contours:
             yield step.reversed() if backwards else step
 
     def _triple_places(self, index: int) -> NDArray[np.int64]:
-        """Where the start of each step is, and the end of the last one."""
+        """Index of the first number of each step, and of the end of the last one."""
         begin = self._first_step[index]
         kinds = np.frombuffer(self._kinds, dtype=np.uint8)[
             begin : begin + 1 + self.length_of(index)

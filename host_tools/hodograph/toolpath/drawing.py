@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drawings as toolpaths: what the readers of DXF and SVG have in common.
+"""Drawings as toolpaths: the common part of the readers of DXF and SVG.
 
 A reader fills a `Drawing`: contours in groups (layer and colour), and notes of what it left out. `commands` then joins
 the contours, orders them, and gives the moves: rapid to each contour, and along it at the feed of its group.
@@ -42,7 +42,9 @@ from .ordering import (
 )
 
 ORDERS = ("short", "inside-first", "file")
-"""Orders of contours: short rapid moves; what lies inside before what is around it, then short; as in the file."""
+"""Orders of contours: for short rapid moves; inner contours before the ones around them, then for short rapid moves; as
+in the file.
+"""
 
 _SAME_DIGITS = 6
 """Decimals of mm in which contours are compared."""
@@ -55,19 +57,19 @@ MOST_COPIES = 1_000_000
 class DrawingOptions:
     """How a drawing becomes a toolpath.
 
-    feed_mm_s   feed of contours that `feeds` has nothing for
+    feed_mm_s   feed of contours without an entry in `feeds`
     feeds       feed by the name of a layer, or by a colour: "#rrggbb", or its number in DXF. A layer comes first.
-    unit_mm     length of a unit of the drawing; None: as the file says. A file that does not say is refused.
-    scale       by which the drawing is multiplied
+    unit_mm     length of a unit of the drawing; None: that of the file. A file without unit is refused.
+    scale       factor on all lengths of the drawing
     layers      names of the layers to take, in the order in which they are machined; empty: all, in one
     ids         identities of the elements to take (SVG: id, DXF: handle); empty: all
     gap_mm      ends of contours of one group that are this near are joined
     order       one of ORDERS
     z_mm        height of the drawing's plane
-    lift_mm     how far above the highest point of the drawing rapid moves are; 0: at the height of the contours
+    lift_mm     height of rapid moves above the highest point of the drawing; 0: at the height of the contours
     start       position at which the toolpath starts
-    strict      whether text, images and whatever else is no curve are refused, instead of left out with a message
-    Raises InputError: a number or name out of its range.
+    strict      whether text, images and other elements without curves are refused; False: they are left out with a
+    message Raises InputError: a number or name out of its range.
     """
 
     feed_mm_s: float
@@ -107,7 +109,9 @@ class DrawingOptions:
 
 
 class Group(NamedTuple):
-    """What a contour belongs to: `colour` is "#rrggbb", `number` the colour's in DXF; empty if there is none."""
+    """Layer and colour of a contour: `colour` is "#rrggbb", `number` that of the colour in DXF; empty if there is
+    none.
+    """
 
     layer: str
     colour: str = ""
@@ -134,7 +138,7 @@ class Drawing:
         return ToolpathError(self.file, line, column, text)
 
     def placement(self, unit_mm: float) -> Affine:
-        """The map from the drawing to mm, for a unit of the file; `options.unit_mm` comes before that."""
+        """The map from the drawing to mm. `options.unit_mm` has precedence over the unit of the file."""
         size = self.options.scale * (
             unit_mm if self.options.unit_mm is None else self.options.unit_mm
         )
@@ -147,7 +151,7 @@ class Drawing:
         self.contours.group = self._groups.setdefault(group, len(self._groups))
 
     def takes(self, layer: str, ids: Iterable[str]) -> bool:
-        """Whether the options ask for an element of this layer with these identities (its own and its groups')."""
+        """Whether the options select an element of this layer with these identities (its own and its groups')."""
         self._layers.setdefault(layer)
         wanted = set(self.options.ids)
         found = wanted.intersection(ids)
@@ -157,7 +161,7 @@ class Drawing:
         )
 
     def leave_out(self, what: str, line: int, column: int = 1) -> None:
-        """Note what is not part of the toolpath. Raises ToolpathError if the options ask for that."""
+        """Note an element that is left out. Raises ToolpathError if the options are strict."""
         if self.options.strict:
             raise self.error(
                 line, f"{what} cannot be followed: remove it or convert it to paths", column
@@ -166,11 +170,11 @@ class Drawing:
         self._notes[what] = (count + 1, first)
 
     def assume_unit(self, line: int) -> None:
-        """Note that the page at this line has no size; `options.unit_mm` says it."""
+        """Note that the page at this line has no size, unless `options.unit_mm` gives the unit."""
         self._assumed_line = line if self.options.unit_mm is None else 0
 
     def count_copies(self, steps: int, line: int, column: int = 1) -> None:
-        """Bound what copies add. Raises ToolpathError: too much."""
+        """Count the steps that a copy adds. Raises ToolpathError: copies add too many."""
         self._copied += steps + 1
         if self._copied > MOST_COPIES:
             raise self.error(
@@ -180,7 +184,9 @@ class Drawing:
     # ---- commands
 
     def commands(self) -> Iterator[Command]:
-        """Messages, moves and the end. Raises ToolpathError: no contour; InputError: an option that nothing has."""
+        """Messages, moves and the end. Raises ToolpathError: no contour; InputError: the drawing has no such layer,
+        identity or colour.
+        """
         feeds = self._feeds()
         yield from self._remarks()
         self._check_names()
@@ -194,7 +200,7 @@ class Drawing:
         yield ProgramEnd(max(1, self.last_line))
 
     def _remarks(self) -> Iterator[Message]:
-        """What was left out, and what the file does not say."""
+        """Messages about elements that were left out, and about what the file does not define."""
         for what, (count, first) in self._notes.items():
             yield Message(first, f"left out: {what}, {count} times, first in line {first}")
         if self._assumed_line:
@@ -202,7 +208,7 @@ class Drawing:
             yield Message(self._assumed_line, text)
 
     def _repeats(self) -> Iterator[Message]:
-        """How many contours are drawn again."""
+        """Message about the contours that are drawn twice."""
         if repeats := repeated(self.contours):
             first = min(self.contours.line_of(index) for index in repeats)
             text = f"drawn again: {len(repeats)} contours, first in line {first}"
@@ -239,7 +245,7 @@ class Drawing:
         return feeds
 
     def _sequence(self) -> tuple[list[Visit], str]:
-        """The contours in their order, and what that gains."""
+        """The contours in their order, and a message on how much that shortens the rapid moves."""
         contours, options = self.contours, self.options
         chains = [
             chain for chain in join(contours, options.gap_mm) if _moves_at_all(contours, chain)
@@ -267,7 +273,9 @@ class Drawing:
         )
 
     def _stages(self, chains: Sequence[Chain]) -> list[list[Chain]]:
-        """Chains that are machined before others: by layer as requested, and by how deep they lie."""
+        """Groups of chains in the order of machining: by the requested layers, and by how deep chains lie inside
+        others.
+        """
         layers = {name: k for k, name in enumerate(self.options.layers)}
         names = [group.layer for group in self._groups]
         layer_of = [names[self.contours.group_of(chain.pieces[0][0])] for chain in chains]
@@ -328,7 +336,7 @@ def _with_same_ends(contours: Contours) -> Iterator[list[int]]:
     """Contours of a group that have as many steps and the same ends as others, in the order of the file."""
     ends = np.round(contours.ends(), _SAME_DIGITS).reshape(-1, 6) + 0.0
     start, end = ends[:, :3], ends[:, 3:]
-    # Of both directions the one whose first coordinate that differs rises.
+    # Of both directions, the one in which the first coordinate that differs rises.
     differs = start != end
     first = np.argmax(differs, axis=1)[:, None]
     falls = np.take_along_axis(start, first, 1) > np.take_along_axis(end, first, 1)
@@ -346,7 +354,7 @@ def _with_same_ends(contours: Contours) -> Iterator[list[int]]:
 
 
 def _shape(contours: Contours, index: int, *, backwards: bool) -> tuple[object, ...]:
-    """What the steps of a contour draw, for comparison."""
+    """The geometry of the steps of a contour, for comparison."""
 
     def rounded(points: Iterable[Point]) -> tuple[object, ...]:
         return tuple(round(value, _SAME_DIGITS) + 0.0 for point in points for value in point)
@@ -359,7 +367,7 @@ def _shape(contours: Contours, index: int, *, backwards: bool) -> tuple[object, 
 
 
 def _moves_at_all(contours: Contours, chain: Chain) -> bool:
-    """Whether a chain has a step: one that is closed within the gap by moving its ends may have none left."""
+    """Whether a chain has a step. If its ends are moved together within the gap, none may remain."""
     return next(steps_of(contours, Visit(chain)), None) is not None
 
 

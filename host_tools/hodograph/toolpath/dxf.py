@@ -4,9 +4,9 @@
     for command in read_dxf(Path("part.dxf"), DrawingOptions(feed_mm_s=20.0)):
         ...
 
-The file is read as a stream of tags (group code and value, a line each). Only contours are kept, of blocks too: a
-document of ezdxf takes 30 times the file's memory, knows no lines, and replaces what is missing by zeros. ezdxf is what
-knows coordinate systems of entities, colours, units and encodings.
+The file is read as a stream of tags (group code and value, a line each). Only contours are kept, also of blocks. A
+document of ezdxf would take 30 times the file's memory, has no line numbers, and replaces missing values by zeros.
+ezdxf is used for coordinate systems of entities, colours, units and encodings.
 """
 
 from __future__ import annotations
@@ -33,10 +33,9 @@ _WHITE = 7
 def read_dxf(path: Path, options: DrawingOptions) -> Iterator[Command]:
     """The commands of a drawing in DXF: messages of what was left out, moves, and the end.
 
-    Raises ToolpathError: a damaged file, or a value without meaning, with its line; a drawing without contours.
-    InputError: the file cannot be read; its unit is not known; an option names what the drawing does not have; ezdxf
-    is not installed.
-    The whole file is read before the first command.
+    Raises ToolpathError, with the line: a damaged file, or a value without meaning; a drawing without contours. Raises
+    InputError: the file cannot be read; its unit is not known; the drawing lacks something that an option names; ezdxf
+    is not installed. The whole file is read before the first command.
     """
     try:
         with path.open("rb") as file:
@@ -75,7 +74,7 @@ class _Layer:
 
 @dataclass(frozen=True, slots=True)
 class _Insert:
-    """A copy of a block: the maps from the block to where it stands, one for each place of a grid."""
+    """A copy of a block: the maps from the block to the drawing, one for each place of a grid."""
 
     block: str
     maps: tuple[Affine, ...]
@@ -86,7 +85,9 @@ class _Insert:
 
 @dataclass(slots=True)
 class _Block:
-    """What a block holds: contours, whose groups are numbers of `styles`, copies of others, and what is left out."""
+    """The content of a block: contours, whose groups are numbers of `styles`, copies of other blocks, and what is left
+    out.
+    """
 
     base: Point
     contours: Contours = field(default_factory=Contours)
@@ -370,7 +371,7 @@ class _Reader:
     def _draw(
         self, entity: Entity, contours: Contours, outer: Affine, left_out: list[tuple[str, int]]
     ) -> None:
-        """Draw an entity, or note why not."""
+        """Draw an entity, or note that it is left out."""
         draw = CURVES.get(entity.kind)
         before = contours.step_count
         if draw is None:
@@ -386,7 +387,7 @@ class _Reader:
 
 
 class _Place:
-    """Gives errors of shapes the line of the entity, or of the tag that they name."""
+    """Adds to errors of shapes the line of the tag that they name, or of the entity."""
 
     def __init__(self, drawing: Drawing, entity: Entity) -> None:
         self._drawing = drawing

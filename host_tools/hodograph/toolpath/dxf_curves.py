@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves of DXF entities: `CURVES` has the function that draws each kind. It adds to contours, in whose coordinates it
-draws.
+"""Curves of DXF entities: `CURVES` has the function that draws each kind. It draws in the coordinates of the contours.
 
 Raises ShapeError: a value is missing or has no meaning.
 """
@@ -195,7 +194,7 @@ def _given_spline(entity: Entity, points: NDArray[np.float64]) -> Spline:
 def clamped(spline: Spline) -> Spline:
     """The part of a NURBS from knot 0 to knot 1, with these knots repeated so that it meets its end points.
 
-    Raises ShapeError: a knot inside is repeated more often than the degree says, where the curve may break.
+    Raises ShapeError: an inner knot is repeated more often than the degree allows, so that the curve may have a gap.
     """
     found = _clamped_at_start(_clamped_at_start(spline).reversed()).reversed()
     inner = found.knots[(found.knots > 0.0) & (found.knots < 1.0)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Toolpath files of every kind, distinguished by the ends of their names.
+"""Reads toolpath files of every kind, distinguished by the endings of their names.
 
 for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
     ...
@@ -21,7 +21,7 @@ from ..names import (
 )
 from .moves import Command
 
-# A reader is imported when a file of its kind is read: together they load much that no other command needs.
+# A reader is imported when a file of its kind is read, since the readers load modules that other commands do not need.
 if TYPE_CHECKING:
     from .drawing import DrawingOptions
     from .points import PointOptions
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How a file is read that does not say all itself. None and empty: not given.
+    """Options for reading a file, where the file itself leaves something open. None and empty: not given.
 
-    feed_mm_s  feed: drawings need it, points where they have no column of it; of G-code it replaces F
+    feed_mm_s  feed: drawings need it, and points without a column of feeds; in G-code it replaces F
     layers     drawings: only these layers, in this order
     ids        drawings: only elements with these identities (SVG: id, DXF: handle)
     gap_mm     drawings: ends of contours that are this near are joined
-    lift_mm    drawings: how far above the drawing rapid moves are
-    scale      drawings and points: by which lengths are multiplied
+    lift_mm    drawings: height of rapid moves above the drawing
+    scale      drawings and points: factor on lengths
     unit_mm    drawings and points: length of a unit
-    closed     points: back to the first point
+    closed     points: the path returns to the first point
     block_delete, skip_optional_stops  G-code: lines that begin with "/" are left out, M1 is left out
     """
 
@@ -65,19 +65,19 @@ _OPTIONS_OF = {
     "--block-delete": ("block_delete", GCODE_SUFFIXES),
     "--skip-optional-stops": ("skip_optional_stops", GCODE_SUFFIXES),
 }
-"""Options of the command line: their field of ReadOptions, and the kinds of files that they are for."""
+"""Options of the command line: their field of ReadOptions, and the kinds of files that accept them."""
 
 
 def is_gcode(file: Path) -> bool:
-    """Whether a toolpath is G-code, whose messages are for the operator; others tell what was left out."""
+    """Whether a toolpath is G-code. Its messages are for the operator; those of other files list what was left out."""
     return file.suffix.lower() in GCODE_SUFFIXES or str(file) == STANDARD_INPUT
 
 
 def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
     """The commands of a file; the last one is ProgramEnd.
 
-    Raises InputError: the file cannot be read, has no feed, or an option is not for its kind; ToolpathError, when the
-    iterator comes to the place: what has no meaning.
+    Raises InputError: the file cannot be read, has no feed, or its kind does not accept an option. Raises ToolpathError
+    where the iterator reaches text without meaning.
     """
     _check_options(file, options)
     suffix = file.suffix.lower()

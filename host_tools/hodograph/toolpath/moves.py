@@ -38,7 +38,7 @@ class Plane(enum.Enum):
 
 
 class FeedMode(enum.Enum):
-    """What the feed of a move was given as."""
+    """The mode in which the feed of a move was programmed."""
 
     PER_MINUTE = "length per minute"
     INVERSE_TIME = "duration of the move"
@@ -50,8 +50,8 @@ class Feed:
     """The feed of a move.
 
     In mode INVERSE_TIME `duration_s` is the time of the whole move and both speeds are 0. In the other modes
-    `duration_s` is 0 and `feed_mm_s` is the speed along the path; `feed_deg_s` takes its place in a move that only
-    turns a, b or c. Mode PER_REVOLUTION holds the speeds at `spindle_rev_min`, which is 0 in the other modes.
+    `duration_s` is 0 and `feed_mm_s` is the speed along the path; `feed_deg_s` takes its place in a move of a, b and c
+    alone. Mode PER_REVOLUTION holds the speeds at `spindle_rev_min`, which is 0 in the other modes.
     """
 
     mode: FeedMode
@@ -106,7 +106,7 @@ class SplineMove:
 
     @property
     def end(self) -> Position:
-        """Where the move ends."""
+        """The end of the move."""
         return self.points[-1]
 
 
@@ -141,7 +141,7 @@ class Dwell:
 
 
 class Rotation(enum.Enum):
-    """What the spindle does; clockwise as seen from the spindle towards the part."""
+    """Rotation of the spindle; clockwise as seen from the spindle towards the part."""
 
     STOPPED = 0
     CLOCKWISE = 1
@@ -212,7 +212,7 @@ class AnalogOutput:
 
 @dataclass(frozen=True, slots=True)
 class OverrideSwitch:
-    """Whether the operator's overrides of feed and spindle speed act from here on."""
+    """Whether the operator's overrides of feed and spindle speed are in effect from here on."""
 
     line: int
     enabled: bool
@@ -242,7 +242,7 @@ class ProgramEnd:
 
 
 Move = StraightMove | ArcMove | SplineMove
-"""What moves the axes; each has `line`, `end` and `feed`."""
+"""A command that moves the axes; each has `line`, `end` and `feed`."""
 
 Command = (
     Move

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Joins the contours of a drawing, and chooses their order, direction and start for short rapid moves between them.
 
-`join` makes chains of contours whose ends meet. `arrange` visits the chains: the nearest one next, and then as long as
-it helps, within a bound of work, a part of the sequence is reversed (2-opt) or one chain is moved elsewhere (or-opt).
-A closed chain may begin anywhere; the candidates are the starts of its steps, 16 points of a circle.
+`join` makes chains of contours whose ends meet. `arrange` orders the chains: it begins with the nearest one next. Then
+it reverses a part of the sequence (2-opt) or moves one chain elsewhere (or-opt) while that shortens the rapid moves,
+within a bound of work. A closed chain may begin at the start of each of its steps, or at 16 points of a circle. Used by
+`drawing`.
 
 The work is bounded by counts, not by time: the same drawing gives the same sequence on every computer.
 """
@@ -30,15 +31,17 @@ _MOST_ENTRIES = 64
 _CIRCLE_ENTRIES = 16
 
 _LEAST_RING = 4.0
-"""A contour whose ends are within the gap is closed if it is so many gaps long; else it is a dash, not a ring."""
+"""A contour whose ends are within the gap is closed if its length is at least this many gaps. A shorter one is a dash,
+not a ring.
+"""
 
 _TRIALS = 300_000
 _LEAST_REACH = 50
-"""In one pass, changes of a sequence are tried from each visit to those at most `_TRIALS` / visits places away."""
+"""In one pass, each visit is tried with those at most `_TRIALS` / visits places away in the sequence."""
 
 _MOST_PASSES = 8
 _PASSED = 10_000
-"""Passes end when they have tried so many visits."""
+"""Passes end after this number of tried visits."""
 
 _LEAST_GAIN = 1e-9
 
@@ -185,8 +188,8 @@ def _chains(is_open: NDArray[np.bool_], links: NDArray[np.int64]) -> list[Chain]
 def steps_of(contours: Contours, visit: Visit) -> Iterator[Step]:
     """The steps of a visit; each begins exactly where the one before it ends.
 
-    Where contours meet within a gap, a line or spline next to the gap is moved by it; between two arcs a line is added.
-    A line that has no length then is not a step.
+    Where contours meet within a gap, the end of a line or spline next to the gap is moved; between two arcs a line is
+    added. A line without length is left out.
     """
     for step in _met_steps(contours, visit):
         if step.kind != LINE or step.start != step.end:
@@ -268,7 +271,7 @@ def _ending_at(step: Step, point: Point) -> Step:
 
 
 def entries_of(contours: Contours, chain: Chain) -> list[Entry]:
-    """Where a chain may begin: nowhere else than at its start if it is open."""
+    """Where a chain may begin: an open chain at its start only."""
     if not chain.is_closed:
         return []
     if len(chain.pieces) > 1:
@@ -335,9 +338,8 @@ def rapid_length(contours: Contours, visits: Sequence[Visit], start: Point) -> f
 
 
 def arrange(contours: Contours, chains: Sequence[Chain], start: Point) -> list[Visit]:
-    """The chains in an order with short moves from `start` to the first one and between them.
-
-    It is the order of the file if none is found that is shorter.
+    """The chains in an order with short moves from `start` to the first one and between them; the order of the file if
+    no shorter one is found.
     """
     entries = [entries_of(contours, chain) for chain in chains]
     visits = _nearest_first(contours, chains, entries, start)
@@ -355,7 +357,7 @@ def arrange(contours: Contours, chains: Sequence[Chain], start: Point) -> list[V
 def _nearest_first(
     contours: Contours, chains: Sequence[Chain], entries: Sequence[list[Entry]], start: Point
 ) -> list[Visit]:
-    """From each place to the nearest chain that is left."""
+    """The sequence that goes from each chain to the nearest remaining one."""
     candidates: list[tuple[int, Visit]] = []
     for k, chain in enumerate(chains):
         if entries[k]:
@@ -390,7 +392,7 @@ def _nearest_first(
 
 
 class _Places:
-    """The nearest of points, of which some are removed as time goes on."""
+    """Finds the nearest of points, some of which are removed over time."""
 
     def __init__(self, points: Vectors) -> None:
         self._points = points
@@ -409,7 +411,7 @@ class _Places:
             self._build()
 
     def nearest(self, point: Vectors) -> int:
-        """The number of the nearest one that is left; there is one."""
+        """The number of the nearest remaining point; there has to be one."""
         count = 1
         while True:
             found = np.atleast_1d(self._tree.query(point, k=min(count, len(self._numbers)))[1])
@@ -488,7 +490,7 @@ class _Sequence:
         saved = _distance(first, before)
         if i + 1 < n:
             saved += _distance(last, self._first[i + 1]) - _distance(before, self._first[i + 1])
-        # Place k is behind visit k; place -1 is at the start.
+        # Place k is after visit k; place -1 is at the start.
         places = np.array(
             [k for k in range(begin - 1, end + 1) if k not in (i - 1, i)], dtype=np.int64
         )
@@ -545,11 +547,11 @@ def _best_entries(
     return chosen
 
 
-# ---- what lies inside what
+# ---- chains inside others
 
 
 def depths(contours: Contours, chains: Sequence[Chain]) -> list[int]:
-    """How many closed chains each chain lies inside of, seen along z."""
+    """The number of closed chains around each chain, seen along z."""
     outlines = [_outline(contours, chain) for chain in chains]
     low = np.array([outline.min(axis=0) for outline in outlines]).reshape(-1, 2)
     high = np.array([outline.max(axis=0) for outline in outlines]).reshape(-1, 2)

@@ -34,7 +34,7 @@ from .moves import (
 )
 
 COLUMNS = ("x", "y", "z", "a", "b", "c", "feed")
-"""Names of columns; "-" stands for one that is not read."""
+"""Names of columns; "-": the column is not read."""
 
 MOST_MM = 1e9
 """Greatest coordinate, in mm or degrees."""
@@ -78,12 +78,12 @@ class PointOptions:
     """How points become a toolpath.
 
     feed_mm_s   feed up to the first line that has one; None: the column "feed" has it in every line
-    columns     names of the columns, of COLUMNS or "-"; empty: as the header says, without one x y or x y z
-    separator   what stands between columns, or "auto": tab, semicolon or comma, as in the first line, else blanks
-    unit_mm     length of a unit of columns whose header names none
-    scale       by which x, y and z are multiplied
-    closed      whether the path goes back to the first point
-    noise_mm    how far points may be off the curve that they sample; 0: the path is that of the tolerance alone
+    columns     names of the columns, of COLUMNS or "-"; empty: those of the header; without a header x y or x y z
+    separator   the separator of columns, or "auto": tab, semicolon or comma, as in the first line, else blanks
+    unit_mm     length of a unit of columns without a unit in the header
+    scale       factor on x, y and z
+    closed      whether the path returns to the first point
+    noise_mm    greatest distance of points from the curve that they sample; 0: the tolerance alone counts
     start       position at which the toolpath starts
     Raises InputError: a number or name out of its range.
     """
@@ -126,9 +126,9 @@ def read_points(lines: Iterable[str], file: str, options: PointOptions) -> Itera
     lines    lines of text, with or without their ends
     file     name for messages
 
-    Points that repeat the one before them are left out with a message.
-    Raises ToolpathError, when the iterator comes to the place: a line that is no point, a feed that is missing, a file
-    with fewer than two different points. The commands before it have been yielded.
+    Points that repeat the one before them are left out with a message. Raises ToolpathError where the iterator reaches
+    a line that is no point, a missing feed, or the end of a file with fewer than two different points. The commands
+    before it have been yielded.
     """
     return _Reader(file, options).run(lines)
 
@@ -249,7 +249,7 @@ class _Reader:
             return None
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("error")  # of lines without content
+                warnings.simplefilter("error")  # lines without content
                 table = np.loadtxt(lines, delimiter=layout.separator, comments=None, ndmin=2)
         except (ValueError, UserWarning):
             return None
@@ -352,7 +352,7 @@ def _places(line: str, fields: Sequence[str]) -> list[int]:
     for field in fields:
         at = max(at, line.find(field.strip(), at))
         places.append(at + 1)
-        at += len(field.strip()) + 1  # behind the separator, at least
+        at += len(field.strip()) + 1  # after the separator, at least
     return places
 
 

@@ -5,9 +5,9 @@
         ...
 
 The outlines of paths and basic shapes are followed, whether they are stroked or filled. The page's lower left corner is
-the origin; y points up. XML is read by Expat, as a stream; the rest of the grammar is `svg_values`. The libraries that
-were looked at (svgpathtools 1.8, svgelements 1.9) read on in silence behind errors, know no places, and take 32 and 84
-times the memory of the path data. Tests compare with svgelements.
+the origin; y points up. Expat reads the XML as a stream; `svg_values` reads the values of attributes. The libraries
+svgpathtools 1.8 and svgelements 1.9 are not used: they continue after errors without a message, have no line numbers,
+and take 32 and 84 times the memory of the path data. Tests compare with svgelements.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ animate animateColor animateMotion animateTransform clipPath color-profile curso
 linearGradient marker mask meshgradient metadata pattern radialGradient script set solidcolor style symbol title view
 """
 _QUIET = frozenset(_QUIET_NAMES.split())
-"""Elements that draw nothing where they stand."""
+"""Elements that draw nothing by themselves."""
 
 _SHAPES = frozenset(["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"])
 _GROUPS = frozenset(["svg", "g", "a", "switch", "use"])
@@ -67,7 +67,7 @@ def read_svg(path: Path, options: DrawingOptions) -> Iterator[Command]:
     """The commands of a drawing in SVG: messages of what was left out, moves, and the end.
 
     Raises ToolpathError: broken XML, or an attribute without meaning, with its place; a drawing without contours.
-    InputError: the file cannot be read; an option names what the drawing does not have.
+    InputError: the file cannot be read; the drawing lacks something that an option names.
     The whole file is read before the first command.
     """
     try:
@@ -90,7 +90,7 @@ class _Element:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """What children take over from an element. Lengths in px."""
+    """State that children inherit from an element. Lengths in px."""
 
     affine: Affine
     width: float
@@ -218,7 +218,7 @@ class _Reader:
         return True
 
     def _style(self, name: str, element: _Element) -> dict[str, str]:
-        """The properties of an element that count here: attributes, then style sheets, then its own style."""
+        """The properties of an element that are used here: from attributes, then style sheets, then its own style."""
         given = element.attributes
         style = {key: given[key].strip() for key in _STYLED if key in given}
         classes = frozenset(given.get("class", "").split())
@@ -446,7 +446,7 @@ _DIRECTION = {
 
 
 class _Survey:
-    """What is known before drawing: style sheets, and the identities that `use` refers to."""
+    """The first reading of a file: style sheets, and the identities that `use` refers to."""
 
     def __init__(self) -> None:
         self.references: set[str] = set()

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Values of SVG attributes: path data, transforms, lengths, lists of points, style declarations and style sheets.
 
-Everything raises ShapeError for what the grammar of SVG 1.1 does not allow: renderers draw a broken path up to the
-first error and say nothing, which is no way to machine a part.
+Each function raises ShapeError for text that the grammar of SVG 1.1 does not allow. Renderers draw a broken path up to
+its first error without a message; a part machined in this way would be wrong.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..errors import brief
 from .contours import Affine, Contours, Point, ShapeError
 
 PX_MM = 25.4 / 96.0
-"""A user unit (px) where nothing else is said: 1/96 inch, as in CSS."""
+"""The user unit (px): 1/96 inch, as in CSS."""
 
 _UNITS_PX = {
     "": 1.0,
@@ -37,7 +37,7 @@ _FUNCTION = re.compile(r"([a-zA-Z]+)\s*\(([^()]*)\)")
 
 
 def length_px(text: str, whole_px: float) -> float:
-    """A length in user units; `whole_px` is what 100 % are."""
+    """A length in user units; `whole_px`: the length of 100 %."""
     found = _LENGTH.fullmatch(text)
     if found is None:
         raise ShapeError(f'"{brief(text)}" is not a length')
@@ -161,7 +161,7 @@ _FLAG = re.compile(r"[01]")
 
 
 def draw_path(contours: Contours, data: str, line: int) -> int:
-    """Draws the attribute `d` of a path; returns how many pieces of it have no length."""
+    """Draws the attribute `d` of a path; returns the number of its pieces without length."""
     pen = _Pen(contours, line)
     for command, values, at in _commands(data):
         try:
@@ -172,7 +172,7 @@ def draw_path(contours: Contours, data: str, line: int) -> int:
 
 
 def _commands(data: str) -> Iterator[tuple[str, list[float], int]]:
-    """Commands with their numbers and places; one that is given once for several sets of numbers is repeated."""
+    """Commands with their numbers and places. A command with several sets of numbers is repeated for each set."""
     at, command, is_first = _after_separator(data, 0), "", True
     if data[:at].strip():
         raise ShapeError("path data, character 1: a command is missing")
@@ -211,7 +211,7 @@ def _arguments(data: str, at: int, command: str) -> tuple[list[float], int]:
 
 
 class _Pen:
-    """Where path data has come to, in user units."""
+    """The state while path data is drawn, in user units."""
 
     def __init__(self, contours: Contours, line: int) -> None:
         self.without_length = 0
@@ -322,7 +322,9 @@ def declarations(text: str) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """A rule of a style sheet: the name, classes and identities that it asks for; it counts by `rank`."""
+    """A rule of a style sheet: the name, classes and identities that an element needs; rules with a higher `rank` have
+    precedence.
+    """
 
     name: str
     classes: frozenset[str]
@@ -331,7 +333,7 @@ class Rule:
     properties: Mapping[str, str]
 
     def fits(self, name: str, classes: frozenset[str], identity: str) -> bool:
-        """Whether it is for an element."""
+        """Whether the rule applies to an element."""
         return (
             self.name in ("", "*", name)
             and self.classes <= classes
@@ -340,7 +342,7 @@ class Rule:
 
 
 def style_rules(text: str) -> tuple[list[Rule], list[str]]:
-    """The rules of a style sheet, and the selectors that are not understood (names, classes and ids are)."""
+    """The rules of a style sheet, and its selectors other than names, classes and ids, which are not supported."""
     text = _without_comments(text).replace("<!--", "").replace("-->", "")
     rules: list[Rule] = []
     others: list[str] = []

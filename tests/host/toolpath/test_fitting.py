@@ -314,9 +314,9 @@ def test_stretches_beside_a_vertex_without_room_do_not_overlap(
     def without_room(*given: object) -> Outline:
         found = outline(*given)  # type: ignore[arg-type]
         last = np.flatnonzero(~found.anchored[:-1] & found.anchored[1:]) + 1
-        room = found.room_mm.copy()
-        room[last] = 0.0
-        return replace(found, room_mm=room)
+        reach = found.coarse_reach_mm.copy()
+        reach[last] = 0.0
+        return replace(found, coarse_reach_mm=reach)
 
     plain = fitted(rounded_rectangle(0.5))
     monkeypatch.setattr(fitting, "outline", without_room)

@@ -49,7 +49,7 @@ def _solve(lower: Real, diagonal: Real, upper: Real, rhs: Real) -> Real:
     _place(band, diagonal, 0)
     _place(band, lower[1:], -1)
     _place(band, upper[:-1], 1)
-    # Here, since its import takes a quarter of the time in which a command that solves nothing starts.
+    # Here, since its import takes a quarter of the start time of a command that solves nothing.
     from scipy.linalg import lapack
 
     _, _, x, info = lapack.dgbsv(_REACH, _REACH, band, rhs, overwrite_ab=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public functions of the package: from points or a control polygon in space to a SpatialPHSpline."""
+"""From points or a control polygon in space to a SpatialPHSpline. For the pipeline and the API."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def spatial_through_points(
     knots: str = "chord",
     extra: Real | None = None,
 ) -> SpatialSplineResult:
-    """C2 PH quintic spline through given points in space, one span between neighbours.
+    """C2 PH quintic spline through given points in space, one span from each point to the next.
 
     `points`: real (n, 3), mm; tangents are vectors (3,); otherwise as `through_points`. Points of one z, with tangents
     that keep it, give the planar spline, bit for bit. `extra`: (n, E), values of extra axes at the points; mm, or
@@ -155,7 +155,7 @@ def _check_extra(points: object, extra: Real | None, what: str) -> None:
 def _with_extra(
     found: SpatialSplineResult, extra: Real | None, closed: bool, polygon: bool
 ) -> SpatialSplineResult:
-    """The same with extra axes that have the values `extra` (n, E) at the points that were given; None: none."""
+    """The spline with extra axes that have the values `extra` (n, E) at the given points; None: without."""
     if extra is None or not extra.shape[1]:
         return found
     spans = found.spline.segment_count

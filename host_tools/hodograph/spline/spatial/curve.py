@@ -19,7 +19,9 @@ from ..splitting import Image, split_segments
 from .quaternion import polar
 
 _GREATEST_COMPONENT = 8.0 - 2.0**-40
-"""Of A in a program: it has 48 bits for one, 44 of them after the point (docs/reference/protocol.md 1.2)."""
+"""Greatest component of A in a program, which has 48 bits for one, 44 of them after the point
+(docs/reference/protocol.md 1.2).
+"""
 
 _STRAIGHT = 1e-12
 """Curvature times the length of its segment below which a segment counts as straight: it has no torsion there."""
@@ -32,7 +34,7 @@ class SpatialPHSpline(ArcLengthChain):
     origin    (N, 3), start point of each segment
     preimage  (N, 4, 3), Bernstein coefficients of A = u + v i + p j + q k in mm^(1/2), the three of a component last
     closed    the end is the start
-    extra     (N, E, 6), Bezier coefficients of the axes that follow beside x, y, z; mm, degrees (`with_extra_axes`)
+    extra     (N, E, 6), Bezier coefficients of the extra axes; mm, degrees (`with_extra_axes`)
 
     Built by `spatial_from_control_polygon` or `spatial_through_points`, not by hand. All methods take arrays of any one
     shape (or scalars) and give arrays of that shape, of vectors with three components more. Arc lengths outside 0 …
@@ -135,7 +137,7 @@ class SpatialPHSpline(ArcLengthChain):
 
     @property
     def chain(self) -> PhChain:
-        """Its coefficients, as the native module takes them."""
+        """The coefficients of sigma for the native module."""
         return PhChain(
             self.segment_starts_mm,
             self._arc_coefficients,
@@ -183,8 +185,8 @@ class SpatialPHSpline(ArcLengthChain):
         return greatest_curvature(self.preimage, curvature_numerator, speed_of)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> SpatialPHSpline:
-        """The same curve in shorter segments; as PHSpline.split, with components of A below 8, and no segment in which
-        an extra axis moves by more than the format can express.
+        """The same curve in shorter segments, as PHSpline.split. In addition components of A are below 8, and no extra
+        axis moves by more within a segment than the format allows.
         """
         origin, preimage, extra = split_segments(
             self.origin,

@@ -14,7 +14,9 @@ from ..nodal import control_polygon_guide
 from .curve import SpatialPHSpline
 
 _MOST_SLOPE, _MOST_BEND = 1.5, 4.0
-"""Slope at a node times the longer span beside it, and second derivative times its square, over the greater step."""
+"""Greatest slope at a node times the longer span next to it, and greatest second derivative times the square of that
+span, over the greater step.
+"""
 
 _REPEATED = 1e-9
 
@@ -27,9 +29,9 @@ def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:
     curve  not yet split: one segment for each span
     values of an open path at its N + 1 joints, of a closed one at the N joints without the repeated first
 
-    Slopes and second derivatives by arc length at the nodes are those of a C2 cubic spline over arc length, limited
-    where a short span beside a long one would make the axis overshoot. A quintic for each span meets both. An axis
-    that is linear in arc length is exactly that.
+    Slopes and second derivatives by arc length at the nodes are those of a C2 cubic spline over arc length. They are
+    limited where the axis would overshoot, in a short span next to a long one. A quintic for each span meets both. An
+    axis that is linear in arc length stays exactly linear.
     """
     value = np.vstack((values, values[:1])) if curve.closed else np.asarray(values)
     slope, bend = _by_arc_length(curve.segment_starts_mm, value, curve.closed)
@@ -40,8 +42,8 @@ def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, ben
     """Bezier coefficients (N, E, 6) of axes with values, slopes and second derivatives (N + 1, E) by arc length at the
     joints of a curve.
 
-    In spans below _SHORT_MM they are rounded as a program has them: in a span of 10 nm that alone makes a third
-    derivative of 10^5 deg/mm^3, which a feed plan has to know.
+    In spans below _SHORT_MM they are rounded as in a program: in a span of 10 nm the rounding alone makes a third
+    derivative of 10^5 deg/mm^3, which a feed plan has to include.
     """
     c = curve.speed_coefficients
     begin = _by_parameter(slope[:-1], bend[:-1], c[:, 0], 4.0 * (c[:, 1] - c[:, 0]))
@@ -53,7 +55,7 @@ def quintics_by_arc_length(curve: SpatialPHSpline, value: Real, slope: Real, ben
 
 
 def with_standing_axes(curve: SpatialPHSpline, count: int) -> SpatialPHSpline:
-    """The curve with so many extra axes more, which stand at 0."""
+    """The curve with `count` more extra axes, which stand at 0."""
     if count == 0:
         return curve
     still = np.zeros((curve.segment_count, count, 6))
@@ -70,7 +72,7 @@ def nodal_values(values: Real, closed: bool) -> Real:
 
 
 def require_moving(points: Real, values: Real, what: str) -> None:
-    """Raises InputError: extra axes (n, E) differ between two neighbouring points (n, 3) that are the same."""
+    """Raises InputError: extra axes (n, E) differ between two consecutive points (n, 3) that are the same."""
     same = ~np.diff(points, axis=0).any(axis=1) & np.diff(values, axis=0).any(axis=1)
     if same.any():
         k = int(np.argmax(same))
@@ -81,9 +83,10 @@ def require_moving(points: Real, values: Real, what: str) -> None:
 
 
 def without_tail(values: Real, count: int, what: str) -> Real:
-    """The first `count` rows of extra axes: those of points that a closed path keeps.
+    """The first `count` rows of extra axes: those of the points that a closed path keeps.
 
-    The points after repeat the first ones in x, y and z. Raises InputError: an axis does not come back with them.
+    The points after them repeat the first ones in x, y and z. Raises InputError: an extra axis does not repeat its
+    values there.
     """
     tail = len(values) - count
     apart = np.abs(values[count:] - values[:tail])
@@ -99,7 +102,7 @@ def without_tail(values: Real, count: int, what: str) -> Real:
 
 def _by_arc_length(s_mm: Real, value: Real, closed: bool) -> tuple[Real, Real]:
     """First and second derivatives (nodes, E) by arc length."""
-    # Here, since scipy's import takes longer than most splines.
+    # Here, since the import of scipy takes longer than making most splines.
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(s_mm, value, bc_type="periodic" if closed else "not-a-knot")
@@ -113,7 +116,7 @@ def _by_arc_length(s_mm: Real, value: Real, closed: bool) -> tuple[Real, Real]:
 
 
 def _beside(spans: Real, closed: bool) -> Real:
-    """The greater of the two values (N, …) beside each node (N + 1, …)."""
+    """The greater of the two values (N, …) on both sides of each node (N + 1, …)."""
     before = np.concatenate((spans[-1:] if closed else spans[:1], spans))
     after = np.concatenate((spans, spans[:1] if closed else spans[-1:]))
     return np.asarray(np.maximum(before, after))

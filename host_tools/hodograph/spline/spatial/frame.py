@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The frame of a guide curve: roots of its hodograph without twist between spans; docs/theory/spatial-splines.md 3.
 
-It decides the freedom that interpolation leaves, and is where Newton starts.
+It fixes the freedom that interpolation leaves, and gives the starting values of Newton's method.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from ..bernstein import Real, basis
 from .quaternion import phase_between, root, turned
 
 _SAMPLES = 8
-"""Places a span at which the guide's tangent is followed; the middle one is at xi = 1/2."""
+"""Number of places on a span at which the guide's tangent is followed; the middle one is at xi = 1/2."""
 
 _LEAST_SPEED = 1e-3
-"""Of the chord: a guide that all but stops at mid-span gives no slower start than this."""
+"""Least speed of a starting value at mid-span, as a share of the chord, if the guide nearly stops there."""
 
 _REST, _NUDGE = 1e-6, 1e-3
 
@@ -59,7 +59,7 @@ def guide_frame(hodograph: Real, chords: Real) -> Frame:
 def without_rests(hodograph: Real, closed: bool) -> Real:
     """The hodograph (M, 3, 3) with zeros at the joints moved aside by a thousandth, to the left as seen from above.
 
-    A guide that stops and turns back exactly at a joint has no tangent there to follow. For judging and starting only.
+    A guide that stops and reverses exactly at a joint has no tangent there. For quality and starting values only.
     """
     before = hodograph if closed else hodograph[:-1]
     after = np.roll(hodograph, -1, axis=0) if closed else hodograph[1:]
@@ -77,7 +77,7 @@ def without_rests(hodograph: Real, closed: bool) -> Real:
 
 
 def _samples(hodograph: Real) -> Real:
-    """Tangents (8 M + 1, 3) along the guide; where it stands still, the one before, or the first one of all."""
+    """Tangents (8 M + 1, 3) along the guide; where its speed is 0, the one before, or the first one that exists."""
     xi = np.arange(_SAMPLES) / _SAMPLES
     inner = np.moveaxis(hodograph @ basis(2, xi).T, 1, 2).reshape(-1, 3)
     tangents = np.concatenate((inner, hodograph[-1:, :, 2]))

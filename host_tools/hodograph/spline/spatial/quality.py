@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""How good a solution in space is: turning and bending beside the guide's; docs/theory/spatial-splines.md 5."""
+"""Quality of a solution in space: turning and bending compared with the guide; docs/theory/spatial-splines.md 5."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def spline_shape(preimage: Real) -> SpaceShape:
 def guide_shape(hodograph: Real) -> SpaceShape:
     """Figures of spans with quadratic hodographs (N, 3, 3), vectors with their Bernstein coefficients last.
 
-    Where the guide stops and turns back, which no quadrature notices, the turning is that from sample to sample.
+    Where the guide stops and reverses, which quadrature cannot find, the turning is that from sample to sample.
     """
     shape, uneven = _shape(hodograph, _guide_rates)
     shape.turning[uneven] = np.maximum(shape.turning[uneven], _sampled_turning(hodograph[uneven]))
@@ -71,7 +71,7 @@ def _shape(spans: Real, rates: Rates) -> tuple[SpaceShape, NDArray[np.bool_]]:
 
     By Gauss quadrature on 6 points, or 96 where a span turns by more than 0.8 rad or its speed is uneven.
 
-    Except next to a cusp, bending is good to two digits and more. Turning is within 3 %: its integrand almost has a
+    Except next to a cusp, bending has two correct digits or more. Turning is within 3 %: its integrand almost has a
     kink where the curvature nearly vanishes.
     """
     speed, turning, bending = rates(spans, _SMOOTH[0])

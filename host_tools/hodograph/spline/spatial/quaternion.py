@@ -44,7 +44,7 @@ def polar_of(a: Real | Sequence[Real], b: Real | Sequence[Real]) -> tuple[Real, 
 
 
 def _components(a: Real) -> tuple[Real, Real, Real, Real]:
-    """u, v, p, q. np.moveaxis takes longer than what is made of them where there are few."""
+    """u, v, p, q. For few quaternions np.moveaxis would take longer than the computation."""
     return a[..., 0], a[..., 1], a[..., 2], a[..., 3]
 
 

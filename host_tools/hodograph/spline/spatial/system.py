@@ -103,7 +103,7 @@ class SpaceSystem:
         return np.asarray(means - 60.0 * self.chords / self.knots.length[:, None])
 
     def residual_mm(self, unknown: Real) -> Real:
-        """By how much each span misses its chord."""
+        """The error of each span's chord, mm."""
         return np.asarray(self.residual(unknown) * (self.knots.length[:, None] / 60.0))
 
     def newton_step(self, unknown: Real, residual: Real) -> Real:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Proof of how far a curve and the programmed path are apart, for every point of both.
+"""Proves a bound of the distance between a curve and the programmed path, for every point of both.
 
-docs/theory/toolpath-fitting.md section 6. The curve is replaced by chords, with a bound of how far they are off. The
-distance of a point from a chord is convex, so a whole chord is no farther from another one than the farther of its
-ends. Chords for which that is too much are halved.
+docs/theory/toolpath-fitting.md section 6. Chords with an error bound replace the curve. The distance of a point from a
+chord is convex, so a whole chord is no farther from another chord than the farther one of its ends. Chords whose bound
+exceeds the tolerance are halved.
 """
 
 from __future__ import annotations
@@ -23,22 +23,25 @@ _CHORD_SHARE = 0.005
 _MOST_PIECES = 4096
 _HALVINGS = 16
 _BESIDE = (2, 6, 6, 24)
-"""Neighbours on either side of the nearest chord so far, at first and after each of the first halvings; after these, 6.
-In noise, places of two chains belong to each other only roughly."""
+"""Chords on either side of the nearest one found that are compared, at first and after each of the first halvings;
+later 6. In noise, places of two chains correspond only roughly.
+"""
 
 _MOST_PAIRS = 100_000
 """Pairs of chords that are compared at once."""
 
 _SURE = 4
-"""Halvings after which the chords around a chord surely are those nearest to it."""
+"""Halvings after which the compared chords certainly include the nearest one."""
 
 ROUNDING_MM = 5e-9
-"""What the rounding of a program (2^-34 mm), its kernel (1 nm) and this proof add, with room to spare."""
+"""Allowance for the rounding of a program (2^-34 mm), of its kernel (1 nm) and of this proof."""
 
 
 @dataclass(frozen=True, eq=False)
 class Chords:
-    """Chords between points (n, 3), off by `error_mm` (n,), at places (n + 1,) that the other chain counts in too."""
+    """Chords between points (n, 3) with errors of at most `error_mm` (n,), at places (n + 1,) in the measure of the
+    other chain.
+    """
 
     start: Real
     end: Real
@@ -66,7 +69,7 @@ class Certificate:
 def certify(
     curve: SpatialPHSpline, place_mm: Real, reference: Reference, tolerance_mm: float
 ) -> Certificate:
-    """How far curve and reference are apart, exactly enough to say whether it is `tolerance_mm`.
+    """Bounds of the distance between curve and reference, fine enough to compare it with `tolerance_mm`.
 
     place_mm  (segments + 1,) rising places of the reference that belong to the joints of the curve
     """
@@ -111,7 +114,7 @@ def _curve_chords(
 
 
 def _reference_chords(reference: Reference, places: Real) -> tuple[Chords, Index]:
-    """The chords of the reference cut at `places`, and which each is part of."""
+    """The chords of the reference cut at `places`, and for each the chord that it is a part of."""
     own = reference.place_mm
     cut = np.unique(np.concatenate((own, places[(places > 0.0) & (places < own[-1])])))
     chord = np.clip(np.searchsorted(own, cut[:-1], side="right") - 1, 0, reference.count - 1)
@@ -136,7 +139,7 @@ def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
         beside = _BESIDE[halving] if halving < len(_BESIDE) else _BESIDE[1]
         bound, least, at = _nearest(start, end, at, to, beside)
         bound, least = bound + of.error_mm[owner], least + of.error_mm[owner]
-        # Where an end itself is too far from all chords around, halving proves nothing more.
+        # If an end itself is too far from all chords around it, halving proves nothing more.
         far = (bound > tolerance_mm) & ((least <= tolerance_mm) | (halving < _SURE))
         if halving == _HALVINGS or not far.any():
             np.maximum.at(found, owner, bound)
@@ -152,8 +155,8 @@ def _directed(of: Chords, to: Chords, tolerance_mm: float) -> Real:
 def _nearest(
     start: Real, end: Real, at: Index, to: Chords, beside: int
 ) -> tuple[Real, Real, Index]:
-    """Distance (n,) of chords to the nearest one of `beside` chords on either side of chords `at` (n,), that one's
-    error added; what the farther one of their ends alone has; and which is the nearest one.
+    """Distance (n,) of chords to the nearest of the chords `at` (n,) and `beside` chords on either side, plus the error
+    of that one; the distance of the farther end alone; and the index of the nearest chord.
     """
     parts = np.array_split(np.arange(at.size), max(1, at.size * (2 * beside + 1) // _MOST_PAIRS))
     found = [_nearest_of(start[own], end[own], at[own], to, beside) for own in parts]
@@ -164,7 +167,7 @@ def _nearest(
 def _nearest_of(
     start: Real, end: Real, at: Index, to: Chords, beside: int
 ) -> tuple[Real, Real, Index]:
-    """The same for few chords, all neighbours at once."""
+    """The same for few chords, with all chords around them at once."""
     other = np.clip(at[:, None] + np.arange(-beside, beside + 1), 0, to.start.shape[0] - 1)
     a, b, error = to.start[other], to.end[other], to.error_mm[other]
     from_start = distance_to_chord(start[:, None], a, b) + error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Puts lines, corner curves and splines behind one another to one curve of continuous curvature.
+"""Joins lines, corner curves and splines to one curve of continuous curvature.
 
 docs/theory/toolpath-fitting.md section 5.
 """
@@ -29,8 +29,8 @@ _LEAST_MM = 1e-9
 class Segments:
     """PH segments that belong to stretches of the reference, in any order.
 
-    origin    (n, 3) where they begin
-    end       (n, 3) where they end
+    origin    (n, 3) start points
+    end       (n, 3) end points
     preimage  (n, 4, 3)
     low, high (n,) places of the reference where they begin and end
     """
@@ -62,7 +62,9 @@ class Segments:
 
 
 def with_lines(given: Segments, first: Real, last: Real, length_mm: float) -> Segments:
-    """Segments with straight lines in their gaps, from `first` (3,) at place 0 to `last` (3,) at `length_mm`."""
+    """The segments, with straight lines in the gaps between them, from `first` (3,) at place 0 to `last` (3,) at
+    `length_mm`.
+    """
     own = given.ordered()
     begin = np.concatenate((first[None], own.end))
     end = np.concatenate((own.origin, last[None]))
@@ -87,7 +89,7 @@ def corner_segments(
     """Corner curves of tolerance `size_mm` (n,) at vertices (n, 3) between legs with unit vectors (n, 3).
 
     place  (n,) of the vertices
-    rate   (n,) each: how much the place changes with a mm of the leg before and of the leg after
+    rate   (n,) each: change of the place per mm of the leg before, and of the leg after
     """
     across = after - np.sum(before * after, axis=1)[:, None] * before
     sine = np.linalg.norm(across, axis=1)
@@ -106,7 +108,7 @@ def corner_segments(
         level[:, None, None, None], _level_preimage(w, before, across), _turned(w, before, across)
     )
     reach = (unit.reach * size_mm)[:, None]
-    # The two middle joints meet the vertex; the others are as far from it as along the legs.
+    # The two middle joints are at the place of the vertex; the others at their distance along the legs.
     count = SHAPES[shape].segments
     at = np.abs(joint) / np.abs(joint[:, :1]) * reach
     at[:, count // 2] = 0.0
@@ -154,7 +156,7 @@ def straightened(preimage: Real, spans: Real, direction: Real) -> Real:
 
     spans      (3,) lengths of their parameter in the spline, which has continuous second derivatives
     direction  (3,) unit vector of the line
-    Start, end, and everything behind the end stay as they are. Raises PlanError where there is no such curve nearby.
+    Start, end and everything after the end stay the same. Raises PlanError: there is no such curve nearby.
     """
     size = np.sqrt(spans)[:, None]
     chord = hodograph_of(preimage).mean(axis=2).sum(axis=0)
@@ -178,7 +180,7 @@ def straightened(preimage: Real, spans: Real, direction: Real) -> Real:
     aside = _across(direction)
 
     def residual(free: Real) -> Real:
-        """What is left (m, 7) of the conditions."""
+        """Residuals (m, 7) of the conditions."""
         hodograph = hodograph_of(assembled(free))
         missing = (hodograph.mean(axis=3).sum(axis=1) - chord) / np.linalg.norm(chord)
         here, beside = hodograph[:, 0, :, 0], hodograph[:, 0, :, 1]

@@ -5,8 +5,8 @@ docs/theory/toolpath-fitting.md section 4. The preimage w of a corner is a unifo
 the bisector. Its few numbers were found by search for the least time through the corner at limited jerk. In the
 jerk-limited regime a corner's shape does not depend on the limits; the tolerance only scales it.
 
-There are several shapes: the farther a corner may reach into its legs, the less time it takes. The wide ones first
-swing to the outer side of the tolerance.
+There are several shapes: the more of its legs a corner may use, the less time it takes. The wide ones first swing to
+the outer side of the tolerance.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from ...spline.bernstein import Complex, Real, basis, square
 
 SHARPEST_RAD = 2.6
-"""Turns beyond this are stops: a corner curve would take as long."""
+"""Sharper turns are stops: a corner curve would take as long."""
 
 _PLACES = 33
 _ANGLES = 60
@@ -56,11 +56,11 @@ SHAPES = (
     Shape((-1.041,), (1.022,), -0.62),
     Shape((), (), 1.099),
 )
-"""The widest first. The last one takes the least room."""
+"""The shapes, the widest first. The last one uses the least length of its legs."""
 
 
 def extent(turn_rad: Real, shape: int = -1) -> Real:
-    """How far (n,) a corner of tolerance 1 reaches into its legs, for turns in 0 … SHARPEST_RAD; inf for turn 0."""
+    """Length (n,) of its legs that a corner of tolerance 1 uses, for turns in 0 … SHARPEST_RAD; inf for turn 0."""
     turn, reach = _extents(shape)
     # Nearly proportional to 1 / turn, so that this product is smooth.
     with np.errstate(divide="ignore"):
@@ -79,7 +79,7 @@ class Corners:
 
     w      (n, segments, 3) Bernstein coefficients of the preimages
     joint  (n, segments + 1) complex; from leg to leg
-    reach  (n,) how far the curve takes each leg
+    reach  (n,) length of each leg that the curve uses
     """
 
     w: Complex

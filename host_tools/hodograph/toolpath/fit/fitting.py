@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """From a programmed path to a curve of continuous curvature within a certified tolerance.
 
-docs/theory/toolpath-fitting.md.
+Theory: docs/theory/toolpath-fitting.md. `fit` is used by job.py, by stream/ and by the API.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _CORNER_SHARE, _ROOM_SHARE = 0.985, 0.985
-"""Of the tolerance: for corner curves, and for stations of smoothed stretches."""
+"""Shares of the tolerance for corner curves, and for stations of smoothed stretches."""
 
 _LEG_SHARE = 0.98
 _STRAIGHT_ROOM = 10.0
-"""In tolerances: room of a vertex at which the path goes straight on, where a stretch may end."""
+"""Usable leg length, in tolerances, of a vertex without change of direction, where a stretch may end."""
 
 _ENDS = 8.0
-"""How far a stretch reaches into a long leg, in multiples of the room of the vertex there."""
+"""Length of a long leg that a stretch uses, in multiples of the usable leg length of the vertex there."""
 
 _BARRIER = 3e-7
 _POWER = 5
@@ -42,11 +42,13 @@ _ROUNDS = 8
 _REPAIRS = 12
 _MOST_FOR_CHOICE = 20_000
 _SLOW_SHARES = (0.5, 0.25)
-"""Of the speed at which full acceleration is reached within a length that jerk allows: caps of further estimates."""
+"""Greatest speeds of further estimates, as shares of the speed above which acceleration and not jerk limits the
+motion.
+"""
 
 _LESS_ROOM = (0.95, 0.95, 0.95, 0.75)
-"""Of the room, where a curve was out of it: in the first rounds of repair, then in all. At first the new stations help,
-and less room costs time.
+"""Factors on the bounds of stations where a curve was outside the tolerance: in the first rounds of repair, and in
+later ones. In the first rounds the new stations help; lower bounds cost time.
 """
 _THIN_SHARE = 0.01
 _THIN_ROUNDS = 4
@@ -56,10 +58,10 @@ _THIN_ROUNDS = 4
 class FittedPath:
     """A curve from rest to rest, and how it belongs to the programmed path.
 
-    curve         at most `certificate.worst_mm` from the reference, and the reference from it
+    curve         at most `certificate.worst_mm` from the reference, and vice versa
     place_mm      (segments + 1,) places of the reference at the joints of the curve
-    turning_deg   bound of how far the rotary axes along are from the programmed angles at the same share of the way
-                  between two points; None: none turns along
+    turning_deg   bound of the deviation of the rotary axes from the programmed angles at corresponding places; None:
+                  none moves
     """
 
     reference: Reference
@@ -80,7 +82,7 @@ class FittedPath:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How a path may be changed: by `tolerance_mm` at most, so that a motion inside `limits` is fast."""
+    """The tolerance of a curve, and the motion limits for which it should be fast."""
 
     tolerance_mm: float
     limits: MotionLimits
@@ -96,13 +98,14 @@ class Unfit:
 def fit(
     reference: Reference, how: Tolerance, tied: tuple[bool, bool] = (False, False)
 ) -> FittedPath | Unfit:
-    """The curve of a reference without turns beyond SHARPEST_RAD, and that begins and ends at rest.
+    """The curve of a reference that has no turns beyond SHARPEST_RAD; NotFitted: the chords around which none was
+    found.
 
-    Where start or end is `tied`, it is straight there, in the direction of the chord: curves of both halves of a chord
-    join with continuous curvature.
+    The path begins and ends at rest. If an end is `tied`, it is in the middle of a chord of a longer path: the curve is
+    straight there, so that the curves of both halves of the chord join with continuous curvature.
 
-    Smoothing weighs its cost with estimated speeds. Of a path that is not very long, each stretch is smoothed for
-    estimates with the programmed feeds and with lower ones; what should take the least time is taken.
+    Smoothing weighs its cost with estimated speeds. Each stretch of a path that is not very long is smoothed for
+    estimates with the programmed feeds and with lower ones. The result with the least estimated time is taken.
     """
     path = outline(reference, how.tolerance_mm, tied)
     plan = _Plan.of(path, how, tied).with_stretches(_ROOM_SHARE).with_choice(_caps(reference, how))
@@ -151,7 +154,7 @@ def _chords(reference: Reference, spans: Real) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class _Smoothed:
-    """Points (n, 3) through which the curve of a stretch leads, their places (n,), and about how long it takes."""
+    """Points (n, 3) on the curve of a stretch, their places (n,), and its estimated time."""
 
     point: Real
     place_mm: Real
@@ -160,7 +163,7 @@ class _Smoothed:
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """What a section is made of: corners at single vertices, and stretches of stations between long legs."""
+    """The parts of a section: corners at single vertices, and stretches of stations between long legs."""
 
     path: Outline
     how: Tolerance
@@ -176,7 +179,7 @@ class _Plan:
 
     @classmethod
     def of(cls, path: Outline, how: Tolerance, tied: tuple[bool, bool]) -> _Plan:
-        long, reach = path.anchored, path.room_mm.copy()
+        long, reach = path.anchored, path.coarse_reach_mm.copy()
         inner = reach[1:-1]
         inner[inner == 0.0] = _STRAIGHT_ROOM * how.tolerance_mm
         leg, count = path.leg_mm, path.leg_mm.size
@@ -186,12 +189,12 @@ class _Plan:
             near, far = share * reach[:-1], share * reach[1:]
         vertex = np.arange(1, count)
         alone = vertex[long[:-1] & long[1:] & (path.turn_rad[1:-1] > 0.0)]
-        room = np.minimum(far[alone - 1], near[alone])
+        usable_mm = np.minimum(far[alone - 1], near[alone])
         off = np.maximum(path.off_mm[alone - 1], path.off_mm[alone])
         size = _CORNER_SHARE * how.tolerance_mm - off
         shape = np.full(alone.size, len(SHAPES) - 1, dtype=np.intp)
         for k in range(len(SHAPES) - 2, -1, -1):
-            shape[extent(path.turn_rad[alone], k) * size <= room] = k
+            shape[extent(path.turn_rad[alone], k) * size <= usable_mm] = k
         spans = []
         short = np.flatnonzero(~long)
         runs = np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if short.size else []
@@ -208,16 +211,16 @@ class _Plan:
         return cls(path, how, tied, alone, shape, size, tuple(spans))
 
     def with_stretches(self, share: float) -> _Plan:
-        """With stations on the stretches, which have `share` of the tolerance as room."""
-        room = share * self.how.tolerance_mm
+        """The layout with stations on its stretches; their bounds are `share` of the tolerance."""
+        bound_mm = share * self.how.tolerance_mm
         made = [
-            stations(self.path, first, last, (before, after), room)
+            stations(self.path, first, last, (before, after), bound_mm)
             for first, last, before, after in self.spans
         ]
         return replace(self, stretches=made, shaped=[None] * len(made), known=[None] * len(made))
 
     def with_choice(self, caps: list[float]) -> _Plan:
-        """With stretches smoothed for the one of these greatest speeds that should take the least time."""
+        """The layout with each stretch smoothed for the greatest speed, of these, with the least estimated time."""
         which = list(range(len(self.stretches)))
         if not which:
             return self
@@ -230,7 +233,9 @@ class _Plan:
         )
 
     def tightened(self, low: Real, high: Real, less: float) -> _Plan:
-        """With `less` of the room, and more stations, in stretches that reach between places low (n,) and high (n,)."""
+        """The layout with bounds times `less`, and more stations, in stretches between places low (n,) and high
+        (n,).
+        """
         made = [tightened(one, low, high, less, self.how.tolerance_mm) for one in self.stretches]
         kept = [one is old for one, old in zip(made, self.stretches, strict=True)]
         known = [own if keep else None for own, keep in zip(self.known, kept, strict=True)]
@@ -238,7 +243,7 @@ class _Plan:
         return replace(self, stretches=made, shaped=shaped, known=known)
 
     def segments(self) -> tuple[Segments, Real]:
-        """The curves between the straight lines, and the places (n, 2) of stretches for which there is none."""
+        """The curves between the straight lines, and the places (n, 2) of stretches for which none was found."""
         parts = [self._corners(k) for k in range(len(SHAPES)) if (self.shape == k).any()]
         new = [index for index, known in enumerate(self.known) if known is None]
         moved = [index for index in new if self.shaped[index] is None]
@@ -274,7 +279,7 @@ class _Plan:
         )
 
     def _smoothed(self, which: list[int]) -> list[_Smoothed]:
-        """Points of these stretches, each for its greatest speed."""
+        """Smoothed points of these stretches, each for its greatest speed."""
         stretches = [self.stretches[index] for index in which]
         place = np.concatenate([one.place_mm for one in stretches])
         count = [one.place_mm.size for one in stretches]
@@ -282,7 +287,7 @@ class _Plan:
         own = Stations(
             np.concatenate([one.point for one in stretches]),
             _normals(np.concatenate([one.direction for one in stretches])),
-            np.concatenate([one.room_mm for one in stretches]),
+            np.concatenate([one.bound_mm for one in stretches]),
         )
         limits = self.how.limits
         programmed = np.minimum(self.path.feed_at(place), limits.feed_mm_s)
@@ -332,7 +337,7 @@ class _Plan:
 
 
 def _arc_places(moved: Real, place: Real, group: Index) -> Real:
-    """Arc lengths (n,) of the moved stations; between groups as far apart as before."""
+    """Arc lengths (n,) of the moved stations; the distance between groups stays the same."""
     step = np.linalg.norm(np.diff(moved, axis=0), axis=1)
     step = np.where(np.diff(group) > 0, np.maximum(np.diff(place), 1e-6), step)
     return np.concatenate((place[:1], place[0] + np.cumsum(step)))
@@ -350,7 +355,7 @@ def _normals(direction: Real) -> Real:
 
 
 def _thinned(points: Real, place: Real, off_mm: float) -> tuple[Real, Real]:
-    """Stations without those that a cubic through their neighbours meets anyway."""
+    """The stations without those that a cubic through the stations around them meets."""
     for _ in range(_THIN_ROUNDS):
         count = place.size
         if count < 9:

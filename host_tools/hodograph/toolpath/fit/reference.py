@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The programmed path of moves as chords, with a bound of how far each chord is from what was programmed.
+"""The programmed path of moves as chords, with a bound of the error of each chord.
 
 docs/theory/toolpath-fitting.md section 2.
 """
@@ -32,7 +32,7 @@ class Reference:
     point      (n + 1, 3) mm
     line       (n,) source line of each chord
     feed_mm_s  (n,) programmed feed along it; inf: as fast as the machine can
-    sag_mm     (n,) the programmed path between the ends of a chord and the chord are nowhere farther apart
+    sag_mm     (n,) bound of the distance between a chord and the programmed path between its ends
     turn_deg   (n + 1, 3) a, b and c at the points, linear between them; None: they stay at 0
     """
 
@@ -44,7 +44,7 @@ class Reference:
 
     @property
     def count(self) -> int:
-        """Chords."""
+        """Number of chords."""
         return int(self.line.size)
 
     @cached_property
@@ -73,7 +73,7 @@ class ReferenceBuilder:
     """Takes moves, one after the other, and keeps their chords."""
 
     def __init__(self, start: Position, sag_mm: float) -> None:
-        """`sag_mm`: what a chord of an arc or a spline may be off. `length_mm` counts the chords so far."""
+        """`sag_mm`: greatest error of a chord of an arc or a spline. `length_mm` grows with the chords."""
         self.start = start
         self.length_mm = 0.0
         self._at = start
@@ -84,11 +84,11 @@ class ReferenceBuilder:
 
     @property
     def position(self) -> Position:
-        """Where the last move ends."""
+        """The end of the last move."""
         return self._at
 
     def add(self, move: Move) -> None:
-        """The next move. One that turns a, b or c has to change x, y or z too."""
+        """Adds the next move. A move of a, b or c has to change x, y or z too."""
         first = len(self._points) - 1
         if isinstance(move, StraightMove):
             end = move.end[:3]
@@ -111,7 +111,7 @@ class ReferenceBuilder:
             self._points.extend(tuple(row) for row in points[1:].tolist())
             self._rows.extend([(move.line, feed, sag)] * (points.shape[0] - 1))
         if move.end[3:] != self._at[3:]:
-            # Between these points the angles are linear, between those of two such moves they stay.
+            # The angles are linear between these points, and constant between the points of two such moves.
             self._turns[first] = self._at[3:]
             self._turns[len(self._points) - 1] = move.end[3:]
         self._at = move.end
@@ -122,16 +122,16 @@ class ReferenceBuilder:
         return len(self._rows)
 
     def points(self, first: int, end: int) -> Real:
-        """Points (n, 3) first … end - 1, as far as there are so many."""
+        """Points (n, 3) first … end - 1, or fewer at the end of the path."""
         return np.array(self._points[max(first, 0) : end], dtype=np.float64)
 
     @property
     def turns(self) -> bool:
-        """Whether a move has turned a, b or c."""
+        """Whether a, b or c has moved."""
         return len(self._turns) > 1
 
     def angles(self, first: int, end: int) -> Real:
-        """a, b and c (n, 3) at points first … end - 1, as far as there are so many."""
+        """a, b and c (n, 3) at points first … end - 1, or fewer at the end of the path."""
         known = list(self._turns)
         first, end = max(first, 0), min(end, len(self._points))
         low = max(bisect_right(known, first) - 1, 0)
@@ -147,7 +147,7 @@ class ReferenceBuilder:
         return np.stack([np.interp(own, at, column) for column in value.T], axis=1)
 
     def cut(self, chord: int) -> Reference:
-        """The chords of all moves so far up to the middle of this one; the other half and what follows stays."""
+        """Cuts off and returns all chords up to the middle of this one; the other half and later chords stay."""
         middle = _middle(*self._points[chord : chord + 2])
         turned = _middle(*self.angles(chord, chord + 2).tolist())
         points, rows, turns = self._points, self._rows, self._turns
@@ -199,7 +199,7 @@ def feed_of(feed: Feed | None, length_mm: float) -> float:
 
 
 def arc_points(start: Position, move: ArcMove, sag_mm: float) -> tuple[Real, float]:
-    """Points (n + 1, 3) of an arc from `start`, and how far its chords are off at most."""
+    """Points (n + 1, 3) of an arc from `start`, and the greatest error of its chords."""
     first, second, normal = move.plane.value
     centre = np.array(move.centre)
     begin = np.array([start[first], start[second]]) - centre
@@ -207,7 +207,7 @@ def arc_points(start: Position, move: ArcMove, sag_mm: float) -> tuple[Real, flo
     radius = float(np.hypot(*begin)), float(np.hypot(*end))
     angle = atan2(begin[1], begin[0])
     swept = _swept(angle, atan2(end[1], end[0]), move.turns)
-    # |r''| by the angle is at most the radius and twice its rate of change: chords are off by an eighth of it.
+    # |r''| by the angle is at most the radius plus twice its rate of change; the error of a chord is an eighth of that.
     bend = max(radius) + 2.0 * abs(radius[1] - radius[0]) / max(abs(swept), _LEAST_CHORD_RAD)
     step = min(max(sqrt(8.0 * sag_mm / bend), _LEAST_CHORD_RAD), 0.5)
     count = min(max(ceil(abs(swept) / step), 2), _MOST_ARC_CHORDS)
@@ -232,7 +232,7 @@ def _swept(begin: float, end: float, turns: int) -> float:
 
 
 def spline_points(move: SplineMove, sag_mm: float) -> tuple[Real, float]:
-    """Points (n + 1, 3) of a NURBS, and how far its chords are off at most.
+    """Points (n + 1, 3) of a NURBS, and the greatest error of its chords.
 
     Bézier pieces in homogeneous coordinates are halved until each lies near its chord: weights are positive, so a piece
     is inside the hull of its control points.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sections of a toolpath: what is passed from rest to rest, and what happens at the stops between.
+"""Divides a toolpath into sections from rest to rest, with the commands at the rests between them.
 
 docs/theory/toolpath-fitting.md section 1.
 """
@@ -45,13 +45,13 @@ from .stations import outline
 Real = NDArray[np.float64]
 
 SAG_SHARE = 0.01
-"""Of the tolerance: how far the chords of an arc or a spline may be off."""
+"""Share of the tolerance for the error of chords of an arc or a spline."""
 
 EXACT_MM = 1e-3
-"""Deviation of arcs and splines where moves are to be followed exactly."""
+"""Error of chords of arcs and splines where the tolerance is 0."""
 
 _STRAIGHT_RAD = 1e-6
-"""Change of direction up to which moves of G61 go straight on."""
+"""Greatest change of direction between moves of G61 that is no corner."""
 
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
 SHORTEST_MM = 2.0**-9
@@ -59,7 +59,7 @@ SHORTEST_MM = 2.0**-9
 
 
 _LONG_TOLERANCES = 10.0
-"""Of a path that is always a section, wherever it ends."""
+"""Length of a path that is always a section, wherever it ends."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +76,8 @@ class Section:
 
     reference     the programmed path
     tolerance_mm  how far the curve may be from it
-    before        commands that happen at rest, before the section starts
-    events        commands that happen on the way
+    before        commands at rest, before the section starts
+    events        commands within it
     tied          whether start and end are no rests, but in the middle of a chord of a longer section: the curve is
                   straight there, in the direction of the chord
     stands_at     of a section that turns a, b and c alone: where x, y and z stand, mm. The points of its reference are
@@ -94,7 +94,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False)
 class Toolpath:
-    """All sections, and the commands that happen at rest at the end."""
+    """All sections, and the commands at rest at the end."""
 
     sections: tuple[Section, ...]
     after: tuple[Command, ...]
@@ -102,7 +102,7 @@ class Toolpath:
 
 @dataclass
 class Divider:
-    """Collects moves until something asks for a stop."""
+    """Collects moves until a command or a corner needs a stop."""
 
     file: str
     asked_mm: float
@@ -147,7 +147,7 @@ class Divider:
             self.before.append(command)
 
     def _spindle(self, command: Spindle) -> None:
-        """The axes stop for it, but where it changes S only, of a laser that follows the feed."""
+        """A command at rest. If it only changes S of a laser that follows the feed, the axes do not stop."""
         before, self.rotation = self.rotation, command.rotation
         dynamic = before is command.rotation is Rotation.COUNTERCLOCKWISE
         if self.laser_mode and dynamic:
@@ -170,8 +170,8 @@ class Divider:
             self.stop()
 
     def _turned_alone(self, move: Move) -> StraightMove | None:
-        """The move as one of (a, b, c) in place of x, y, z, where it turns axes while x, y and z go less than a path
-        needs; None: x, y and z move.
+        """The move with (a, b, c) in place of x, y, z, if it moves rotary axes alone: x, y and z move less than a path
+        needs. None: x, y and z move.
         """
         if not isinstance(move, StraightMove):
             return None
@@ -189,19 +189,19 @@ class Divider:
 
     @property
     def _place(self) -> Position:
-        """Where the moves have led so far; x, y and z less than a path needs away from there count for the next one."""
+        """The end of the moves so far. Shorter moves of x, y and z than a path needs are added to the next one."""
         own = self.builder.position
         return own if self.stands_at is None else (*self.stands_at, *own[:3])
 
     def _go_to_turning(self) -> None:
-        """The section ends. The next one turns a, b and c."""
+        """Ends the section. The next one moves a, b and c alone."""
         self.stop()
         here = self.builder.position
         self.stands_at = here[:3]
         self._begin_at((*here[3:], 0.0, 0.0, 0.0))
 
     def _go_from_turning(self) -> None:
-        """The section that turns a, b and c ends."""
+        """Ends the section of a, b and c alone."""
         self.stop()
         here = self._place
         self.stands_at = None
@@ -225,7 +225,7 @@ class Divider:
             self.direction = None
 
     def _goes_straight_on(self, move: Move) -> bool:
-        """Whether a straight move goes on in the direction of the straight move before it."""
+        """Whether a straight move has the direction of the straight move before it."""
         if self.direction is None or not isinstance(move, StraightMove):
             return False
         leg = np.subtract(move.end[:3], self.builder.position[:3])
@@ -250,7 +250,7 @@ class Divider:
 
     @property
     def section_tolerance(self) -> float:
-        """Deviation that a section may have."""
+        """Tolerance of the section."""
         if self.blending is Blending.CONTINUOUS and self.tolerance_mm > 0.0:
             return self.tolerance_mm
         return min(self.tolerance_mm or EXACT_MM, EXACT_MM)
@@ -265,7 +265,7 @@ class Divider:
         self.events.append(PathEvent(self.builder.length_mm, command))
 
     def add(self, reference: Reference, *, ends_tied: bool) -> None:
-        """Adds what was collected as sections; `ends_tied`: the last one goes on in motion."""
+        """Adds the collected moves as sections; `ends_tied`: the last one continues in motion."""
         whole = Section(
             reference,
             self.section_tolerance,
@@ -278,14 +278,14 @@ class Divider:
         self.before, self.events, self.tied = [], [], ends_tied
 
     def stop(self) -> None:
-        """Whatever comes next starts from rest."""
+        """Ends the section: the next move starts from rest."""
         if not self.moved:
             return
         reference = self.builder.reference()
         if reference.count and float(reference.place_mm[-1]) >= SHORTEST_MM:
             self.add(reference, ends_tied=False)
             begin = self.builder.position
-        else:  # too short to be run: the next section makes it good
+        else:  # too short for a section: the next section includes it
             begin = self.builder.start
         self.builder = ReferenceBuilder(begin, SAG_SHARE * self.section_tolerance)
         self.moved = False
@@ -301,8 +301,8 @@ def divided(
 ) -> Toolpath:
     """The sections of a toolpath.
 
-    tolerance_mm  how far curves may be from the programmed path; 0: exact stops everywhere. What a toolpath asks for
-                  itself (G64 P) counts where it is less
+    tolerance_mm  greatest distance of curves from the programmed path; 0: exact stops everywhere. A lower tolerance in
+                  the toolpath (G64 P) counts
     laser_mode    whether S after M4 changes in motion
     Raises InputError, naming file and line: moves that have no path.
     """
@@ -330,9 +330,9 @@ def _without_reversals(section: Section) -> Iterator[Section]:
 
 
 def _far_apart(section: Section, inner: list[int]) -> list[int]:
-    """Those of these inner points between which, and beside which, each part leads to a place that is as far as a
-    section has to be long, or is so long that no curve within the tolerance is shorter: a smaller hook stays in a part.
-    All of them, where none is left.
+    """The inner points at which the section may be cut: the ends of each part are as far apart as a section has to be
+    long, or the part is longer than any curve within the tolerance could shorten. A smaller hook stays inside a part.
+    All points, if none would remain.
     """
     reference, last = section.reference, section.reference.count
     long_mm = max(SHORTEST_MM, _LONG_TOLERANCES * section.tolerance_mm)

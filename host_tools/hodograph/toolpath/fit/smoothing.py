@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Moves points sideways, each within its bound, so that the path through them can be passed fast.
 
-docs/theory/toolpath-fitting.md section 3. The cost of a path is the integral of its jerk squared over time, at
-speeds (n,) that are given. It is quadratic in the shifts. The bounds are kept by a barrier, so that every step of the
-search stays inside them and no decision has to be made which of them bind. The search is in C.
+docs/theory/toolpath-fitting.md section 3. The cost of a path is the integral of its jerk squared over time, at speeds
+(n,) that are given. It is quadratic in the shifts. A barrier keeps the bounds, so every step of the search stays inside
+them and no active set is needed. The search is in C.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _ORDER = 3
 
 @dataclass(frozen=True, eq=False)
 class Stations:
-    """Places of a path that may be moved.
+    """Stations of a path, which may be moved.
 
     point   (n, 3) mm
     normal  (n, 3, m) orthonormal directions in which a station may move: m = 1 in a plane, 2 in space
-    bound   (n,) how far, mm; 0: not at all
+    bound   (n,) greatest shift, mm; 0: the station stays
     """
 
     point: Real
@@ -55,7 +55,7 @@ def smoothed(
     middle = 0.5 * (weight[1:-2] + weight[2:-1])
     coefficient = coefficient * np.sqrt(width * middle)[:, None]
     shift = np.empty_like(start)
-    # Each curve by itself: the steps of one are not shortened by the bounds of another.
+    # Each curve by itself, so that the bounds of one do not shorten the steps of another.
     edges = [0, *(np.flatnonzero(np.diff(group)) + 1).tolist(), group.size]
     for first, end in itertools.pairwise(edges):
         own, rows = slice(first, end), slice(first, max(first, end - _ORDER))

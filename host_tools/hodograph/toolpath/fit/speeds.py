@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""An estimate of the speed along a path of points: what smoothing weighs its cost with.
-
-It decides nothing but where smoothing matters: the feed is planned exactly, later. docs/theory/toolpath-fitting.md 3.
+"""An estimate of the speed along a path of points, with which smoothing weighs its cost;
+docs/theory/toolpath-fitting.md 3. It only decides where smoothing matters: the feed itself is planned later.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ _LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """The lowest limits of the axes: along the path none of them is exceeded below these."""
+    """The lowest limits of all axes: a motion that keeps them along the path keeps the limits of each axis."""
 
     feed_mm_s: float
     acceleration_mm_s2: float
@@ -42,7 +41,7 @@ def speeds(point: Real, place: Real, feed_mm_s: Real, limits: MotionLimits) -> R
         )
         speed = np.minimum(speed, np.cbrt(limits.jerk_mm_s3 / most))
     speed[[0, -1]] = np.minimum(speed[[0, -1]], _LEAST_SHARE * feed_mm_s[[0, -1]])
-    # At constant jerk from a slow place v^(3/2) rises with the way, at constant acceleration v^2 does.
+    # At constant jerk from a slow place v^(3/2) rises with the distance, at constant acceleration v^2 does.
     rise = 1.5 * _JERK_SHARE * sqrt(limits.jerk_mm_s3) * place
     speed = np.cbrt(_within(speed**1.5, rise)) ** 2
     rise = 2.0 * _ACCELERATION_SHARE * limits.acceleration_mm_s2 * place

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Where a path is divided: at long straight lines, and into stations that smoothing may move.
+"""Divides a path at long straight lines into corners and stretches, and a stretch into stations that smoothing may
+move.
 
 docs/theory/toolpath-fitting.md section 3.
 """
@@ -19,33 +20,38 @@ Flags = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
 _THIN_SHARE = 0.04
-"""Of the tolerance: how far a point that is left out may lie from the leg that passes it."""
+"""Share of the tolerance: greatest distance of a dropped point from its leg."""
 
 _LINE_SHARE = 0.25
-"""The same for points on a leg that is left alone: noise on a straight line does not keep corners from their room."""
+"""The same for points on a leg that no corner or stretch uses as a whole: noise on a straight line does not reduce the
+usable leg length of corners.
+"""
 
 _ROUGH_SHARE, _ROUGH_LEG = 0.7, 8.0
-"""The same for points of noise, which have a leg of at most so many tolerances."""
+"""The same for points of noise, and the greatest length of their legs in tolerances."""
 
 _WINDOW = 7
-"""Of so many neighbouring points most turn to another side than a neighbour, where it is noise."""
+"""Number of consecutive points that are noise if most of them turn to another side than a point next to them."""
 
 _NEAREST = 11.0
-"""In tolerances: how near vertices of smoothed stretches may be that are not needed to keep `_LINE_SHARE`."""
+"""Least distance, in tolerances, of vertices of smoothed stretches that are not needed to keep `_LINE_SHARE`."""
 
 _THIN_ROUNDS = 12
 _GRADES = np.array([0.25, 0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0, 9.0, 15.0])
-"""Stations beside a vertex, in multiples of the room that its corner curve would take."""
+"""Distances of stations from a vertex, in multiples of the usable leg length that its corner curve would need."""
 
 _MIDDLE = 0.2
-"""A leg longer than this share of the room at its ends has a station in its middle."""
+"""A leg longer than this share of the usable leg length at its ends has a station in its middle."""
 
 _STRAIGHT = np.array([0.0, 0.2])
-"""Stations at the ends of long legs that stay on them, as shares of the part that is taken: the curve leaves a leg with
-its direction and without curvature."""
+"""Fixed stations at the ends of long legs, as shares of the used part of the leg: the curve leaves a leg in its
+direction with curvature 0.
+"""
 
 _LONG = 4.0
-"""A leg this many times as long as the room that corners at its ends need at least is left alone between them."""
+"""If a leg is this many times as long as the least usable leg length of the corners at its ends, its middle stays
+straight.
+"""
 
 _MOST_TIMES = 8.0
 _LESS_ELSEWHERE = 0.99
@@ -55,14 +61,15 @@ _LESS_ELSEWHERE = 0.99
 class Outline:
     """The vertices of a section that are kept.
 
-    point     (n + 1, 3) mm
-    place_mm  (n + 1,) where they are on the reference
-    off_mm    (n,) how far points that were left out lie from each leg
-    turn_rad  (n + 1,) change of direction; 0 at the ends
-    reach_mm  (n + 1,) how far a corner curve would take each leg; 0 at the ends and where it goes straight on
-    room_mm   (n + 1,) the same, where smaller turns between long legs are left out
-    anchored  (n,) legs so long that the corners at both ends leave a part of them alone
-    reference   that it is the outline of
+    point            (n + 1, 3) mm
+    place_mm         (n + 1,) their places on the reference
+    off_mm           (n,) greatest distance of dropped points from each leg
+    turn_rad         (n + 1,) change of direction; 0 at the ends
+    reach_mm         (n + 1,) usable leg length that a corner curve would need; 0 at the ends and where the direction
+                     does not change
+    coarse_reach_mm  (n + 1,) the same, where smaller turns between long legs are left out
+    anchored         (n,) whether a leg is so long that a part of it between the corners stays straight
+    reference        the path of which this is the outline
     """
 
     point: Real
@@ -70,7 +77,7 @@ class Outline:
     off_mm: Real
     turn_rad: Real
     reach_mm: Real
-    room_mm: Real
+    coarse_reach_mm: Real
     anchored: Flags
     reference: Reference
 
@@ -105,7 +112,7 @@ def turns(point: Real) -> Real:
 def outline(
     reference: Reference, tolerance_mm: float, tied: tuple[bool, bool] = (False, False)
 ) -> Outline:
-    """The vertices of a reference, without those that lie on the way between their neighbours.
+    """The vertices of a reference, without those that lie nearly on the line between the vertices beside them.
 
     tied  whether the first and the last leg have to be the first and the last chord
     """
@@ -115,25 +122,25 @@ def outline(
     coarse = _thinned(
         reference, coarse, _ROUGH_SHARE * tolerance_mm, tied, _ROUGH_LEG * tolerance_mm
     )
-    room = _reach(reference.point[coarse], tolerance_mm)
-    long = _is_long(reference.point[coarse], room)
+    coarse_reach = _reach(reference.point[coarse], tolerance_mm)
+    long = _is_long(reference.point[coarse], coarse_reach)
     kept = _between(reference, fine, coarse, long, _NEAREST * tolerance_mm)
     point = reference.point[kept]
     reach = _reach(point, tolerance_mm)
-    roomy = reach.copy()
-    roomy[np.isin(kept, coarse)] = room
+    widest = reach.copy()
+    widest[np.isin(kept, coarse)] = coarse_reach
     own = _is_long(point, reach) | long[np.searchsorted(coarse, kept[:-1], side="right") - 1]
     off = _off(reference, kept)
-    return Outline(point, reference.place_mm[kept], off, turns(point), reach, roomy, own, reference)
+    return Outline(
+        point, reference.place_mm[kept], off, turns(point), reach, widest, own, reference
+    )
 
 
 def _between(
     reference: Reference, fine: Index, coarse: Index, long: Flags, nearest_mm: float
 ) -> Index:
-    """The coarse vertices, and those of the fine ones between which smoothing moves the path.
-
-    There are none on long legs (n,); elsewhere they are about `nearest_mm` apart at least. More of them would only
-    follow the noise.
+    """The coarse vertices, and the fine ones that smoothing needs between them. Long legs (n,) get no fine ones.
+    Elsewhere their distance is at least about `nearest_mm`; more of them would only follow the noise.
     """
     leg = np.clip(np.searchsorted(coarse, fine, side="right") - 1, 0, long.size - 1)
     begin, end = reference.place_mm[coarse[leg]], reference.place_mm[coarse[leg + 1]]
@@ -145,7 +152,7 @@ def _between(
 
 
 def _reach(point: Real, tolerance_mm: float) -> Real:
-    """How far (n,) a corner curve would take the legs at points (n, 3)."""
+    """Usable leg length (n,) that corner curves at points (n, 3) would need."""
     turn = turns(point)
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = tolerance_mm * extent(np.minimum(turn, SHARPEST_RAD))
@@ -153,7 +160,7 @@ def _reach(point: Real, tolerance_mm: float) -> Real:
 
 
 def _is_long(point: Real, reach: Real) -> Flags:
-    """Legs (n,) between points (n + 1, 3) so long that corners at both ends leave a part of them alone."""
+    """Whether the legs (n,) between points (n + 1, 3) are so long that a part between the corners stays straight."""
     leg = np.linalg.norm(np.diff(point, axis=0), axis=1)
     return np.asarray(leg >= _LONG * (reach[1:] + reach[:-1]))
 
@@ -165,7 +172,8 @@ def _thinned(
     tied: tuple[bool, bool],
     rough_mm: float | None = None,
 ) -> Index:
-    """Those of the kept points (n,) without which no point of the reference is farther than this from its leg.
+    """The kept points (n,) without those that can be dropped: no point of the reference is then farther than this from
+    its leg.
 
     rough_mm  leave out only points of noise, with a leg of at most this length
     """
@@ -177,7 +185,7 @@ def _thinned(
             drop[1:-1] &= _is_rough(point, rough_mm)
         drop[1] &= not tied[0]
         drop[-2] &= not tied[1]
-        # No two neighbours in one round: of each run every second one.
+        # No two consecutive points in one round: of each run every second one.
         run = np.arange(drop.size) - np.maximum.accumulate(np.where(drop, 0, np.arange(drop.size)))
         drop &= run % 2 == 1
         at = np.flatnonzero(drop)
@@ -190,8 +198,8 @@ def _thinned(
 
 
 def _is_rough(point: Real, longest_mm: float) -> Flags:
-    """Inner points (n - 2,) of a chain (n, 3) with a leg of at most this length where the chain turns back, or turns to
-    another side than at a neighbour, like most points around: noise, not a curve.
+    """Inner points (n - 2,) of a chain (n, 3) that are noise: a leg there is at most this long, and the chain reverses,
+    or turns to another side than at a point next to it, as it does at most points around.
     """
     leg = np.diff(point, axis=0)
     length = np.linalg.norm(leg, axis=1)
@@ -205,7 +213,7 @@ def _is_rough(point: Real, longest_mm: float) -> Flags:
 
 
 def _off(reference: Reference, kept: Index) -> Real:
-    """How far (n,) the points between the kept ones (n + 1,) lie from the legs."""
+    """Greatest distance (n,) of the points between the kept ones (n + 1,) from the legs."""
     point = reference.point
     leg = np.repeat(np.arange(kept.size - 1), np.diff(kept))
     aside = distance_to_chord(point[:-1], point[kept[leg]], point[kept[leg + 1]])
@@ -214,20 +222,23 @@ def _off(reference: Reference, kept: Index) -> Real:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Stations of a stretch: points (n, 3), directions (n, 3), places (n,) on the reference, room (n,) in mm."""
+    """Stations of a stretch: points (n, 3), directions (n, 3), places (n,) on the reference, greatest shifts (n,) in
+    mm.
+    """
 
     point: Real
     direction: Real
     place_mm: Real
-    room_mm: Real
+    bound_mm: Real
 
 
 def stations(
-    path: Outline, first: int, last: int, ends: tuple[float, float], room_mm: float
+    path: Outline, first: int, last: int, ends: tuple[float, float], bound_mm: float
 ) -> Places:
-    """Stations from leg `first` to leg `last`, of whose far parts only `ends` mm are taken.
+    """Stations from leg `first` to leg `last`.
 
-    A stretch that begins at a long leg begins `ends[0]` before its first inner vertex; 0: with the vertex itself.
+    ends      length in mm of the first and of the last leg that the stretch uses; 0: it begins, or ends, at the vertex
+    bound_mm  greatest shift of a station; the distance of dropped points is subtracted
     """
     before, after = ends
     vertex = np.arange(first + (before > 0.0), last + 1 + (after == 0.0))
@@ -262,9 +273,9 @@ def stations(
     parts_direction = [tangent[vertex - first], direction[leg]]
     parts_place = [path.place_mm[vertex], base[leg] + own * scale[leg]]
     off = np.concatenate((path.off_mm[legs][:1], path.off_mm[legs], path.off_mm[legs][-1:]))
-    parts_room = [
-        room_mm - np.maximum(off[:-1], off[1:])[vertex - first],
-        room_mm - path.off_mm[legs[leg]],
+    parts_bound = [
+        bound_mm - np.maximum(off[:-1], off[1:])[vertex - first],
+        bound_mm - path.off_mm[legs[leg]],
     ]
     for leg_at, at, inward in ((0, low[0], before), (legs.size - 1, high[-1], -after)):
         if inward != 0.0:
@@ -272,23 +283,22 @@ def stations(
             parts_point.append(path.point[legs[leg_at]] + fixed[:, None] * direction[leg_at])
             parts_direction.append(np.repeat(direction[leg_at][None], fixed.size, axis=0))
             parts_place.append(base[leg_at] + fixed * scale[leg_at])
-            parts_room.append(np.zeros(fixed.size))
+            parts_bound.append(np.zeros(fixed.size))
     place = np.concatenate(parts_place)
     order = np.argsort(place, kind="stable")
-    room = np.concatenate(parts_room)[order]
-    room[[0, -1]] = 0.0
+    bound = np.concatenate(parts_bound)[order]
+    bound[[0, -1]] = 0.0
     return Places(
         np.concatenate(parts_point)[order],
         np.concatenate(parts_direction)[order],
         place[order],
-        room,
+        bound,
     )
 
 
 def tightened(one: Places, low: Real, high: Real, share: float, least_mm: float) -> Places:
-    """With less room, and more stations, from places low (n,) to high (n,); stations `least_mm` apart at least.
-
-    All others lose a little room too: else what sticks out may only wander along the path.
+    """The stations with bounds times `share`, and more of them at least `least_mm` apart, from places low (n,) to high
+    (n,). All other bounds shrink a little too; otherwise the violation may only move along the path.
     """
     place = one.place_mm
     first = np.clip(np.searchsorted(place, low, side="right") - 1, 0, place.size - 1)
@@ -300,15 +310,15 @@ def tightened(one: Places, low: Real, high: Real, share: float, least_mm: float)
     hit = np.append(between, False) | np.append(False, between)
     hit[1:] |= hit[:-1].copy()
     hit[:-1] |= hit[1:].copy()
-    room = np.where(hit, share, _LESS_ELSEWHERE) * one.room_mm
+    bound = np.where(hit, share, _LESS_ELSEWHERE) * one.bound_mm
     at = np.flatnonzero(between & (np.diff(place) > 2.0 * least_mm))
     leg = one.point[at + 1] - one.point[at]
-    most = np.maximum(room[at], room[at + 1])
+    most = np.maximum(bound[at], bound[at + 1])
     return Places(
         np.insert(one.point, at + 1, one.point[at] + 0.5 * leg, axis=0),
         np.insert(one.direction, at + 1, leg / np.linalg.norm(leg, axis=1)[:, None], axis=0),
         np.insert(place, at + 1, 0.5 * (place[at] + place[at + 1])),
-        np.insert(room, at + 1, most),
+        np.insert(bound, at + 1, most),
     )
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Axes that turn along with a curve: smooth functions of its arc length within a tolerance.
+"""Rotary axes that move with a curve: smooth functions of its arc length within a tolerance.
 
-docs/theory/toolpath-fitting.md section 9. A programmed axis is linear over each chord of the reference. It becomes a
-C2 function that is never farther from it than the tolerance, at the same place of the path.
+docs/theory/toolpath-fitting.md section 9. A programmed axis is linear over each chord of the reference. It becomes a C2
+function that differs from it by at most the tolerance at each place of the path.
 """
 
 from __future__ import annotations
@@ -24,10 +24,12 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _SHARES = (0.8, 0.5, 0.25)
-"""Of the tolerance: how far the smooth function may be, one after the other until the axes are within the tolerance."""
+"""Deviations of the smooth function as shares of the tolerance, tried in order until the axes are within the
+tolerance.
+"""
 
 _PEAK = 1.0 / 6.0
-"""Deviation at a change of the rate by 1, spread over 1 on either side."""
+"""Deviation at a change of the rate by 1 that is spread over 1 on either side."""
 
 _BESIDE = 24
 _ROUNDS = 60
@@ -38,7 +40,7 @@ _HALVINGS = 16
 _EDGE = 1e-6
 
 _SAME_RATE = 1e-6
-"""Degrees per mm: rates that differ by less are one."""
+"""Rates that differ by less are equal, degrees per mm."""
 
 
 def with_turning(
@@ -50,10 +52,10 @@ def with_turning(
     """The path with extra axes.
 
     columns        of the reference's angles, one for each extra axis; None: the axis stands at 0
-    tolerance_deg  how far the axes may be from the programmed angles at any place
+    tolerance_deg  greatest deviation from the programmed angles at any place
     tied           whether start and end are in the middle of a chord of a longer path: the axes then have the rate of
                    the chord there, and no second derivative, so that both halves join C2
-    Raises PlanError, naming the line: no function is within the tolerance.
+    Raises PlanError, naming the line: no smooth function is within the tolerance.
     """
     reference = fitted.reference
     given = reference.turn_deg
@@ -79,7 +81,7 @@ def with_turning(
 def _rates_at_ends(
     place_mm: Real, value: Real, tied: tuple[bool, bool]
 ) -> tuple[Real | None, Real | None]:
-    """Programmed rates (E,) at start and end, by the length of the chord there; None: that end is not tied."""
+    """Programmed rates (E,) at start and end per length of the chord there; None: that end is not tied."""
     first, last = ((value[k + 1] - value[k]) / (place_mm[k + 1] - place_mm[k]) for k in (0, -2))
     return first if tied[0] else None, last if tied[1] else None
 
@@ -89,8 +91,8 @@ class Angles:
     """Angles that are linear between places of a path.
 
     at     (n + 1,) rising arc lengths, mm
-    value  (n + 1, E) there, degrees
-    rate   (n, E) between, degrees per mm
+    value  (n + 1, E) angles there, degrees
+    rate   (n, E) rates between them, degrees per mm
     """
 
     at: Real
@@ -105,10 +107,11 @@ class Angles:
         return cls(at, value, np.diff(value, axis=0) / np.diff(at)[:, None])
 
     def with_rates(self, first: Real | None, last: Real | None) -> Angles:
-        """With these rates (E,) at start and end, up to the middle of the leg there; None: with their own.
+        """The angles with these rates (E,) at start and end, up to the middle of the leg there; None: with their own
+        rates.
 
-        The curve of half a chord is a little shorter than it, each half by another length, so that its rate by arc
-        length is not quite that of the other half.
+        The curves of the two halves of a chord differ a little in length, so their rates by arc length differ too. The
+        given rates are equal on both sides.
         """
         at, value = self.at, self.value
         if last is not None and np.abs(last - self.rate[-1]).max() > _SAME_RATE:
@@ -131,12 +134,12 @@ class Angles:
         return np.stack([np.interp(s_mm, self.at, column) for column in self.value.T], axis=1)
 
     def rate_at(self, s_mm: Real) -> Real:
-        """Rates (m, E) behind arc lengths (m,)."""
+        """Rates (m, E) just after arc lengths (m,)."""
         leg = np.searchsorted(self.at, s_mm, side="right") - 1
         return np.asarray(self.rate[np.clip(leg, 0, len(self.rate) - 1)])
 
-    def smoothed(self, room_deg: float) -> SmoothAngles:
-        """Each change of the rate spread as far as the smooth angles stay within `room_deg` of these."""
+    def smoothed(self, tolerance_deg: float) -> SmoothAngles:
+        """The smooth angles: each change of the rate is spread as far as the deviation stays within `tolerance_deg`."""
         inner, size = self.at[1:-1], np.linalg.norm(self.change, axis=1)
         own = np.flatnonzero(size > 0.0)
         at = inner[own]
@@ -144,17 +147,17 @@ class Angles:
             return SmoothAngles(self, at, np.zeros(0), self.change)
         first = self.at[np.maximum(own + 1 - _BESIDE, 0)]
         last = self.at[np.minimum(own + 1 + _BESIDE, self.at.size - 1)]
-        width = np.minimum(room_deg / (_PEAK * size[own]), np.minimum(at - first, last - at))
+        width = np.minimum(tolerance_deg / (_PEAK * size[own]), np.minimum(at - first, last - at))
         smooth = SmoothAngles(self, at, _even(width, at), self.change[own])
         asked = np.sort(np.concatenate((at, 0.5 * (at[1:] + at[:-1]))))
         for _ in range(_ROUNDS):
             off = np.linalg.norm(smooth.correction(asked, 0), axis=1)
-            if off.max() <= room_deg:
+            if off.max() <= tolerance_deg:
                 break
             change, query, _ = smooth.near(asked)
             shrink = np.ones(at.size)
-            share = np.clip(np.sqrt(room_deg / np.maximum(off, 1e-300)), _LEAST_SHRINK, _SURE)
-            np.minimum.at(shrink, change, np.where(off > room_deg, share, 1.0)[query])
+            share = np.clip(np.sqrt(tolerance_deg / np.maximum(off, 1e-300)), _LEAST_SHRINK, _SURE)
+            np.minimum.at(shrink, change, np.where(off > tolerance_deg, share, 1.0)[query])
             smooth = replace(smooth, width=_even(smooth.width * shrink, at))
         return smooth
 
@@ -174,7 +177,9 @@ class SmoothAngles:
     change: Real
 
     def near(self, s_mm: Real) -> tuple[Index, Index, Real]:
-        """The pairs of a change and of one of the rising arc lengths within its width; how far it is, in widths."""
+        """Pairs of a change and an arc length within its width, for rising arc lengths, with their distance in
+        widths.
+        """
         low = np.searchsorted(s_mm, self.at - self.width, side="left")
         count = np.searchsorted(s_mm, self.at + self.width, side="right") - low
         change = np.repeat(np.arange(self.at.size), count)
@@ -184,7 +189,7 @@ class SmoothAngles:
         return change, query, np.clip(apart, -1.0, 1.0)
 
     def correction(self, s_mm: Real, order: int) -> Real:
-        """What smoothing adds (n, E) to the angles, their rates or second derivatives at rising arc lengths (n,)."""
+        """What smoothing adds (n, E) to the angles, their rates or second derivatives, at rising arc lengths (n,)."""
         change, query, apart = self.near(s_mm)
         left, width = 1.0 - np.abs(apart), self.width[change]
         if order == 0:
@@ -199,13 +204,13 @@ class SmoothAngles:
 
 
 def _even(width: Real, at: Real) -> Real:
-    """The widths lowered so that none is greater than one beside it and the distance."""
+    """The widths, lowered so that none exceeds the next one plus the distance between them."""
     width = np.minimum.accumulate(width - at) + at
     return np.asarray(np.minimum.accumulate((width + at)[::-1])[::-1] - at)
 
 
 def _cut_at_changes(fitted: FittedPath, smooth: SmoothAngles) -> FittedPath:
-    """The path with joints where a change of the rate that has no other near it begins, is greatest and ends."""
+    """The path with more joints: where an isolated change of the rate begins, is greatest, and ends."""
     at, width = smooth.at, smooth.width
     if not at.size:
         return fitted
@@ -225,8 +230,8 @@ def _followed(
     rates: tuple[Real | None, Real | None],
     tolerance_deg: float,
 ) -> FittedPath | None:
-    """The path with the smooth angles as quintics of its segments, which are halved until they are within the tolerance
-    of the target; None: they do not come there. `rates`: of tied ends.
+    """The path with the smooth angles as quintics of its segments, which are halved until the quintics are within the
+    tolerance of the target; None: they never are. `rates`: those of tied ends.
     """
     for _ in range(_HALVINGS):
         joint = fitted.curve.segment_starts_mm
@@ -249,9 +254,9 @@ def _followed(
 
 
 def turning_bound_deg(curve: SpatialPHSpline, target: Angles) -> Real:
-    """Bound (segments,) of how far the extra axes are from angles at the same arc length.
+    """Bound (segments,) of the difference between the extra axes and the angles at the same arc length.
 
-    Between places where the programmed rate changes, the difference is off the chord between its ends by at most an
+    Between places where the programmed rate changes, the difference deviates from linear interpolation by at most an
     eighth of its greatest second derivative times the square of the step.
     """
     start, length = curve.segment_starts_mm, curve.segment_lengths_mm
@@ -277,7 +282,7 @@ def turning_bound_deg(curve: SpatialPHSpline, target: Angles) -> Real:
 
 
 def _cut(fitted: FittedPath, segment: Index, xi: Real) -> FittedPath:
-    """The path with joints at these rising places too, xi inside 0 … 1."""
+    """The path with more joints, at these rising places; xi inside 0 … 1."""
     curve = fitted.curve
     owner, begin, preimage = cut_segments(curve.preimage, segment, xi)
     inside = begin[:, None] > 0.0

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reads G-code: RS274/NGC as LinuxCNC 2.9 understands it. docs/reference/gcode.md lists the words."""
+"""Reads G-code: RS274/NGC as LinuxCNC 2.9 understands it. docs/reference/gcode.md lists the words. Used by
+`toolpath/files`.
+"""
 
 from .options import Options
 from .reader import read_gcode

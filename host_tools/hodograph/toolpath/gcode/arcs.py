@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Arcs and helices: G2 and G3 with their centre (I, J, K) or radius (R).
 
-A centre is where I, J and K say. The radii from it to start and end may differ by 0.1 % or by 0.0283 mm (0.00283 inch
-in G20), whichever is more, and by 100 times that length at most: LinuxCNC's bounds, as programs are rounded to few
+I, J and K give the centre. The radii from it to start and end may differ by 0.1 % or by 0.0283 mm (0.00283 inch in
+G20), whichever is more, and by 100 times that length at most. These are LinuxCNC's bounds: programs are rounded to few
 digits. R is the radius of an arc of at most 180°; if negative, of at least 180°. P counts turns.
 """
 

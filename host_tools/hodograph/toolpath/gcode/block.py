@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A block: one line of G-code as its words, checked for what the line alone can show.
+"""A block: one line of G-code as its words, with all checks that need this line only.
 
     N10 G1 X[#1 + 2] F100 #2=5 (comment)
 
-is a line number, which means nothing, words (a letter and a value), settings of parameters and comments. All values of
+has a line number, which has no effect, words (a letter and a value), settings of parameters and comments. All values of
 a block are calculated before any of its settings take effect.
 """
 
@@ -35,7 +35,7 @@ from .source import COMMENT, SourceLine
 _LINE_NUMBER = re.compile(r"n[0-9]+(?:\.[0-9]*)?")
 _INTEGER_LETTERS = "hlt"
 GREATEST_VALUE = 1e9
-"""Values of words are smaller."""
+"""Bound of the magnitude of a word's value."""
 
 _VALUE_LETTERS = "abcefhijklpqrstxyz" + POLAR_LETTERS
 
@@ -45,7 +45,7 @@ class Block:
     """The words of a line.
 
     `values` holds words by their letter without G and M, `g` the G codes by group and `m` the M codes by group.
-    `places` holds where a word begins in the compact text, by letter, or by its code such as "g10" and "m3".
+    `places` holds the start of each word in the compact text, by letter, or by its code such as "g10" and "m3".
     """
 
     line: SourceLine
@@ -56,7 +56,7 @@ class Block:
     settings: list[tuple[int | str, float]] = field(default_factory=list)
 
     def error(self, word: str, text: str) -> ToolpathError:
-        """An error at a word, named as in `places`; at the start of the line if the block has none such."""
+        """An error at a word, named as in `places`; at the start of the line if the block lacks it."""
         return self.line.error(self.places.get(word, 0), text)
 
     def motion_error(self, text: str) -> ToolpathError:

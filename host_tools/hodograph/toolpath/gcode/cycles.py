@@ -4,9 +4,9 @@
     G81 X Y Z R L    G82 X Y Z R P L    G83 X Y Z R Q L
 
 For each hole the tool moves over the hole, rapidly down to R, by feed down to Z, and rapidly up again: to R after G99;
-after G98 to where the series of cycles began, if that is above R. G82 stands still for P seconds at the bottom. G83
-goes down by Q at a time, up to R, and rapidly down again to 0.254 mm above where it was. R, Z, P and Q hold until the
-motion code changes. After G91 X and Y are steps, R counts from where the series began and Z from R; L repeats all.
+after G98 to where the series of cycles began, if that is above R. G82 dwells for P seconds at the bottom. G83 goes down
+by Q at a time, up to R, and rapidly down again to 0.254 mm above the last depth. R, Z, P and Q hold until the motion
+code changes. After G91 X and Y are steps, R counts from the level where the series began and Z from R; L repeats all.
 
 A cycle that begins below R rises to R first.
 
@@ -129,7 +129,7 @@ def _words(block: Block, modes: Modes, motion: int, bottom_letter: str) -> Cycle
 
 
 def _depths(block: Block, motion: int, words: CycleWords, r: float, bottom: float) -> list[float]:
-    """Where the pecks end."""
+    """The depths at which the pecks end."""
     depths: list[float] = []
     if motion == 830 and words.q is not None:
         if (r - bottom) / words.q > MOST_STEPS:
@@ -142,7 +142,7 @@ def _depths(block: Block, motion: int, words: CycleWords, r: float, bottom: floa
 def _holes(
     block: Block, modes: Modes, here: list[float], first: int, second: int, pecks: int
 ) -> Iterator[tuple[float, float]]:
-    """Where the holes are, in the plane."""
+    """The places of the holes in the plane."""
     count = 1
     if "l" in block.values:
         count = block.integer("l", "L of a canned cycle", 1, MOST_STEPS // pecks or 1)

@@ -6,9 +6,9 @@
     o2 while [v] ... o2 endwhile        o3 do ... o3 while [v]        o4 repeat [n] ... o4 endrepeat
     o2 break        o2 continue
 
-A label is a number or a name; that of a call may be calculated (`o[#1 + 10] call`), and that of a return does not
-matter. Structures lie within one another or apart. `Structure` finds their parts before anything runs; `Flow` then goes
-from line to line.
+A label is a number or a name; that of a call may be calculated (`o[#1 + 10] call`), and that of a return is ignored.
+Structures may be nested but not overlap. `Structure` finds their parts before anything runs; `Flow` then goes from line
+to line.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MOST_LEVELS = 100
 """Most subroutines that are active at a time."""
 
 MAY_BE_O_LINE = re.compile(r"[ \t/]*(?:[nN][0-9. \t]*)?[oO]")
-"""Matches every line with an O-word, and few others."""
+"""Matches every line with an O-word, and few other lines."""
 
 _NUMBER = re.compile(r"[0-9]+")
 _NAME = re.compile(r"<([!-'*-;=?-~]+)>")
@@ -43,7 +43,7 @@ _LOOPS = ("while", "do", "repeat")
 class OLine:
     """A line with an O-word. `label` is empty if it is calculated; `keyword` is empty for a program number.
 
-    `place` is where the O-word begins and `rest` where its arguments begin, in the compact text. `opener`, `branches`
+    `place` is the start of the O-word in the compact text, `rest` that of its arguments. `opener`, `branches`
     and `closer` are indices of lines: of the line that begins the structure that this line belongs to (for break and
     continue, the loop), of its elseif and else, and of its end.
     """
@@ -184,7 +184,7 @@ class Structure:
 
 @dataclass(slots=True)
 class _Frame:
-    """An active subroutine, or the main program: where it goes on after it, and what its repeats have left."""
+    """An active subroutine, or the main program: the line after its call, and its remaining repeats."""
 
     back: int
     repeats: dict[int, int] = field(default_factory=dict)

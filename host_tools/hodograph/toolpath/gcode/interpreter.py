@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Executes blocks: from the words of a block and the modal state to commands.
 
-The order of execution within a block is that of RS274/NGC (docs/reference/gcode.md has it as a table). A block that is
-refused changes nothing that matters: the reader stops there.
+The order of execution within a block is that of RS274/NGC (table in docs/reference/gcode.md). The reader stops at a
+refused block, so its effect on the state does not matter.
 """
 
 from __future__ import annotations
@@ -237,7 +237,7 @@ class Interpreter:
         return PathMode(line, Blending.CONTINUOUS, tolerances["p"], tolerances["q"])
 
     def _axis_words(self, block: Block) -> dict[int, float]:
-        """Axis words by axis, in mm and degrees."""
+        """The axis words by axis, in mm and degrees."""
         modes = self.modes
         return {
             axis: block.values[letter] * modes.unit(letter)
@@ -316,7 +316,7 @@ class Interpreter:
         return self.coordinates.to_program(self.modes.position)
 
     def _end(self, block: Block) -> Position:
-        """The machine position that the axis words of a block mean."""
+        """The machine position that the axis words of a block give."""
         modes, where = self.modes, self.coordinates
         words = self._axis_words(block)
         if block.has_any(POLAR_LETTERS):
@@ -384,8 +384,8 @@ class Interpreter:
         elif motion == NURBS:
             add_control_point(block, modes, self._end(block))
             self._feed(block)
-        # LinuxCNC leaves the motion before a Bézier curve active, against its manual: here none is, so that no program
-        # means one thing here and another there.
+        # LinuxCNC leaves the motion before a Bézier curve active, against its manual. Here no motion is active then, so
+        # that no program has a different meaning here.
         modes.motion = None if motion in (50, 51) else motion
 
     def _move_straight(self, block: Block, motion: int, commands: list[Command]) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Modal state of the interpreter: what stays in force from block to block, and where the machine is."""
+"""Modal state of the interpreter: settings that stay in force from block to block, and the machine position."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ MM_PER_INCH = 25.4
 
 @dataclass(slots=True)
 class CycleWords:
-    """Words of a canned cycle that hold until they are given again, in mm and s. `level` is where the series began."""
+    """Words of a canned cycle that hold until they are given again, in mm and s. `level`: position of the normal axis
+    at the start of the series.
+    """
 
     r: float = 0.0
     z: float = 0.0
@@ -37,7 +39,8 @@ class Modes:
     """The state after a block. It begins as in LinuxCNC: G17 G21 G40 G49 G54 G64 G80 G90 G91.1 G94 G97 G99.
 
     `position` is the machine position; `unit_mm` is the length of a program unit. `feed_word` is the last F as it was
-    programmed and `feed_unit_mm` the unit in force then. `spline_handle` is where a G5 without I and J goes on.
+    programmed and `feed_unit_mm` the unit in force then. `spline_handle`: control point from which a G5 without I and J
+    continues.
     """
 
     position: Position = ORIGIN
@@ -75,7 +78,7 @@ class Modes:
         return value / self.unit(AXIS_LETTERS[axis])
 
     def update_feed(self) -> None:
-        """Make `feed` from the last F; it is None as long as there is none that moves."""
+        """Make `feed` from the last F; None: there is none, or it is 0."""
         speed = self.feed_word
         if self.feed_mode is FeedMode.PER_REVOLUTION:
             speed *= self.speed_rev_min

@@ -24,11 +24,11 @@ class Options:
     tools           offset of each tool by its number. None: every tool has offset 0, so that positions are those of
                     the tool's tip. With a table, a tool that is not in it is refused.
     feed_mm_s       feed of moves that have none of their own, in degrees per second where rotary axes move alone; None:
-                    such moves are refused. What F gives is replaced by those who ask for it (job.py).
+                    such moves are refused. job.py replaces the feeds that F gives, if requested.
     block_delete    whether lines that begin with "/" are left out
     optional_stops  whether M1 stops; False: it is left out
-    most_jumps      most subroutine calls and backward jumps of loops; a program that makes more is refused, since its
-                    loops may be without end
+    most_jumps      most subroutine calls and backward jumps of loops; a program with more is refused, since its loops
+                    may be endless
     fast_path       whether plain straight moves are read without the general interpreter. The moves are the same.
     """
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Polar coordinates: `@` is a distance from the program's origin in mm or inches, `^` an angle in degrees from x.
 
-After G90 both are absolute, and one that is missing is that of the present position. After G91 they are steps of the
-present distance and angle. They stand for X and Y of a motion in plane XY.
+After G90 both are absolute; a missing one keeps its value of the present position. After G91 they are steps of the
+present distance and angle. They replace X and Y of a motion in plane XY.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ Point = tuple[float, float]
 
 
 def polar_target(block: Block, modes: Modes, here: Point) -> Point | None:
-    """The program coordinates x and y that the polar words of a block mean; None if it has none.
+    """The program coordinates x and y that the polar words of a block give; None: it has none.
 
     here    present x and y, as program coordinates in mm
-    Raises ToolpathError: X or Y beside them, another plane, G53, or no present angle to start from.
+    Raises ToolpathError: X or Y in the same block, another plane, G53, or no present angle to start from.
     """
     given = [letter for letter in POLAR_LETTERS if letter in block.values]
     if not given:

@@ -5,11 +5,11 @@
         for command in read_gcode(lines, "part.ngc"):
             ...
 
-Lines are not kept: a program of any length takes the same memory. Only from the first line with an O-word on, the text
-is kept until its end, since O-words go back and forth in it. Commands are not kept.
+Lines are not kept: a program of any length takes the same memory. From the first line with an O-word on, the text is
+kept until its end, since O-words jump in it. Commands are not kept.
 
-Most lines of long programs are straight moves with X, Y, Z and F in this order. A short path of its own reads them
-(`_PLAIN`); it has the same result as the interpreter, and hands over whatever is not as plain as that.
+Most lines of long programs are straight moves with X, Y, Z and F in this order. A shorter method reads them (`_PLAIN`),
+with the same result as the interpreter, which gets all other lines.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .interpreter import Interpreter
 from .options import Options
 from .source import COMMENT, SourceLine
 
-# Bounded throughout, so that whatever matches keeps the general limits of a line and of the numbers in it.
+# All repetitions are bounded, so that each match keeps the general limits of a line and of its numbers.
 _BLANK = r"[ \t]{0,20}"
 _SIZE = r"(?:[0-9]{1,9}(?:\.[0-9]{0,20})?|\.[0-9]{1,20})"
 _PLAIN = re.compile(
@@ -49,9 +49,8 @@ def read_gcode(
     options  tables of the machine; None: all of them are 0
 
     The program ends with M2 or M30, with the second of two "%" lines, or with its last line; but if it begins with "%",
-    one of the first two has to be there. What follows is not read.
-    Raises ToolpathError, when the iterator comes to the place: a line without meaning, or with one that is not
-    supported. The commands before it have been yielded.
+    one of the first two has to be there. Later lines are not read. Raises ToolpathError where the iterator reaches a
+    line without meaning, or with an unsupported one. The commands before it have been yielded.
     """
     return _Reader(file, options or Options()).run(lines)
 
@@ -90,7 +89,7 @@ class _Reader:
                 return
 
     def _plain_moves(self, source: Iterator[Entry]) -> Generator[Command, None, Entry | None]:
-        """Yield straight moves as long as lines are plain; return the first line that is not, None if there is none."""
+        """Yield straight moves while lines are plain; return the first line that is not, None if there is none."""
         modes = self._interpreter.modes
         where = self._interpreter.coordinates
         if not self._allows_plain():
@@ -185,7 +184,7 @@ class _Reader:
         return o_line is not None and o_line.keyword != ""
 
     def _flow(self, first: int, lines: list[str]) -> Iterator[Command]:
-        """Execute lines that go back and forth; `first` is the number of the first one."""
+        """Execute lines among which O-words jump; `first` is the number of the first one."""
         maybe = (
             (index, self._line(first + index, raw))
             for index, raw in enumerate(lines)

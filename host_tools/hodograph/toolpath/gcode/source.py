@@ -13,7 +13,7 @@ import string
 from ...errors import ToolpathError
 
 COMMENT = "("
-"""What stands for a comment in the compact text."""
+"""The character that replaces a comment in the compact text."""
 
 BLANKS = " \t\r\n"
 MAX_LINE = 4096

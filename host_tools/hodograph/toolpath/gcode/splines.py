@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Splines of plane XY: G5 (cubic Bézier), G5.1 (quadratic Bézier), G5.2 with G5.3 (NURBS).
 
-    G5 X Y I J P Q   control points: start, start + (I, J), end + (P, Q), end; without I and J a G5 goes on from the
-                     G5 before it without a corner
+    G5 X Y I J P Q   control points: start, start + (I, J), end + (P, Q), end; without I and J a G5 continues the G5
+                     before it without a corner
     G5.1 X Y I J     control points: start, start + (I, J), end
     G5.2 X Y P L     a control point with weight P; L is the order (degree + 1) of the whole curve, 3 if not given;
                      the start is the first control point, with weight 1, or P of a first G5.2 without X and Y
@@ -136,9 +136,8 @@ def finish_nurbs(block: Block, modes: Modes, feed: Feed) -> SplineMove:
 
 
 def check_inside_nurbs(block: Block) -> None:
-    """Between G5.2 and G5.3 a block may only have control points: anything else would be lost or change them.
-
-    Raises ToolpathError if it has more.
+    """Between G5.2 and G5.3 a block may only have control points: other words would be lost or change the points.
+    Raises ToolpathError: it has other words.
     """
     allowed = {NURBS, 53}
     for code in block.g.values():
