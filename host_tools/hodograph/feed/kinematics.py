@@ -2,9 +2,9 @@
 """Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it.
 
 `spline.frames` has the derivatives of a curve by arc length, `axis_motion` the chain rule; docs/theory/numerics.md 5.6.
-Arrays of all A axes have the axis as first index.
-`sample` applies them to feed pieces, in cells (one piece on one segment of the path); how far a quantity may rise
-between samples is taken from its second differences. docs/theory/numerics.md section 7.
+Arrays of all A axes have the axis as first index. `sample` applies them to feed pieces, in cells (one piece on one
+segment of the path). Second differences estimate the rise of a quantity between samples; docs/theory/numerics.md
+section 7.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def axis_motion(frame: Frames, d1: Real, d2: Real, d3: Real) -> tuple[Real, Real
 
 
 class Pieces(Protocol):
-    """Feed pieces, with or without their override bounds."""
+    """Feed pieces with or without override bounds: `RawPieces` or `FeedPieces`."""
 
     @property
     def duration_q32_s(self) -> Int:
@@ -59,9 +59,9 @@ class Pieces(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PathBounds:
-    """A path, and the limits of its file that depend on where on the path the motion is.
+    """A path, and its limits that depend on the place on the path.
 
-    `kept`: the plan keeps them; else they only keep factors above 1 from exceeding more of them.
+    kept  whether the plan keeps them; False: they only bound overrides above 100 %
     """
 
     spline: Curve
@@ -71,7 +71,7 @@ class PathBounds:
 
     @property
     def bind(self) -> bool:
-        """Whether there are any."""
+        """Whether there are any such limits."""
         limits = self.limits
         some = limits.centripetal_mm_s2 is not None or bool(limits.zones)
         return some or limits.axes.any or self.plants is not None
@@ -79,8 +79,8 @@ class PathBounds:
 
 @dataclass(frozen=True, eq=False)
 class PathKinematics:
-    """The motion of feed pieces along a path, in C cells with K samples each: `piece` (C,), those of the axes
-    (A, C, K), the others (C, K); mm, s.
+    """The motion of feed pieces along a path, in C cells with K samples each: `piece` (C,); velocity, acceleration and
+    jerk of the axes (A, C, K); the others (C, K); mm, s.
     """
 
     piece: Int
@@ -93,9 +93,10 @@ class PathKinematics:
 
 
 def sample(bounds: PathBounds, pieces: Pieces, *, filled: bool = False) -> PathKinematics:
-    """The motion of `pieces` along the path. Cells in which an axis' acceleration or jerk may rise between samples by
-    more than a share of its reserve are cut into parts, where it is near its limit; `filled`: everywhere, since the
-    override uses up what the plan leaves of a limit.
+    """The motion of `pieces` along the path. A cell is cut into parts where an axis' acceleration or jerk is near its
+    limit and may rise between samples by more than a share of its reserve.
+
+    filled  cut also where it is not near its limit, since the override uses what the plan leaves of a limit
     """
     track = _track(pieces)
     ends = [end for zone in bounds.limits.zones for end in (zone.from_mm, zone.to_mm)]
@@ -126,7 +127,7 @@ class _ArcLength:
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """Piece, begin and end (u) of each."""
+    """Piece, begin and end (u) of each cell."""
 
     piece: Int
     low: Real
@@ -177,7 +178,7 @@ def _divided(cells: _Cells) -> _Cells:
 
 
 def _sampled(samples: PathKinematics) -> tuple[Real, ...]:
-    """All but `piece`."""
+    """The fields of PathKinematics other than `piece`."""
     along = samples.arc_mm, samples.feed, samples.centripetal
     return (*along, samples.velocity, samples.acceleration, samples.jerk)
 
@@ -194,7 +195,7 @@ def _taken(samples: PathKinematics, which: NDArray[np.bool_]) -> PathKinematics:
 
 
 def raised(values: Real) -> Real:
-    """Magnitudes of samples (…, K), raised by what they may rise in between, from second differences."""
+    """Magnitudes of samples (…, K), raised by their possible rise between samples, from second differences."""
     step = values[..., 1:] - values[..., :-1]
     bend = np.abs(step[..., 1:] - step[..., :-1]) / 8.0
     out = np.abs(values)

@@ -19,8 +19,9 @@ POLICIES = ("respect", "report")
 LEAST_RESERVE, GREATEST_RESERVE = 2e-3, 0.9
 
 MACHINE_SHARE = 0.998
-"""Of the machine's axis limits: what plans use. The rest is for rounding, and for the controller's bounds between the
-places that it evaluates (docs/guides/limits.md)."""
+"""Share of the machine's axis limits that plans use. The remainder is for rounding, and for the controller's bounds
+between the places that it evaluates (docs/guides/limits.md).
+"""
 
 PerAxis = tuple[float, ...]
 """One value for each axis that follows the path, in the order of the path; inf: no limit."""
@@ -46,14 +47,14 @@ class FeedZone:
 class Limit:
     """One bound that a motion has to keep.
 
-    key     what is bounded, with its unit, as files name it: "feed_mm_s", "velocity_mm_s", "volts" …
+    key     the bounded quantity with its unit, as in files: "feed_mm_s", "velocity_mm_s", "volts" …
     value   the greatest magnitude, a reserve already taken off; inf: none
     source  section that gives it: "limits" or "feed" of the path file, "machine", "controller", "drive", "format"
     axis    name of the limited axis; None: along the path
-    zone    where on the path it applies; None: everywhere
+    zone    the part of the path where it applies; None: everywhere
     share   `value` over the value given in the file; below 1 where a reserve is kept
     words   the reason for a limit that no file gives
-    unit    of the axis: "deg" where it turns
+    unit    of the axis: "deg" for a rotary axis
     """
 
     key: str
@@ -123,7 +124,7 @@ def least(limits: Iterable[Limit]) -> Limit:
 
 @dataclass(frozen=True)
 class ReserveZone:
-    """A stretch of the path on which a plan leaves `share` of the accelerations and jerks free for stops."""
+    """A stretch of the path on which a plan leaves `share` of accelerations and jerks free for stops."""
 
     from_mm: float
     to_mm: float
@@ -136,7 +137,7 @@ class Peak:
 
     value    in the unit of `limit`; the value is nowhere above `at_most` (None: not proven)
     s_mm     arc length where it was found
-    t_s      program time of that place, None where it is not known
+    t_s      program time of that place; None: not known
     curvature_per_mm  of the path there
     """
 
@@ -168,13 +169,13 @@ class Peak:
 
     @property
     def place(self) -> str:
-        """Where, in words."""
+        """The place in words."""
         radius = f" (radius {1.0 / self.curvature_per_mm:.3g} mm)" if self.curvature_per_mm else ""
         return f"at {self.s_mm:.6g} mm, where the curvature is {self.curvature_per_mm:.3g} 1/mm{radius}"
 
     @property
     def excess_text(self) -> str:
-        """By how much the given limit is exceeded, in words."""
+        """The excess over the given limit in words."""
         given = self.limit.given
         over = 100.0 * (self.value / given - 1.0)
         return f"{self.limit.name} {self.value:.6g} is above its limit {given:g} by {over:.1f} %"
@@ -185,7 +186,7 @@ class Plant:
     """The voltage limit of an axis: volts * gain = velocity + time constant * acceleration; docs/theory/numerics.md 13.
 
     gain_mm_s_v     steady speed for one volt
-    volts           greatest voltage that may be used, of which friction takes `friction_volts`
+    volts           greatest voltage that may be used, including `friction_volts` for friction
     volts_limit     of the drive itself; never below `volts`
     """
 
@@ -202,11 +203,11 @@ class Plant:
 
 
 Plants = tuple[Plant, ...]
-"""Of each axis that follows the path."""
+"""The plant of each axis that follows the path."""
 
 
 def as_drives_limit(plants: Plants | None) -> Plants | None:
-    """The same with all volts that the drives have; None: these are not known."""
+    """The plants with all volts of their drives; None: not known."""
     if plants is None or any(plant.volts_limit == inf for plant in plants):
         return None
     return tuple(replace(plant, volts=plant.volts_limit) for plant in plants)
@@ -239,12 +240,12 @@ class AxisLimits:
         return AxisLimits(*(_scaled(getattr(self, one.name), share) for one in fields(self)))
 
     def from_axis(self, first: int) -> AxisLimits:
-        """Those of the axes from number `first` on."""
+        """The limits of the axes from number `first` on."""
         each = (getattr(self, one.name) for one in fields(self))
         return AxisLimits(*(given and given[first:] for given in each))
 
     def and_of(self, other: AxisLimits) -> AxisLimits:
-        """What keeps both: the lower of each."""
+        """Limits that keep both: the lower one of each."""
         pairs = ((getattr(self, one.name), getattr(other, one.name)) for one in fields(self))
         return AxisLimits(*(_lower(a, b) for a, b in pairs))
 
@@ -265,19 +266,19 @@ class Limits:
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
     centripetal_mm_s2   feed^2 times curvature
-    volts               of each axis by the plant of its drive file (docs/theory/numerics.md 13), along the path;
-                        the drive's own volts_limit where that is less
+    volts               of each axis, by the plant of its drive file (docs/theory/numerics.md 13); the drive's
+                        volts_limit if that is less
     axis                of the motion of the axes
     zones               feed zones; where several meet, the least feed
-    reserve             share of the axes' accelerations, jerks and volts that plans leave free, so that hold, resume
-                        and override keep these limits too (docs/theory/numerics.md section 7)
+    reserve             share of the axes' accelerations, jerks and volts that plans leave free for hold, resume and
+                        override (docs/theory/numerics.md section 7)
 
-    machine             of the motion of the axes by the machine file: they always bind
+    machine             of the motion of the axes, from the machine file; they always apply
     names, units        of the axes that follow the path, in its order; a unit is "mm" or "deg", () stands for mm
-    reserve_zones       where profile "optimal" leaves more than `reserve` free
+    reserve_zones       places where profile "optimal" leaves more than `reserve` free
 
-    policy "respect": the feed is lowered until the profile keeps all limits; "report": it runs as requested and what
-    exceeds is listed, but the machine's limits are kept. Profile "optimal" always keeps them. Raises InputError.
+    Policy "respect": the feed is lowered until the profile keeps all limits. "report": the feed stays as requested, and
+    excesses are listed; the machine's limits are kept. Profile "optimal" always keeps all limits. Raises InputError.
     """
 
     feed_mm_s: float | None = None
@@ -334,8 +335,8 @@ class Limits:
     def on_machine(
         self, names: tuple[str, ...], machine: AxisLimits, units: tuple[str, ...] = ()
     ) -> Limits:
-        """The same on a machine with path axes of these names and units; those that the path file does not know are not
-        limited by it.
+        """The limits on a machine with path axes of these names and units. The path file does not limit axes that it
+        does not have.
         """
         each = (getattr(self.axis, one.name) for one in fields(self.axis))
         own = AxisLimits(
@@ -348,35 +349,39 @@ class Limits:
 
     @property
     def bind(self) -> bool:
-        """Whether one of them bounds the motion everywhere; zones alone do not."""
+        """Whether one of the limits bounds the motion everywhere. Zones alone do not."""
         return self.axes.any or any(getattr(self, name) is not None for name in _SCALARS)
 
     @property
     def axes(self) -> AxisLimits:
-        """What a plan keeps of the axes: the path file's, and MACHINE_SHARE of the machine's where that is less."""
+        """The axis limits that a plan keeps: those of the path file, or MACHINE_SHARE of the machine's if that is
+        less.
+        """
         return self.axis.and_of(self.machine.scaled(MACHINE_SHARE))
 
     @property
     def axes_whole(self) -> AxisLimits:
-        """What a motion has to keep of the axes: the same, with the whole of the machine's."""
+        """The axis limits that a motion has to keep: those of the path file, or the machine's if these are less."""
         return self.axis.and_of(self.machine)
 
     @property
     def of_machine(self) -> Limits:
-        """The machine's only."""
+        """The limits of the machine only."""
         return Limits(
             reserve=self.reserve, machine=self.machine, names=self.names, units=self.units
         )
 
     def source(self, name: str, axis: int) -> str:
-        """Source of the limit of axis number `axis` that binds: "limits" (path file), "machine", or "drive" (volts)."""
+        """Source of the lowest limit of axis number `axis`: "limits" (path file), "machine", or "drive" (volts)."""
         if name == "volts":
             return "drive" if self.volts is None else "limits"
         own, used = getattr(self.axis, name), getattr(self.axes, name)
         return "limits" if own is not None and own[axis] == used[axis] else "machine"
 
     def axis_limits(self, key: str) -> tuple[Limit, ...]:
-        """The limits of the axes that a plan keeps, the reserve taken off accelerations and jerks; value inf: none."""
+        """The axis limits that a plan keeps, with the reserve subtracted from accelerations and jerks; value inf:
+        none.
+        """
         each = getattr(self.axes, key) or (inf,) * len(self.names)
         share = 1.0 if key == "velocity_mm_s" else 1.0 - self.reserve
         return tuple(
@@ -393,7 +398,7 @@ class Limits:
         )
 
     def volts_limits(self, plants: Plants) -> tuple[Limit, ...]:
-        """The limits of the volts beside friction that a plan keeps, the reserve taken off."""
+        """The limits of the volts without friction that a plan keeps, with the reserve subtracted."""
         share = 1.0 - self.reserve
         return tuple(
             Limit(
@@ -413,10 +418,10 @@ _SCALARS = ("feed_mm_s", "acceleration_mm_s2", "jerk_mm_s3", "centripetal_mm_s2"
 
 @dataclass(frozen=True)
 class ControllerLimits:
-    """Limits of the controller (machine file): they always bind.
+    """Limits of the controller (machine file); they always apply.
 
-    A plan keeps `reserve` (a fraction) of each free for hold and override, and at least LEAST_RESERVE, which
-    the pieces need; docs/theory/numerics.md 5.5 and section 7. Raises InputError.
+    A plan keeps the share `reserve` of each free for hold and override, and at least LEAST_RESERVE, which the pieces
+    need; docs/theory/numerics.md 5.5 and section 7. Raises InputError.
     """
 
     feed_mm_s: float
@@ -434,11 +439,11 @@ class ControllerLimits:
 
     @property
     def kept_free(self) -> float:
-        """The fraction of each limit that a plan really keeps free."""
+        """The share of each limit that a plan keeps free: `reserve`, at least LEAST_RESERVE."""
         return max(self.reserve, LEAST_RESERVE)
 
     def limit(self, key: str) -> Limit:
-        """One of them as a plan keeps it, less its reserve."""
+        """One of these limits without its reserve, as a plan keeps it."""
         share = 1.0 - self.kept_free
         return Limit(key, float(getattr(self, key)) * share, "controller", share=share)
 
@@ -446,7 +451,7 @@ class ControllerLimits:
 def ineffective_limits(
     limits: Limits, request: FeedRequest, length_mm: float, plants: Plants | None
 ) -> Iterator[str]:
-    """One line for each part of `limits` that changes nothing on a path of `length_mm`.
+    """One line for each ineffective limit of a path of `length_mm`.
 
     plants  of the axes with the volts that their drives allow; None: no volts are limited
     """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Override headroom: what limits leave for a changing feed override, and the override bounds of each feed piece by
-override level; docs/theory/numerics.md section 7.
+"""Override headroom: the part of the limits that a changing feed override may use, and the override bounds of each feed
+piece by override level; docs/theory/numerics.md section 7. Used by plans and stream/.
 
 With program time at the override lambda an axis moves with
 
@@ -9,8 +9,8 @@ With program time at the override lambda an axis moves with
     jerk          lambda'' v + 3 lambda lambda' a + lambda^3 j
 
 v, a, j its velocity, acceleration and jerk at an override of 1. The limits bound |lambda| <= f, |lambda'| <= R,
-|lambda''| <= Q in each piece, from samples and not from peaks, since an axis is seldom fast, accelerated and
-jerked at once.
+|lambda''| <= Q in each piece. They are computed from samples and not from peaks, since velocity, acceleration and jerk
+of an axis seldom have their peaks at once.
 """
 
 from __future__ import annotations
@@ -50,23 +50,26 @@ Unsigned = NDArray[np.uint32]
 GREATEST_FACTOR = 2.0
 
 _LEAST_FACTOR = 1.05
-"""Along a path a factor below is 1: it would take half of the headroom of a changing override, and gain less than 5
-%."""
+"""On a path a factor below this is set to 1: it would use half of the headroom of a changing override and gain less
+than 5 %.
+"""
 
 _MARGIN = 1.0 - 1e-9
 _TINY = 1e-12
 
 FACTOR_SHARE = 0.5
-"""Part of the headroom under each limit that a factor above 1 may use up."""
+"""Part of the headroom of each limit that a factor above 1 may use."""
 
 RATE_SHARES = (0.5, 0.7, 0.85, 0.95)
-"""Parts of the jerk's headroom that lambda' may use; lambda'' has the rest. The best one depends on the piece."""
+"""Parts of the jerk's headroom that lambda' may use; the remainder is for lambda''. The best one depends on the
+piece.
+"""
 
 
 def with_override(
     raw: Pieces, controller: ControllerLimits, limits: Limits, paths: Sequence[PathBounds] = ()
 ) -> FeedPieces:
-    """Pieces with bounds of the override: from the controller's limits, and from those along a path."""
+    """The pieces with override bounds, from the controller's limits and from those along the paths."""
     peaks = derivative_peaks(raw.duration_q32_s, raw.c_q40)
     headrooms = [Headroom(path, raw) for path in paths if path.bind]
     override = override_bounds(*peaks, controller, limits, headrooms)
@@ -82,7 +85,9 @@ def with_override(
 
 @dataclass(frozen=True, eq=False)
 class OverrideBounds:
-    """As the format has them, rounded down: the factor (M,), and codes of slope and second derivative (M, LEVELS)."""
+    """Override bounds in the format, rounded down: the factor (M,), and codes of override rate and acceleration (M,
+    LEVELS).
+    """
 
     factor_q14: Unsigned
     rate_codes: Codes
@@ -91,7 +96,7 @@ class OverrideBounds:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Peaks (M,) of the pieces along the path, beside the limits."""
+    """Peaks (M,) of the pieces along the path, and the limits."""
 
     v: Real
     a: Real
@@ -122,7 +127,7 @@ class _Piece:
         return second
 
     def codes(self, at: Real, shares: Sequence[float]) -> Iterator[tuple[Codes, Codes]]:
-        """Codes of slope and second derivative (M,) for each share."""
+        """Codes of override rate and override acceleration (M,) for each share."""
         second = self.seconds(at)
         for found in self.rates(at, shares):
             rate = rate_codes(found * _MARGIN)
@@ -137,10 +142,11 @@ def override_bounds(
     program: Limits,
     headrooms: Sequence[Headroom] = (),
 ) -> OverrideBounds:
-    """Bounds from the peaks of each piece (M,), such that in each level, for every override lambda of the level,
-    |lambda'| <= rate and |lambda''| <= second, the controller's limits hold, and at constant
-    lambda <= factor the program's too. `headrooms` are those along the path; where the plan keeps the limits of one,
-    they hold for every motion of lambda as the controller's do.
+    """Override bounds from the peaks of each piece (M,). In each level they ensure: at each override of the level, with
+    |lambda'| <= rate and |lambda''| <= second, the motion keeps the controller's limits. At constant lambda <= factor
+    it also keeps the program's limits.
+
+    headrooms  those along the paths; if the plan keeps the limits of one, the bounds keep them at each motion of lambda
     """
     v, a, j = (np.maximum(p, _TINY) for p in (feed_mm_s, acceleration_mm_s2, jerk_mm_s3))
     factor = np.minimum.reduce(
@@ -158,7 +164,7 @@ def override_bounds(
     binding = [headroom for headroom in headrooms if headroom.bounds.kept]
     if binding:
         factor = np.where(factor < _LEAST_FACTOR, 1.0, factor)
-    # Rounded first: the override rates then use the headroom that the stored factor really leaves.
+    # The factor is rounded first, so that the override rates use the headroom that the stored factor leaves.
     factor_q14 = np.floor(np.clip(factor * _MARGIN, 1.0, GREATEST_FACTOR) * FACTOR_ONE_Q14)
     factor = factor_q14 / FACTOR_ONE_Q14
     piece = _Piece(v, a, j, controller, binding)
@@ -174,7 +180,7 @@ def override_bounds(
 
 
 def _best(piece: _Piece, at: Real, change: Real) -> tuple[Codes, Codes]:
-    """Codes for overrides up to `at`, of the share of the jerks with which they change by `change` soonest."""
+    """Codes for overrides up to `at`, for the share of the jerks with which a change by `change` is fastest."""
     choices = piece.codes(at, RATE_SHARES if piece.headrooms else RATE_SHARES[:1])
     rate, second = next(choices)
     taken_s = _move_s(change, rate, second)
@@ -219,10 +225,10 @@ class Axes:
 
 @dataclass(frozen=True, eq=False)
 class _Volts:
-    """What does not depend on the override of |lambda v + lambda^2 T a|, at all samples (A, C, K).
+    """The parts of |lambda v + lambda^2 T a| that do not depend on the override, at all samples (A, C, K).
 
     pull     T a, signed; size: its magnitude
-    against  whether v and T a pull apart; between: the greatest value then, v^2 / (4 T |a|)
+    against  whether v and T a have opposite signs; between: the greatest value then, v^2 / (4 T |a|)
     slope    T v
     """
 
@@ -249,7 +255,7 @@ class _Volts:
         )
 
     def left(self, f: Real) -> Real:
-        """What the greatest value over 0 <= lambda <= f leaves of the reach: that at f, or `between`."""
+        """The reach less the greatest value over 0 <= lambda <= f, which is that at f, or `between`."""
         at_f = raised(f * self.signed_v + f**2 * self.pull)
         apart = self.against & (np.abs(self.signed_v) < 2.0 * f * self.size)
         return np.asarray(self.reach - np.maximum(at_f, np.where(apart, self.between, 0.0)))
@@ -257,7 +263,7 @@ class _Volts:
 
 @dataclass(frozen=True, eq=False)
 class Headroom:
-    """What the limits along a path leave the override in each of M feed pieces."""
+    """The headroom of the limits along a path for the override, in each of M feed pieces."""
 
     bounds: PathBounds
     pieces: Pieces
@@ -268,7 +274,7 @@ class Headroom:
 
     @cached_property
     def axes(self) -> Axes:
-        """Those that follow the path."""
+        """Number of axes that follow the path."""
         samples, limits, plants = self._samples, self.bounds.limits.axes, self.bounds.plants
         count = len(samples.velocity)
         velocity, acceleration, jerk = (
@@ -290,8 +296,8 @@ class Headroom:
         )
 
     def _less_reserve(self, limit: Real, used: Real) -> Real:
-        """Limits (A, 1, 1) without what reserve zones keep for stops: the override may not use it. Where the plan
-        uses (A, C, K) more, they leave the override what they leave it elsewhere.
+        """Limits (A, 1, 1) less what reserve zones keep for stops, which the override may not use. Where the plan
+        itself uses more (A, C, K), the override has the same headroom as outside of the zones.
         """
         limits, arc_mm = self.bounds.limits, self._samples.arc_mm
         if not limits.reserve_zones:
@@ -305,7 +311,7 @@ class Headroom:
         )
 
     def factor(self) -> Real:
-        """f (M,), below 1 where a limit is exceeded at an override of 1."""
+        """The factor f (M,); below 1: a limit is exceeded at an override of 1."""
         limits, samples, axes = self.bounds.limits, self._samples, self.axes
         feed = raised(samples.feed) + _TINY
         f = np.full_like(feed, np.inf)
@@ -325,8 +331,8 @@ class Headroom:
         return self._least(np.minimum(f, by_axis.min(axis=0)))
 
     def rate(self, factor: Real) -> tuple[Real, Real]:
-        """R (M,) for factors (M,): what accelerations and volts leave, and what all of the jerks does; below 0 where a
-        limit leaves nothing.
+        """R (M,) for factors (M,): as accelerations and volts allow, and as the whole headroom of the jerks allows;
+        below 0: a limit leaves no headroom.
         """
         axes, f = self.axes, factor[self._samples.piece, None]
         rest = (axes.acceleration - f**2 * axes.a) / axes.v
@@ -365,7 +371,7 @@ def _by_axis(values: Iterable[float]) -> Real:
 
 
 def _shared_headroom(peak: Real, limit: Real) -> Real:
-    """1 plus half of the headroom above a peak, over the peak; below 1 where there is none."""
+    """The factor that uses half of the headroom above a peak; below 1: there is none."""
     headroom = limit / peak - 1.0
     return np.asarray(1.0 + np.where(headroom > 0.0, FACTOR_SHARE, 1.0) * headroom)
 

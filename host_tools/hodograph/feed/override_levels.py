@@ -2,8 +2,8 @@
 """Override levels, and the codes of override bounds; docs/reference/protocol.md 1.3 and 1.4.
 
 Each override of `LEVEL_OVERRIDES` ends a level with its own bounds of override rate and override acceleration: at an
-override below 1 much of acceleration and jerk is free. The last level, `FULL`, is that of all overrides up to the
-factor. A bound is stored as a code of 8 bits, in steps of an eighth of an octave.
+override below 1 the motion uses less of the limits of acceleration and jerk. The last level, `FULL`, is that of all
+overrides up to the factor. A bound is stored as a code of 8 bits, in steps of an eighth of an octave.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def seconds_per_s2(codes: ArrayLike) -> Real:
 
 
 def rate_codes(rate_per_s: ArrayLike) -> Codes:
-    """The greatest codes that are not above; 0 where there is none."""
+    """The greatest codes whose override rates are not above these (any shape); 0: there is none."""
     return _codes_below(np.asarray(rate_per_s) / _RATE_UNIT)
 
 
@@ -57,7 +57,7 @@ _ALL = _mantissas(np.arange(_GREATEST_CODE + 1))
 
 
 def _codes_below(values: ArrayLike) -> Codes:
-    """The greatest codes whose m is at most the values; 0: even that of code 1 is more."""
+    """The greatest codes whose m is at most the values; 0: m of code 1 is more."""
     found = np.searchsorted(
         _ALL, np.floor(np.clip(values, 0.0, 2.0**62)).astype(np.uint64), "right"
     )

@@ -122,9 +122,8 @@ def joined_pieces(parts: Sequence[FeedPieces]) -> FeedPieces:
 
 @dataclass(frozen=True, eq=False)
 class RawPieces:
-    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and how well they fit.
-
-    The errors are bounds, against the timeline; above the goals only where the ramp has too few periods.
+    """Durations (M,), starts (M,) and coefficients (M, 7) of pieces, and bounds of their errors against the timeline.
+    The errors exceed the goals only if the ramp has too few periods.
     """
 
     duration_q32_s: Int
@@ -135,7 +134,7 @@ class RawPieces:
 
     @property
     def faithful(self) -> bool:
-        """Within JERK_GOAL_MM_S3 and LENGTH_GOAL_MM of the timeline."""
+        """Whether the errors are within JERK_GOAL_MM_S3 and LENGTH_GOAL_MM."""
         return self.jerk_error_mm_s3 < JERK_GOAL_MM_S3 and self.length_error_mm < LENGTH_GOAL_MM
 
 
@@ -149,7 +148,7 @@ def exponents(duration_q32_s: Int) -> Int:
 
 
 def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
-    """Coefficients c1 … c7 in tau; c1 such that each end is the next start to the last bit.
+    """Coefficients c1 … c7 in tau; c1 is such that each end is exactly the next start.
 
     times (n + 1,) in 2^-32 s, starts (n + 1,) in 2^-40 mm; shapes (n, 8): powers of u = 0 … 1 over a piece, mm
     """
@@ -203,8 +202,8 @@ def derivative_extremes(
 ) -> tuple[tuple[Real, Real, Real], tuple[Real, Real, Real]]:
     """Lower and upper bounds (M,) of feed, acceleration and jerk over each piece, close to the true extremes.
 
-    From Bernstein coefficients after halving the piece n times: what they overstate is 1/4^n of what
-    `derivative_bounds` does (Farouki 2012, section 5). Memory for a curved piece: about 250 bytes times 2^n.
+    From Bernstein coefficients after halving the piece n times: they overestimate by 1/4^n of what `derivative_bounds`
+    does (Farouki 2012, section 5). Memory for a curved piece: about 250 bytes times 2^n.
     """
     curved = np.flatnonzero(c_q40[:, 1:].any(axis=1))
     lows, highs = [], []
@@ -221,7 +220,9 @@ def derivative_extremes(
 
 
 def distance_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
-    """How far (M,) each piece goes at most before its start or beyond its end, in mm, of its bounds after halving."""
+    """Bound (M,) of how far each piece moves before its start or beyond its end, in mm, from its bounds after
+    halving.
+    """
     seconds = np.ldexp(duration_q32_s.astype(np.float64), -32)
     feed = derivative_bounds(duration_q32_s, c_q40)[0]
     distance = np.zeros((len(seconds), DEGREE + 1))
@@ -249,8 +250,8 @@ def derivative_peaks(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]
 def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> FeedPieces:
     """The same feed, the `chosen` (M,) pieces each as two that last half as long; docs/theory/numerics.md section 7.
 
-    A half is the polynomial of its piece about its own start, rounded as every piece is: its end is the next start to
-    the last bit, its feed is off by less than 2^-30 mm/s. Override bounds are those of the piece.
+    A half is the polynomial of its piece about its own start, rounded like each piece: its end is exactly the next
+    start, and its feed differs by less than 2^-30 mm/s. Override bounds are those of the piece.
 
     length_q40  end of the last piece
     """
@@ -304,7 +305,7 @@ def _parts(shape: Real, middle: float) -> tuple[Real, Real]:
 def _halved(coefficients: Real) -> Real:
     """Bernstein coefficients (…, n) on both halves of the interval, (…, 2, n); de Casteljau.
 
-    scipy's BPoly evaluates and does not subdivide: bounds as close, from its values, would take 65 times as long.
+    Own code, since scipy's BPoly cannot subdivide: equally close bounds from its values would take 65 times as long.
     """
     n = coefficients.shape[-1]
     out = np.empty((*coefficients.shape[:-1], 2, n))

@@ -41,7 +41,7 @@ class FeedCurve(Protocol):
 
     @property
     def follows_joints(self) -> bool:
-        """Whether pieces begin at joints of segments, where limited quantities jump."""
+        """Whether pieces begin at joints of segments, where limited quantities may jump."""
 
     def value(self, order: int, t_s: ArrayLike) -> Real:
         """F (order 0) or a derivative of it, at times 0 … time_s (clipped); mm, s."""
@@ -50,7 +50,7 @@ class FeedCurve(Protocol):
         """Greatest feed, acceleration and jerk along the path; mm, s."""
 
     def raw_pieces(self, length_q40: int, period_us: int, joints_q40: Int | None) -> RawPieces:
-        """The curve in integers over exactly this length, which may differ a little (rounding)."""
+        """The curve in integers over exactly this length, which may differ from its own by rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,12 +58,12 @@ class FeedPlan:
     """The feed along a whole path.
 
     limits      of the path file and of the machine's axes
-    controller  limits of the controller; `assumed`: no machine is named, they never bind
+    controller  limits of the controller; `assumed`: no machine is named, and they are never reached
     curve       arc length over time
-    notes       one line for each thing the user should know (what lowered the feed, and so on)
+    notes       one line for each thing that the user should know, such as the limit that lowered the feed
     excesses    peaks above their limits under policy "report"
-    history     steps of the pattern search for the feed really used; empty without a search
-    paths       the path with the limits that depend on it, by which pieces get their override bounds
+    history     steps of the pattern search for the feed that is used; empty without a search
+    paths       the path with the limits that depend on it, from which pieces get their override bounds
     """
 
     request: FeedRequest
@@ -84,7 +84,7 @@ class FeedPlan:
 
     @property
     def n_c(self) -> float | None:
-        """Slope coefficient used; None for profiles without."""
+        """Slope coefficient that is used; None: the profile has none."""
         return None if self.curve.ramp is None else self.curve.ramp.n_c
 
     @property
@@ -153,7 +153,7 @@ class FeedPlan:
         return with_override(self.raw, self.controller, self.limits, self.paths)
 
     def pieces_over(self, length_q40: int, joints_q40: Int | None = None) -> FeedPieces:
-        """The plan in integers over exactly `length_q40`, which may differ a little (rounding).
+        """The plan in integers over exactly `length_q40`, which may differ from its own length by rounding.
 
         joints_q40  (segments + 1,) of the program: pieces that begin at a joint begin exactly there
         """
@@ -169,7 +169,7 @@ class FeedPlan:
 
     @cached_property
     def _fitted(self) -> dict[tuple[int, bytes | None], FeedPieces]:
-        """The last result of `pieces_over`: fitting and compiling a plan ask for the same pieces."""
+        """The last result of `pieces_over`: fitting and compiling a plan need the same pieces."""
         return {}
 
     @property
@@ -178,11 +178,11 @@ class FeedPlan:
 
 
 Replan = Callable[[FeedPlan, Sequence[FeedZone], str], FeedPlan]
-"""Plans a request again with further feed zones; the text, why, goes to the notes."""
+"""Plans a request again with further feed zones; the text is the reason, for the notes."""
 
 
 def assumed_controller(feed_mm_s: float, acceleration: float, jerk: float) -> ControllerLimits:
-    """Limits of a controller that nobody named, from the peaks of a plan: so high that they never bind."""
+    """Limits for a plan without a machine, from its peaks: so high that they are never reached."""
     return ControllerLimits(
         2.0 * feed_mm_s, 8.0 * acceleration + 10.0 * feed_mm_s, 16.0 * jerk + 100.0 * feed_mm_s
     )

@@ -44,10 +44,10 @@ def plan_feed(
 ) -> FeedPlan:
     """Plans `request` over a path of `length_mm`.
 
-    The feed is lowered, and n_c found again, where the path is too short for its ramps, where the limits
-    of the path file bind (policy "respect") and where those of the controller do, less their
-    reserve. Without a controller (no machine file) limits are assumed that never bind. Raises InputError for a length
-    out of range and PlanError where no feed keeps the limits.
+    The feed is lowered, and n_c found again, in three cases: the path is too short for the ramps, a limit of the path
+    file is exceeded (policy "respect"), or a limit of the controller less its reserve is. Without a machine file the
+    limits of the controller are never reached. Raises InputError: the length is out of range. Raises PlanError: no feed
+    keeps the limits.
     """
     check_period(period_us)
     if request.optimal:
@@ -95,7 +95,7 @@ def plan_path(
 
 
 def replan(plan: FeedPlan, zones: Sequence[FeedZone], reason: str) -> FeedPlan:
-    """Planned again with the feed nowhere above the least of the zones; `reason` goes to the notes."""
+    """The plan made again with the feed nowhere above the least of the zones; `reason` goes to the notes."""
     assert not plan.request.optimal, "replan_optimal makes such plans again"
     lowest = min(zone.feed_mm_s for zone in zones)
     return _below(plan, Limit("feed_mm_s", lowest, "format", words=reason))
@@ -117,7 +117,7 @@ def _plan(
     period_us: int,
     further: tuple[Limit, ...],
 ) -> FeedPlan:
-    """The plan whose pieces keep the limits too, with `further` limits of the feed."""
+    """The plan whose pieces keep the limits too, not only the exact profile; `further` limits of the feed."""
     for _ in range(_MOST_ROUNDS):
         shape, reasons = choose(length, request, limits, controller, period_us, further)
         line = timeline(shape.ramp, length)
@@ -171,10 +171,9 @@ def _excesses(ramp: Ramp, limits: Limits) -> tuple[Peak, ...]:
 
 
 def _piece_excess(plan: FeedPlan) -> float:
-    """Greatest peak of a piece over the controller's limit less half of what a plan keeps free.
-
-    Where the pieces are only near the profile, policy "respect" holds for them too; and where a bound on the
-    override would round to zero, the feed has to fall.
+    """Greatest peak of a piece over the controller's limit less half of the reserve. With policy "respect" the pieces
+    have to keep the limits of the path file too. The feed also has to be lower if an override bound would be rounded to
+    0.
     """
     pieces = plan.pieces
     peaks = [float(p.max()) for p in derivative_peaks(pieces.duration_q32_s, pieces.c_q40)]

@@ -8,8 +8,8 @@ paper (18) adds:
     A = tau (1 - tau)^4 + 4 tau^2 (1 - tau)^3
 
 with the feed V_f Q(tau) + T E(tau), Q the plain quintic. Its slope coefficient n_c is given or found by a pattern
-search. Every profile is antisymmetric about its middle, V(tau) + V(1 - tau) = V_f, so only the first half is ever
-computed and the second follows: no rounding breaks the symmetry.
+search. Each profile is antisymmetric about its middle, V(tau) + V(1 - tau) = V_f. Only the first half is computed and
+the second follows from it, so that rounding does not break the symmetry.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ MOST_ITERATIONS = 1000
 
 N_C_START, N_C_LOW, N_C_HIGH = 5.0, 2.0, 12.0
 REVERSE_MM_S = -(2.0**-14)
-"""Feed below this counts as reverse motion; (18) always dips a little, the format refuses 2^-10 mm/s."""
+"""A feed below this counts as reverse motion. (18) always goes a little below 0; the format refuses -2^-10 mm/s."""
 
 _ORDERS = 5
 _GAUSS_X, _GAUSS_W = (v / 2.0 for v in np.polynomial.legendre.leggauss(24))
@@ -62,7 +62,7 @@ class Ramp:
     def value(self, order: int, t_s: ArrayLike) -> Real:
         """Derivative `order` of the feed (DISPLACEMENT … SNAP) at times 0 … time_s; mm, s.
 
-        Any shape. Times a rounding outside the ramp are good for the analytic continuation.
+        Any shape. Times outside the ramp by rounding give the analytic continuation.
         """
         tau = np.asarray(t_s, dtype=np.float64) / self.time_s
         second = tau > 0.5
@@ -83,8 +83,8 @@ class Ramp:
         return float(max(values.max(), self._refined(order, values)))
 
     def lowest_feed(self) -> float:
-        """Least feed of the ramp, mm/s: 0, or below where (18) makes it dip under 0 or, which by the
-        symmetry is the same, rise over the end feed.
+        """Least feed of the ramp, mm/s; below 0 if (18) makes it negative or, which is the same by symmetry, greater
+        than the end feed.
         """
         values = self._first_half(FEED, _LOW_GRID)
         lowest = 0.0
@@ -131,7 +131,7 @@ def minimax_ramp(feed_mm_s: float, time_s: float, degree: int) -> Ramp:
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """A ramp, the search that led to it (empty without one), and what the user should know of it."""
+    """A ramp, the steps of the search for it (empty without one), and notes for the user."""
 
     ramp: Ramp
     history: tuple[SearchStep, ...] = ()
@@ -139,7 +139,7 @@ class Shape:
 
 
 def make_shape(request: FeedRequest, feed_mm_s: float) -> Shape:
-    """The ramp of `request` at another feed. Raises PlanError where a given n_c asks for reverse motion."""
+    """The ramp of `request` at another feed. Raises PlanError: the given n_c causes reverse motion."""
     time_s = request.ramp_time_s
     if request.profile == "quintic":
         return Shape(quintic_ramp(feed_mm_s, time_s))
@@ -158,7 +158,7 @@ def make_shape(request: FeedRequest, feed_mm_s: float) -> Shape:
 
 
 def optimise_n_c(feed_mm_s: float, time_s: float) -> Shape:
-    """The exponential ramp of least peak jerk, by the paper's search; plain where none is better."""
+    """The exponential ramp of least peak jerk, by the paper's search; the plain quintic if none is better."""
 
     def objective(n_c: float) -> float:
         ramp = exponential_ramp(feed_mm_s, time_s, n_c)
@@ -195,10 +195,9 @@ def pattern_search(
 ) -> tuple[SearchStep, ...]:
     """Minimises `objective` over low … high from `start`; the last step holds the result.
 
-    Points outside the bounds are not polled. Step 0 is the start. The rules of generalized pattern search are those
-    that MATLAB's `patternsearch` documents for its defaults, since the paper used that function: poll +1 then -1,
-    take the first better point, mesh doubled after success and halved after failure, end when the mesh is below its
-    tolerance.
+    Points outside the bounds are not polled. Step 0 is the start. The rules are the documented defaults of MATLAB's
+    `patternsearch`, which the paper used: poll +1 then -1, take the first better point, double the mesh after success
+    and halve it after failure, end when the mesh is below its tolerance.
     """
     best, value, mesh = start, objective(start), INITIAL_MESH
     evaluations = 1
@@ -288,9 +287,9 @@ def minimax_feed(degree: int) -> Real:
     """Chebyshev coefficients, in x = 2 tau - 1, of the feed of least peak jerk over the end feed (V(-1) = 0, V(1) = 1).
 
     The linear program "least peak of an odd polynomial g (the jerk) with a given first moment" has a Gauss quadrature
-    as its dual solution, so its answer is known in closed form: at the positive nodes of the rule g takes its peak,
-    flat where the node is an inner one. The tests solve the linear program itself beside it. An even degree has the
-    same optimum as the odd one below it.
+    as its dual solution, so its solution is known in closed form: g has its peak at the positive nodes of the rule,
+    with slope 0 at inner nodes. The tests compare with the solution of the linear program. An even degree has the same
+    optimum as the odd one below it.
     """
     x, _ = minimax_nodes(degree)
     m = (degree - 1) // 2

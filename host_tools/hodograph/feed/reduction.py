@@ -23,7 +23,7 @@ _CLOSE = 1e-6
 _MOST_TRIALS = 40
 
 _LEAST_GAIN = 0.05
-"""Of a step down in the logarithm of the peak, over that of the feed: less is taken as so much."""
+"""Least assumed ratio of a step in the logarithm of the peak to the step in that of the feed."""
 
 _ORDERS = {"acceleration_mm_s2": ACCELERATION, "jerk_mm_s3": JERK}
 """Derivatives of a ramp, by the key of their limit."""
@@ -108,7 +108,7 @@ def _ramp_limits(limits: Limits, controller: ControllerLimits | None) -> list[Li
 def _reduced(
     make: Callable[[float], Shape], feed_mm_s: float, limits: list[Limit]
 ) -> tuple[Shape, Limit | None]:
-    """The shape at `feed_mm_s`, or at the highest feed below at which all limits are kept, with the one that binds."""
+    """The shape at `feed_mm_s`, or at the highest lower feed that keeps all limits, with the limit that lowered it."""
     shape = make(feed_mm_s)
     excess, worst = _excess(shape, limits)
     if worst is None or excess <= 0.0:
@@ -143,16 +143,17 @@ def highest(
     margin: float,
     most_trials: int,
 ) -> T | None:
-    """What `attempt` makes of the highest feed with an excess of at most 0, by a secant within a bracket; None where
-    none is found.
+    """The result of `attempt` for the highest feed with an excess of at most 0, by the secant method within a bracket;
+    None: no such feed was found.
 
-    attempt  of a feed: what it gives and the logarithm of its greatest limit usage (above 0: exceeded)
-    excess   of `feed_mm_s`, above 0
-    close    how near to 0 the excess may stay, and how narrow the bracket, when the search ends
-    margin     what first steps go below proportion
+    attempt    for a feed: its result, and the logarithm of its greatest limit usage (above 0: exceeded)
+    excess     of `feed_mm_s`, above 0
+    close      the search ends when the excess is this near to 0, or the bracket this narrow
+    margin     by how much first steps go below proportion
 
-    Peaks go about with the feed: first steps in proportion until one keeps all limits, longer where the last one has
-    brought less; then the secant between the logarithms of feed and excess.
+    Peaks are about proportional to a power of the feed. The first steps are in proportion until one keeps all limits,
+    and longer if the last one reduced the excess less. Then follows the secant between the logarithms of feed and
+    excess.
     """
     high, high_excess = log(feed_mm_s), excess
     gain = 1.0

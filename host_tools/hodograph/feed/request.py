@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The requested feed: section [feed] of a path file as frozen data, with the ranges of its values.
 
-Made by config/path_file.py, read by the planners in this package. Nothing is computed here but checks.
+Made by config/path_file.py, read by the planners in this package. Only checks are made here.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ LONGEST_S = 2.0**22 - 1.0
 class FeedRequest:
     """The requested feed: accelerate for `ramp_time_s`, constant `nominal_mm_s`, decelerate; or profile "optimal".
 
-    profile  "quintic": paper (17); "exponential": (17) with (18); "minimax": least peak jerk;
-             "optimal": least time inside the limits over the whole path. `nominal_mm_s` is then only
-             one more limit of the feed (inf: none), and the rest means nothing
+    profile  "quintic": paper (17); "exponential": (17) with (18); "minimax": least peak jerk; "optimal": least time
+             inside the limits over the whole path. `nominal_mm_s` is then one more limit of the feed (inf: none), and
+             the other fields are not used
     n_c      slope coefficient of "exponential", or "optimise" (pattern search, 2 … 12)
     degree   of "minimax", as a polynomial of feed in time
 
-    Raises InputError for values that make no sense.
+    Raises InputError: a value is out of its range.
     """
 
     profile: str
@@ -61,19 +61,19 @@ class FeedRequest:
 
     @property
     def optimal(self) -> bool:
-        """Whether the whole path is planned inside its limits, instead of two ramps."""
+        """Whether the feed is planned over the whole path, not by two ramps."""
         return self.profile == OPTIMAL
 
 
 def check_period(period_us: int) -> None:
-    """Raises InputError unless `period_us` is one the program format knows."""
+    """Raises InputError: the program format does not allow this period."""
     if period_us not in PERIODS_US:
         known = ", ".join(str(p) for p in PERIODS_US)
         raise InputError(f"period_us {period_us} is not one of {known}")
 
 
 def check_length(length_mm: float) -> None:
-    """Raises InputError for a length that the program format does not know."""
+    """Raises InputError: the program format does not allow this length."""
     if not (isfinite(length_mm) and SHORTEST_MM <= length_mm <= LONGEST_MM):
         raise InputError(
             f"path: its length {length_mm:g} mm must be from {SHORTEST_MM:.3g} to {LONGEST_MM:.7g} mm: "

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Accelerate, go on, decelerate: the exact arc length over time, and its integer feed pieces;
+"""The profile with two ramps and a constant feed between them: exact arc length over time, and its integer feed pieces;
 docs/theory/numerics.md 5.1 and section 6."""
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _FIT = np.linalg.pinv((_FREE * _THIRD) @ _POWERS.T)
 class Timeline:
     """A ramp up, constant feed for `constant_s` and the mirrored ramp down, over `length_mm`.
 
-    `length_mm` and `constant_s` are exact; without a constant stretch the distance of the two ramps is
-    the length but for the rounding of the feed.
+    `length_mm` and `constant_s` are exact. Without a constant stretch the distance of the two ramps is the length,
+    except for the rounding of the feed.
     """
 
     ramp: Ramp
@@ -91,7 +91,9 @@ class Timeline:
     def raw_pieces(
         self, length_q40: int, period_us: int, joints_q40: Int | None = None
     ) -> RawPieces:
-        """Integer pieces over exactly this length, which may differ a little (rounding); any `joints_q40`."""
+        """Integer pieces over exactly this length, which may differ from the own one by rounding; `joints_q40` is not
+        used.
+        """
         if length_q40 == nearest_q40(self.length_mm):
             return quantise(self, length_q40, period_us)
         length = Fraction(length_q40, 2**40)
@@ -124,8 +126,8 @@ def timeline(ramp: Ramp, length_mm: Fraction) -> Timeline:
 
 
 def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
-    """Pieces whose sum is the timeline over exactly `length_q40`, no two adjacent ones (but
-    for the first and last) shorter together than two periods.
+    """Pieces of the timeline over exactly `length_q40`. No two consecutive ones, except the first and the last, last
+    less than two periods together.
     """
     end = round(line.duration_s * 2**32)
     up_end = round(Fraction(line.ramp.time_s) * 2**32)
@@ -137,7 +139,7 @@ def quantise(line: Timeline, length_q40: int, period_us: int) -> RawPieces:
     inner = round_pieces(middle, middle_starts, straight)
     for cuts in _cut_counts(line, up_end, period_us):
         up_cuts = _ramp_cuts(line, up_end, cuts)
-        # The way down is the way up run backwards from the exact end, a rounding off the last tick.
+        # The ramp down is the ramp up in reverse, from the exact end, which differs from the last tick by rounding.
         down_cuts = end - _ramp_cuts(line, end - down_start, cuts)[::-1]
         up = _fit_ramp(line, up_cuts, 0.0, False)
         down = _fit_ramp(line, down_cuts, float(line.duration_s), True)
@@ -182,8 +184,8 @@ def _cut_counts(line: Timeline, ramp_q32: int, period_us: int) -> list[int]:
 
 
 def _ramp_cuts(line: Timeline, end: int, count: int) -> Int:
-    """Even cuts of the ramp, without those where a dip below zero feed (18) has not been made good yet:
-    starts of pieces have to rise.
+    """Even cuts of the ramp, without those at which a negative feed of (18) has not been compensated yet: starts of
+    pieces have to rise.
     """
     cuts = _even(0, end, count)
     distance = line.ramp.value(DISPLACEMENT, cuts * 2.0**-32)
@@ -214,7 +216,7 @@ def _fit_ramp(line: Timeline, cuts: Int, origin_s: float, backwards: bool) -> _R
     target = ramp(JERK, _SAMPLES) * h**3
     shape = shape + (target - (shape * _THIRD) @ _POWERS.T) @ _FIT @ _FREE
     jerk = ramp(JERK, _CHECK) * h**3 - (shape * _THIRD) @ _CHECK_POWERS.T
-    # The distance's error is the jerk's integrated three times from both ends: below jerk h^3 / 100.
+    # The error of the distance is that of the jerk, integrated three times from both ends: below jerk h^3 / 100.
     worst = np.abs(jerk).max(axis=1)
     return _Ramp(distance, shape, float((worst / h[:, 0] ** 3).max()), float(worst.max() / 100.0))
 
@@ -261,7 +263,7 @@ def _constant_starts(line: Timeline, cuts: Int) -> Int:
 
 
 def _tight(raw: RawPieces, line: Timeline) -> bool:
-    """The Bernstein bounds, by which the controller judges, are close to the true extremes."""
+    """Whether the Bernstein bounds, which the controller checks, are close to the true extremes."""
     feed, acceleration, jerk = derivative_bounds(raw.duration_q32_s, raw.c_q40)
     return bool(
         feed.min() > _LEAST_FEED_MM_S

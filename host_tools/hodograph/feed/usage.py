@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limit usage: the peaks of feed pieces beside the limits along a path that a plan has to keep;
+"""Limit usage: the peaks of feed pieces, and the limits along a path that a plan has to keep;
 docs/theory/numerics.md 5.5."""
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def limit_peaks(bounds: PathBounds, pieces: Pieces) -> list[Peak]:
 
 
 Limited = Iterator[tuple[Limit, Real]]
-"""Limits, and the magnitudes (C, K) of what they limit."""
+"""The limits, each with the magnitudes (C, K) of its quantity."""
 
 
 def _along(bounds: PathBounds, motion: PathKinematics) -> Limited:

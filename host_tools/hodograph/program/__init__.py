@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The uploaded program: compile, encode, decode, check, print; docs/reference/protocol.md section 1."""
+"""The program of the controller: compiles, encodes, decodes, checks and prints it; docs/reference/protocol.md section
+1.
+"""
 
 from .check import Fault, check
 from .compiler import Compilation, ProgramOptions, compile_path, compile_program, fit_plan

@@ -2,8 +2,8 @@
 """The validator: the rules of docs/reference/protocol.md 1.1 to 1.4, as the controller checks them
 (firmware/core/program_check.h), vectorised over segments and feed pieces.
 
-Independent of the C code on purpose: a program is judged by both. What the format decides exactly (joints, ranges,
-sums) is decided here in exact integers.
+Independent of the C code on purpose: both check each program. Rules that are exact in the format (joints, ranges, sums)
+are checked in exact integers.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ LEAST_FEED_MM_S = 2.0**-10
 """A slower feed counts as this one: pairs that are too short for it are too short at any feed."""
 
 REACH_Q40 = 1 << 27
-"""How far a piece may reach beyond its ends: 2^-14 mm (PIECE_SLACK_MM), and a gap at a joint."""
+"""Greatest distance by which a piece may reach beyond its ends: 2^-14 mm (PIECE_SLACK_MM), plus a gap at a joint."""
 
 _LEAST_FEED_Q24 = 1 << 14
 
@@ -86,7 +86,9 @@ def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[In
 
 
 def _covering_feed_q24(distance_q40: Int, period_us: int) -> Int:
-    """A feed in 2^-24 mm/s at which twice a period does not quite cover the distance; rounded as in the controller."""
+    """The greatest feed in 2^-24 mm/s that passes less than the distance in two periods; rounded as in the
+    controller.
+    """
     return np.asarray((distance_q40 >> 16) * (4_000_000 // period_us) // 8 - 1)
 
 
@@ -116,11 +118,12 @@ CLOSE_Q40 = 1 << 16
 TRAVEL_SLACK_Q40 = 2.0**16
 """A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
 BOX_ROUNDING_Q40 = 8.0
-"""More than the boxes here and in the controller differ by: each of five steps is rounded here, by 1/2 at most, and the
-controller's sum by less than 1."""
+"""Bound of the difference between the boxes here and in the controller: each of five steps is rounded here by at most
+1/2, and the controller's sum by less than 1.
+"""
 
 _FAR_Q40 = 2.0**50
-"""No segment is as long: differences above are not looked into, so that nothing overflows."""
+"""No segment is as long. Greater differences are not evaluated further, so that no number overflows."""
 
 # Three times the Bernstein coefficients of the square of a quadratic.
 _SIGMA3 = (
@@ -133,7 +136,7 @@ _SIGMA3 = (
 
 
 def coefficients_in_range(program: Program) -> bool:
-    """Whether the preimages keep the range of the format. Of others no curve can be computed."""
+    """Whether the preimages are in the range of the format. For others no curve can be computed."""
     return not np.any(_beyond(program.a_q44, _preimage_limit_q44(program)))
 
 
@@ -144,7 +147,7 @@ def _preimage_limit_q44(program: Program) -> int:
 def segment_faults(
     program: Program, distances: tuple[Wide, ...], limits: ProgramLimits | None
 ) -> list[Rule]:
-    """What is wrong with the segments and their joints, in the order of the controller."""
+    """Violations of the rules of segments and joints, in the order of the controller."""
     code = ProgramError
     limit = _preimage_limit_q44(program)
     drawn = program.point_q40[: len(distances) - 1]
@@ -172,7 +175,7 @@ def segment_faults(
 
 
 def end_faults(program: Program, distances: tuple[Wide, ...]) -> list[Rule]:
-    """What is wrong with the end of the path."""
+    """Violations of the rules of the end of the path."""
     last = program.segment_count - 1
     missing = program.length_q40 - int(program.start_q40[last])
     off = missing <= 0 or bool(_apart(np.array([0, missing]), distances[-1][last:])[0])
@@ -215,7 +218,7 @@ def _sigma3(a_q44: Int) -> list[Wide]:
 
 
 def _apart(starts_q40: Int, distances: Wide, most: Wide = JOIN_ARC) -> Bool:
-    """Whether each distance ends further than `most` from where the next one starts."""
+    """Whether each distance ends further than `most` from the start of the next one."""
     far = np.abs(np.diff(starts_q40.astype(np.float64))) > _FAR_Q40
     step = np.where(far, 0, starts_q40[1:] - starts_q40[:-1])
     gap = distances[: len(step)] - scaled(step, ARC_SCALE, 48)
@@ -234,7 +237,7 @@ def _turned(a_q44: Int) -> Bool:
 
 
 def _extras_apart(program: Program) -> Bool:
-    """Extra axes do not go on at the joints where they were."""
+    """Positions of extra axes differ at the joints."""
     if not program.extra_q40.size:
         return np.zeros(program.segment_count - 1, dtype=np.bool_)
     start = program.point_q40[-len(program.extra_q40) :]
@@ -243,7 +246,7 @@ def _extras_apart(program: Program) -> Bool:
 
 
 def _other_slopes(program: Program) -> Bool:
-    """Extra axes go on at the joints with another slope by arc length."""
+    """Slopes of extra axes by arc length differ at the joints."""
     if not program.extra_q40.size:
         return np.zeros(program.segment_count - 1, dtype=np.bool_)
     a = np.ldexp(program.a_q44.astype(np.float64), -44)
@@ -282,7 +285,7 @@ def leaves_range(program: Program, limits: ProgramLimits) -> bool:
 
 
 def _leaves(program: Program, limits: ProgramLimits, slack_q40: float = TRAVEL_SLACK_Q40) -> Bool:
-    """The box is not within the travel."""
+    """Whether the box (N,) is not within the travel."""
     lowest, highest = boxes_q40(program)
     low = np.array(limits.min_q40_mm, dtype=np.float64) - slack_q40
     high = np.array(limits.max_q40_mm, dtype=np.float64) + slack_q40
@@ -298,11 +301,11 @@ JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
 PIECE_SLACK_MM = 2.0**-14
-"""How far a piece may go before its start or beyond its end."""
+"""Greatest distance that a piece may move before its start or beyond its end."""
 
 
 def piece_faults(program: Program, limits: ProgramLimits | None) -> list[Rule]:
-    """What is wrong with the pieces and their joints, in the order of the controller."""
+    """Violations of the rules of pieces and their joints, in the order of the controller."""
     code = ProgramError
     pieces = program.pieces
     duration, start, c = pieces.duration_q32_s, pieces.start_q40, pieces.c_q40
@@ -320,7 +323,7 @@ def piece_faults(program: Program, limits: ProgramLimits | None) -> list[Rule]:
 
 
 def _before_first(rules: list[Rule], count: int) -> int:
-    """How many pieces from the first are in range; the others cannot be looked into."""
+    """Number of pieces from the first that are in range; later ones cannot be evaluated."""
     return min([int(mask.argmax()) for mask, _, _ in rules if mask.any()], default=count)
 
 
@@ -358,7 +361,7 @@ def _shape_faults(program: Program, limits: ProgramLimits | None, count: int) ->
 
 
 def _starts_elsewhere(program: Program) -> bool:
-    """The first piece does not begin at arc length 0; of a chunk in motion: not inside the first segment."""
+    """Whether the first piece does not begin at arc length 0; in a chunk in motion: not inside the first segment."""
     start = int(program.pieces.start_q40[0])
     if not program.moving:
         return start != 0
@@ -393,7 +396,7 @@ def _bound_masks(duration: Int, c: Int, limits: ProgramLimits | None, halvings: 
 
 
 def last_piece_faults(program: Program) -> list[Rule]:
-    """What is wrong with the end of the feed."""
+    """Violations of the rules of the end of the feed."""
     pieces = program.pieces
     last = len(pieces) - 1
     duration, c = pieces.duration_q32_s[last:], pieces.c_q40[last:]
@@ -458,7 +461,7 @@ class Fault:
 
     @property
     def place(self) -> str:
-        """Where, in words."""
+        """The place in words."""
         if self.code > -20 or self.code == ProgramError.STOP_WORST:
             return "header"
         if self.code <= ProgramError.EVENT_KIND:
@@ -471,9 +474,8 @@ def check(
 ) -> Fault | None:
     """The first rule that `program` breaks, None when it may run. In a chunk it may begin in motion.
 
-    The order is that of the controller: header, segments one by one, their end, pieces one by one, their
-    end and sum, then what two segments have to do with the pieces over them, the stops, and last
-    the events.
+    The order is that of the controller: header, segments one by one, their end, pieces one by one, their end and sum,
+    pairs of short segments, stops, and last the events.
     """
     return _check(program, limits, _CLEAN, chunk)
 
@@ -481,7 +483,7 @@ def check(
 def check_image(
     image: bytes, limits: ProgramLimits | None = None, *, chunk: bool = False
 ) -> Fault | None:
-    """The same from the bytes, with what `decode` refuses and what `Program` does not hold."""
+    """The same from the bytes, including faults that `decode` refuses and fields that `Program` does not have."""
     broken = open_fault(image)
     if broken is not None:
         return Fault(broken, 0)
@@ -519,7 +521,7 @@ def _stop_fault(
 
 
 def _event_faults(program: Program) -> list[Rule]:
-    """What is wrong with single events, and with their order."""
+    """Violations of the rules of single events, and of their order."""
     events = program.events
     kind, value = events["kind"], events["value"]
     digital = kind == DIGITAL
@@ -538,7 +540,7 @@ def _event_faults(program: Program) -> list[Rule]:
 
 
 def _dense(program: Program) -> Bool:
-    """Events, from number EVENTS_A_TICK on, that a tick at 200 % could pass with so many before them."""
+    """Events, from number EVENTS_A_TICK on, that a tick at 200 % could pass together with EVENTS_A_TICK before them."""
     places = program.events["place"]
     if places.size <= EVENTS_A_TICK:
         return np.zeros(0, dtype=np.bool_)

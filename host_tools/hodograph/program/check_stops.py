@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Rules of docs/reference/protocol.md 1.4: how long a stop can take, and its bound in the table;
+"""Rules of docs/reference/protocol.md 1.4: the longest time of a stop, and its bound in the table;
 docs/theory/numerics.md section 7.
 
-In floating point and without what the controller's integers (firmware/core/stop_check.c) round up: a bound that
-the controller accepts is never below the one computed here, and above it by some 20 us at most.
+Computed in floating point, without the rounding up of the controller's integers (firmware/core/stop_check.c). A bound
+that the controller accepts is never below the one computed here, and at most about 20 us above it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Bool = NDArray[np.bool_]
 STOP_TICKS = 9
 """Ticks of a stop that are not in the continuous curve."""
 END_TICKS = 2
-"""Until a command counts, and until the end of the program is a setpoint."""
+"""Ticks until a command takes effect, and until the end of the program is a setpoint."""
 WINDOW_TICKS = 6
 """Periods of program time in which the piece whose numbers count may still change,"""
 WINDOW = 8
@@ -35,9 +35,9 @@ WINDOW = 8
 HALVINGS = 3
 """Each eighth of a piece is checked by itself."""
 LITTLE = 0.25
-"""Share of the deceleration that a rising rate of program time may add when a hold's brake begins."""
+"""Share of the deceleration that a rising override may add when the brake of a hold begins."""
 _ROUNDING = 1e-12
-"""Share of a bound that rounding may take from it here."""
+"""Share of a bound that rounding may change here."""
 _MOST_US = 2.0**32 - 1.0
 
 
@@ -97,7 +97,7 @@ def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramErro
 
 
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
-    """Least bounds (M,) of time in us and of the distance in um, from the command to rest."""
+    """Least allowed bounds (M,) of the time in us and of the distance in um, from the command to rest."""
     own_s, own_mm, waits = own_bounds(program, kind)
     duration = program.pieces.duration_s
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * MM_PER_Q40
@@ -119,8 +119,8 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
 
 
 def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
-    """Time in s and distance in mm (M,) of a stop that brakes in the piece in which it was requested, 0 where none may,
-    and the share of the piece, up to its end, from which it may go on into the next.
+    """Time in s and distance in mm (M,) of a stop that brakes in the piece in which it was requested (0: none may); and
+    the share of the piece, before its end, from which a stop may continue into the next piece.
     """
     pieces, codes = program.pieces, program.stops.codes[:, kind]
     period_s = program.period_us * 1e-6
@@ -140,7 +140,7 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
             pieces.override_factor if level == FULL else np.full_like(speed, LEVEL_OVERRIDES[level])
         )
         second = pieces.override_second_per_s2(level)
-        # It rises from 0 and falls to 0 again within a change of the rate by that of the level at most.
+        # It rises from 0 and falls to 0 again while the override changes by at most the level.
         steepest = np.minimum(pieces.override_rate_per_s(level), np.sqrt(rate * second))
         own_s, own_mm = _level(
             _Start(speed * rate, rising * rate**2, steepest * speed, steepest / second),
@@ -159,8 +159,8 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """Where brakes begin (M,): greatest speed, acceleration at a constant rate, what a changing rate adds to it, and
-    the time in which that is taken back.
+    """At the start of brakes (M,): greatest speed, acceleration at constant override, the part that a changing override
+    adds, and the time in which this part decays.
     """
 
     speed: Real
@@ -170,7 +170,7 @@ class _Start:
 
 
 def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Real, Real]:
-    """Time and distance (M,) of stops that begin in one level of the rate, waits left out."""
+    """Time and distance (M,) of stops that begin in one override level, without the stop delay."""
     speed, rising, slope, cut_s = start.speed, start.rising, start.slope, start.cut_s
     more_s = np.full(speed.size, STOP_TICKS * period_s)
     if kind == HOLD:
@@ -180,7 +180,7 @@ def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Rea
         slope = np.minimum(slope, little)
     speed = speed + 0.5 * (rising + slope) * period_s
     lead_s, slope_s = rising / number[:, JERK_DOWN], slope / number[:, JERK_DOWN]
-    # A rate that still rises is below the greatest by what it goes up while its slope is taken back.
+    # An override that still rises is below the greatest by its rise while its rate decays.
     peak = (
         speed + rising * (0.5 * lead_s + slope_s) + 0.5 * slope * np.maximum(slope_s - cut_s, 0.0)
     )
@@ -189,7 +189,7 @@ def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Rea
 
 
 def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
-    """Whether a brake fits everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
+    """Whether a brake may begin everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
     factor = program.pieces.override_factor[:, None]
     falling = np.maximum(-acceleration, 0.0) * factor**2
     settle_s = 0.5 * falling / jerk_up[:, None] + 3e-6 * program.period_us

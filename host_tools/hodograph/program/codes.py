@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Why a program is refused: the codes of the controller, in its own names and numbers.
+"""Reasons for refusing a program: the codes of the controller, with its names and numbers. Used by check.py and bus/.
 
 The same table as `enum program_error` in firmware/core/program_rules.h (a test compares them).
 """
@@ -85,7 +85,7 @@ class ProgramError(IntEnum):
 
     @property
     def text(self) -> str:
-        """One line in English."""
+        """The reason in one line of English."""
         return _TEXTS[self]
 
 

@@ -33,13 +33,13 @@ _FEED_MARGIN_MM_S = 2.0**-22
 _U32_MAX = 2**32 - 1
 _MOST_ROUNDS = 12
 _PLACES = 9
-"""Of a feed piece whose curvature is named."""
+"""Least curvature of a feed piece that messages name, 1/mm."""
 
 
 @dataclass(frozen=True, eq=False)
 class Compilation:
-    """A program, the plan it holds (its feed lowered where short segments ask for it), what the user
-    should know, and the greatest distance of a segment's start from the ideal curve.
+    """A program, its plan (with a lower feed where segments are short), notes for the user, and the greatest distance
+    of a segment's start from the ideal curve.
     """
 
     program: Program
@@ -50,12 +50,14 @@ class Compilation:
 
 @dataclass(frozen=True)
 class ProgramOptions:
-    """What a program holds beside path and feed.
+    """The other parts of a program, in addition to path and feed.
 
-    `offset_mm`: work offset of each axis of the path; (): none. `limits` of the controller, travel included; without,
-    only the rules of the format are checked. `period_us`, when given, must be the plan's. `stops`: what its stops keep
-    beside the plan's limits. `events`: outputs on the path, by place. `first_axis`: of the machine, that the first axis
-    of the program is.
+    offset_mm   work offset of each axis of the path; (): none
+    limits      of the controller, including travel; None: only the rules of the format are checked
+    period_us   has to be that of the plan; None: not compared
+    stops       limits of its stops in addition to those of the plan
+    events      outputs on the path, by place
+    first_axis  the machine's number of the program's first axis
     """
 
     name: str = ""
@@ -161,10 +163,9 @@ def _require_override_headroom(program: Program, spline: Curve) -> None:
 
 
 def fit_plan(spline: PHSpline | SpatialPHSpline, plan: FeedPlan, replan: Replan) -> FeedPlan:
-    """The plan that `compile_path` makes a program of: made again with a lower feed where segments are too short for
-    it.
+    """The plan of which `compile_path` makes a program, made again with a lower feed where segments are too short.
 
-    Raises PlanError as `compile_path` does for them, and InputError for a path beyond the format.
+    Raises PlanError: segments are too short for any feed. Raises InputError: the path is beyond the format.
     """
     geometry = quantise(spline)
     return _fit_feed(plan, geometry.start_q40, spline, replan)[0]
@@ -191,7 +192,7 @@ def _fit_feed(
         if feed < LEAST_FEED_MM_S:
             raise PlanError(f"{where} at any feed: take points that lie further apart there")
         if plan.limits.policy == "report":
-            # Rounded down for the user, so that it really does.
+            # Rounded down, so that the value in the note is low enough.
             raise PlanError(
                 f"{where}: {feed * (1.0 - 5e-4):.4g} mm/s would do; "
                 'lower nominal_mm_s or set policy "respect"'
@@ -203,7 +204,7 @@ def _fit_feed(
 
 
 def _on_path(events: Events, length_q40: int) -> Events:
-    """The events; one at the end of the path stays there when that is rounded down."""
+    """The events; one at the end of the path stays at the end after rounding."""
     held = events.copy()
     held["place"] = np.minimum(events["place"], length_q40)
     return held
@@ -216,7 +217,7 @@ def _span(spline: Curve, joints_q40: Int, segment: int) -> tuple[int, float]:
 
 
 def _limit(value: float | None, scale: float) -> int:
-    """Rounded up, but not for the rounding of the product."""
+    """The limit in units of the format, rounded up unless only the product was rounded."""
     return 0 if value is None else max(1, min(ceil(value * scale * (1.0 - 1e-12)), _U32_MAX))
 
 

@@ -72,7 +72,7 @@ class Geometry:
 
 
 def quantise(path: PHSpline | SpatialPHSpline, offset_mm: Sequence[float] = ()) -> Geometry:
-    """Segments of a path: its preimage rounded, then everything else from exact sums of the rounded one.
+    """Segments of a path: its preimage is rounded, and all other numbers are exact sums of the rounded one.
 
     offset_mm  work offset of each axis; (): none. Raises InputError.
     """
@@ -143,7 +143,9 @@ def _extra(spline: SpatialPHSpline, offset: Real) -> tuple[Int, Int]:
 
 
 def _anchored(distance_q40: Int, ideal_mm: Real, offset_mm: float) -> tuple[Int, Real]:
-    """Start points from exact distances, drawn to the ideal ones as far as joints stay within 2^-36 mm."""
+    """Start points from exact distances, moved to the ideal ones if joints stay within 2^-36 mm; and their errors in
+    mm.
+    """
     offset = nearest_q40(offset_mm)
     ideal = to_q40(ideal_mm)
     chained = ideal[0] + distance_q40

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The program image: read from a file, decoded to arrays, encoded to bytes; and the memory that it takes.
+"""The program image: reads it from a file, decodes it to arrays, encodes it to bytes; and the memory that it needs.
 
 docs/reference/protocol.md 1.1 to 1.4. Used by the compiler, the checks, the commands and the API.
 """
@@ -30,7 +30,7 @@ Int = NDArray[np.int64]
 MAGIC = b"HDGP"
 VERSION = 2
 HEADER_SIZE, SEGMENT_SIZE, PIECE_SIZE, STOP_SIZE = 128, 72, 88, 16
-"""Those of header and segment are a planar program's; `header_size` and `segment_size` know the others."""
+"""Sizes of header and segment of a program in the plane; `header_size` and `segment_size` give those of others."""
 PLANE_AXES, SPACE_AXES, MOST_AXES = 2, 3, 6
 FLAG_CLOSED, FLAG_MOVING, FLAG_COMPACT = 1, 2, 4
 _FIRST_AXIS_FLAGS = 7 << FIRST_AXIS_SHIFT
@@ -71,7 +71,7 @@ _COMPACT_EXTRA = np.dtype([("start", *_I56), ("b", _I48, 5)])
 _COMPACT_STOP = np.dtype([("codes", "u1", (2, 3)), ("bound_us", "u1", (2, 3))])
 COMPACT_PIECE_SIZE, COMPACT_STOP_SIZE = _COMPACT_PIECE.itemsize, _COMPACT_STOP.itemsize
 COMPACT_PIECE_BYTES = COMPACT_PIECE_SIZE + COMPACT_STOP_SIZE
-"""Of a compact piece with its stop."""
+"""Bytes of a compact piece with its stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,12 +83,12 @@ class Program:
     a_q44      Bernstein coefficients of the preimage, mm^(1/2): in the plane (2, N, 3) those of w = u + iq, in space
                (4, N, 3) those of A = u + v i + p j + q k
     extra_q40  (A - 3, N, 5) Bezier coefficients 1 … 5 of the extra axes from the segment's start; mm, degrees
-    offset_q40 work offset of each axis, already contained
+    offset_q40 work offset of each axis, which the points include
     pieces     the M feed pieces, and `stops` for each of them
     moving     it begins in motion: only in a chunk of a stream
-    compact    its image has compact records, if its numbers fit them: only in a chunk of a stream
+    compact    its image has compact records if its numbers fit them: only in a chunk of a stream
     events     outputs that switch on the path, by place
-    first_axis the axis of the machine that the program's first one is
+    first_axis the machine's number of the program's first axis
     Limits of 0 mean none.
     """
 
@@ -119,7 +119,7 @@ class Program:
 
     @property
     def axis_count(self) -> int:
-        """A: how many axes follow the path."""
+        """A: number of axes that follow the path."""
         return int(self.point_q40.shape[0])
 
     @property
@@ -309,7 +309,7 @@ def header_size(axes: int) -> int:
 
 
 def segment_size(axes: int, *, compact: bool = False) -> int:
-    """Bytes of one of its segments."""
+    """Bytes of a segment of a program that so many axes follow."""
     return _Layout(axes, compact).segment.itemsize
 
 
@@ -369,7 +369,7 @@ def _within(values: Int, limit: int) -> bool:
 
 
 def _segments(program: Program) -> NDArray[np.void]:
-    """As the image has them."""
+    """The segments as records of the image."""
     axes = program.axis_count
     out = np.zeros(program.segment_count, dtype=program._layout.segment)
     drawn = PLANE_AXES if axes == PLANE_AXES else SPACE_AXES
@@ -410,7 +410,7 @@ def _taken(field: NDArray[Any], *, signed: bool = True) -> Int:
 
 
 def open_fault(image: bytes) -> ProgramError | None:
-    """What `program_open` of the controller would answer, None for an image that opens."""
+    """The reason why `program_open` of the controller refuses an image; None: it does not."""
     if len(image) < HEADER_SIZE:
         return ProgramError.SIZE
     head = _HEADER.unpack_from(image)
@@ -435,8 +435,8 @@ def open_fault(image: bytes) -> ProgramError | None:
 
 @dataclass(frozen=True, eq=False)
 class ReservedFields:
-    """Content of an image that is not in `Program`: whether flags of the header and the padding of the
-    name are as they must be, and where reserved fields of stops are not 0 (None: nowhere).
+    """Content of an image that is not in `Program`: whether flags of the header and the padding of the name are
+    correct, and the first stop whose reserved fields are not 0 (None: none).
     """
 
     flags: bool
@@ -462,12 +462,12 @@ def reserved_fields(image: bytes) -> ReservedFields:
 
 @dataclass(frozen=True)
 class ProgramLimits:
-    """What a controller allows, in the units of the protocol; 0 for all but the travel: any.
+    """The limits of a controller, in the units of the protocol; 0, except for the travel: no limit.
 
     stop_time_ms  greatest bound of a fault stop
     axis_count    path axes of the machine; 0: any
 
-    Those of the axes, in the order of the path, are proved by the controller's own check only
+    Limits of the axes are in the order of the path. Only the controller's own check proves them
     (firmware/core/limit_check.h).
     """
 
@@ -485,7 +485,9 @@ class ProgramLimits:
 
 
 def read_image(file: Path) -> bytes | None:
-    """The bytes of a program image, None when the file is something else (a path file). Raises InputError."""
+    """The bytes of a program image; None: the file is of another kind, such as a path file. Raises InputError: it
+    cannot be read.
+    """
     try:
         with file.open("rb") as source:
             if source.read(4) != MAGIC and file.suffix != ".hdgp":
@@ -500,8 +502,9 @@ def read_image(file: Path) -> bytes | None:
 
 @dataclass(frozen=True)
 class RecordBytes:
-    """Bytes that a controller needs beside an image: of each segment in the plane, each piece, each segment in space,
-    and each extra axis of such a segment (docs/reference/protocol.md 1.6; 0x2041 subs 2 to 5)."""
+    """Bytes of the coefficient cache by kernel: for each segment in the plane, each piece, each segment in space, and
+    each extra axis of such a segment (docs/reference/protocol.md 1.6; 0x2041 subs 2 to 5).
+    """
 
     segment: int
     piece: int
@@ -516,18 +519,18 @@ RECORD_BYTES = {
 }
 """By kernel."""
 LARGEST_BANK = 64 * 2**20 - 16
-"""Bytes for a program of the largest store that a port of this project has (Linux); a board's is smaller."""
+"""Bytes for a program in the largest program store of all ports (Linux); those of boards are smaller."""
 _COUNTS = struct.Struct("<20xIIxxH")
 
 
 def record_bytes(records: RecordBytes, axes: int) -> tuple[int, int]:
-    """Of a segment of a program with so many axes, and of a piece."""
+    """Bytes of the coefficient records of a segment of a program with so many axes, and of a piece."""
     extra = max(0, axes - SPACE_AXES) * records.extra_axis
     return records.segment if axes <= PLANE_AXES else records.spatial_segment + extra, records.piece
 
 
 def memory_bytes(image: bytes, records: RecordBytes) -> int:
-    """Image and its records. The image has a whole header."""
+    """Bytes of an image and its coefficient records. The image needs a whole header."""
     segments, pieces, axes = _COUNTS.unpack_from(image[:HEADER_SIZE])
     segment, piece = record_bytes(records, axes)
     return len(image) + int(segments) * segment + int(pieces) * piece

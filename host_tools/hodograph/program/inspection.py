@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A program for people: `hodograph inspect`."""
+"""A program as text and as plain numbers: `hodograph inspect`."""
 
 from __future__ import annotations
 
@@ -72,7 +72,9 @@ def inspect_dict(program: Program) -> dict[str, Any]:
 
 
 def _bytes(program: Program) -> dict[str, Any]:
-    """Of an image, of each of its parts and of the coefficients of each; what a ring for chunks has room for."""
+    """Bytes of an image, of its parts and of their coefficient records; and the motion that a ring for chunks can
+    hold.
+    """
     segments, pieces, seconds = ring_holds(program, RING_BYTES)
     return {
         "header": header_size(program.axis_count),
@@ -99,9 +101,8 @@ def _coefficients(program: Program, kernel: str) -> dict[str, int]:
 
 
 def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
-    """Segments, pieces and seconds that fill so many bytes as compact records, where they are densest.
-
-    Of a program that is smaller: so many of its mean density.
+    """Segments, pieces and seconds that fill `size` bytes as compact records, at the densest place of the program. For
+    a smaller program, at its mean density.
     """
     size = (
         segment_size(program.axis_count, compact=True),
@@ -109,7 +110,7 @@ def ring_holds(program: Program, ring_bytes: int) -> tuple[int, int, float]:
     )
     starts = np.append(program.pieces.start_q40, program.length_q40)
     times = np.concatenate((np.zeros(1), np.cumsum(program.pieces.duration_q32_s) * 2.0**-32))
-    # of the segments, those that begin before the end of each piece
+    # number of segments that begin before the end of each piece
     begun = np.searchsorted(program.start_q40, starts, side="right")
     filled = begun * size[0] + np.arange(program.piece_count + 1) * size[1]
     last = np.searchsorted(filled, filled + ring_bytes, side="right") - 1
@@ -145,7 +146,7 @@ def _bytes_text(found: dict[str, Any]) -> str:
 
 
 def end_point_q40(program: Program) -> NDArray[np.int64]:
-    """Where it ends, (A,) in 2^-40 mm or degrees."""
+    """The end point of a program, (A,) in 2^-40 mm or degrees."""
     *distances, _ = (
         int(arc_to_q40(distance)[0]) for distance in segment_arcs(program.a_q44[:, -1:])
     )
@@ -215,7 +216,7 @@ def _event_dict(event: Event) -> dict[str, Any]:
 
 
 def _event_lines(program: Program, full: bool) -> list[str]:
-    """The table of events; nothing where there is none."""
+    """The table of events; empty: there is none."""
     if not len(program.events):
         return []
     rows = [

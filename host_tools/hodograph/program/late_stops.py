@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""A path is planned again where a fault stop of its program would come later than `stop_time_ms` of the machine file;
+"""Plans a path again if a fault stop of its program would take longer than `stop_time_ms` of the machine file;
 docs/theory/toolpath-fitting.md section 8.
 
-Profile "optimal" first leaves more of its limits free, around places where stops may then begin, or everywhere. If that
-is not enough, and with the other profiles, the feed is lowered step by step.
+With profile "optimal" more of the limits is left free first: around places at which stops may then begin, or
+everywhere. If that is not enough, and with the other profiles, the feed is lowered step by step. Used by pipeline.py.
 """
 
 from __future__ import annotations
@@ -22,18 +22,20 @@ from .stop_reserve import EVERYWHERE, SPREADS, late_too_often, zones_at_places
 from .stops import FAULT
 
 LEAST_STEP, GREATEST_STEP = 0.3, 0.95
-"""Factors of the feed from one plan to the next: in proportion to how late stops are, but within these."""
+"""Least and greatest factor of the feed from one plan to the next. Between them it is in proportion to the lateness of
+stops.
+"""
 
 MOST_STEPS = 8
-"""How many times the feed is lowered."""
+"""How many times the feed is lowered at most."""
 
 FAILED_STEP = 0.7
-"""One more factor of the feed where no program can be made of a plan for another reason than a late stop."""
+"""Factor of the feed if no program can be made of a plan for another reason than a late stop."""
 
 
 @dataclass(frozen=True)
 class Replanning:
-    """How a path is planned again, and how a program is made of a plan.
+    """Plans a path again, with functions for plans and programs.
 
     plan         a plan inside limits; raises PlanError
     slower       a plan made again with feed zones; the text, why, goes to its notes; raises PlanError
@@ -49,8 +51,8 @@ class Replanning:
     stop_time_s: float
 
     def in_time(self, plan: FeedPlan, late: LongStopError) -> Compilation:
-        """The program of the first of some plans whose fault stops are in time; `late` is the refusal of `plan`. A plan
-        that is not found, or of which no program can be made, is passed over. Raises PlanError where none is in time.
+        """The first program whose fault stops are in time; `late` is the refusal of `plan`. Plans that are not found,
+        or of which no program can be made, are skipped. Raises PlanError: no program is in time.
         """
         found = None
         if plan.request.optimal:
@@ -64,8 +66,8 @@ class Replanning:
         return found
 
     def _with_reserve(self, limits: Limits, late: LongStopError) -> Compilation | None:
-        """The program of a plan with zones of reserve around places where stops may begin in a plan whose limits are
-        lower everywhere; of one of these plans, where zones are not enough; None: none is in time.
+        """The program of a plan with reserve zones around places at which stops may begin, which a plan with lower
+        limits everywhere shows. If zones are not enough, the program of such a plan. None: none is in time.
         """
         program, zones = late.program, limits.reserve_zones
         whole: list[FeedPlan] = []
@@ -120,7 +122,7 @@ class Replanning:
         return None
 
     def _slower_zones(self, plan: FeedPlan, program: Program, share: float) -> list[FeedZone]:
-        """Feed zones for the next plan, with lower feeds than this program of `plan` has; none: no feed may be lower.
+        """Feed zones for the next plan, with lower feeds than this program of `plan`; empty: no feed may be lower.
         `share`: a further factor of their feeds.
         """
         step = self.stop_time_s / program.stops.worst(FAULT).time_s
@@ -134,7 +136,7 @@ class Replanning:
 
 
 def _noted(made: Compilation, late: LongStopError) -> Compilation:
-    """The same with a note that it was planned again, and why."""
+    """The program with a note that the path was planned again, with the reason."""
     before_s, after_s = late.program.duration_s, made.program.duration_s
     line = f"planned again with more room for stops, {after_s:.4g} s in place of {before_s:.4g} s: {late.reason}"
     notes = (*made.plan.notes, line)

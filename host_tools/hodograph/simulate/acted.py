@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""When and where each output of the path switched in a run, simulated or on a bus: `outputs` of `--json`, and marks in
-figures.
+"""Time and place at which each output of the path switched in a run, simulated or on a bus. For `outputs` of `--json`,
+and marks in figures.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..events import Event, Events
 
 @dataclass(frozen=True, kw_only=True)
 class ActedOutput(PlacedOutput):
-    """What became of one output in a run, and when: the tick whose setpoint was the first at or past the place."""
+    """One switched output of a run, with the tick whose setpoint was the first at or past the place."""
 
     tick: int
     time_s: float
 
     def summary(self) -> dict[str, object]:
-        """As `--json` gives it."""
+        """The keys of `--json`."""
         found: dict[str, object] = {
             "name": self.name,
             "place_mm": self.place_mm,
@@ -36,7 +36,7 @@ class ActedOutput(PlacedOutput):
 def acted_outputs(
     outputs: Outputs | None, events: Events, event_ticks: NDArray[np.int64], period_us: int
 ) -> list[ActedOutput]:
-    """What the events did that a run came to, in their order.
+    """The outputs that the events of a run switched, in their order.
 
     event_ticks  (E,) the tick in which each acted; negative: in none
     """

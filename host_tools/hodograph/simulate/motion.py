@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run, simulated or recorded: rows a tick, hashes, maxima."""
+"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima. Used by simulate/, reports and the
+API.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ from ..native.program import Counts, counts_by_axis
 from .acted import ActedOutput, acted_outputs
 
 SETTLING_S = 0.2
-"""Time after the last tick that maxima count, hashes and traces do not (docs/reference/protocol.md section 2)."""
+"""Settling time after the last tick, which is included in maxima, but not in hashes and traces
+(docs/reference/protocol.md section 2).
+"""
 
 _Q32 = 2.0**-32
 
@@ -33,17 +37,17 @@ def settling_ticks(period_us: int) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """A run. Row k: setpoint k, and what the drives reported for SYNC k+2, when it is reached.
+    """A run. Row k: setpoint k, and the reports of the drives for SYNC k+2, when it is reached.
 
-    `rows` has `native.ROW` records: the program's ticks, then the settling time; it is empty when the run
-    did not keep them. Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian
-    x, y (…) of the program's ticks. The following error
-    is that of one axis, setpoint less position; the contour error is the distance from the exact curve. Maxima count
-    the settling time, the RMS of the contour error does not. `max_volts` None: the drives do not report their volts.
+    `rows` has `native.ROW` records: the program's ticks, then the settling time; empty if the run did not keep them.
+    Arrays of all A axes that follow the path, `names`, are (n, A). Hashes are over i32 little-endian x, y (…) of the
+    program's ticks. The following error is that of one axis, setpoint less position; the contour error is the distance
+    from the exact curve. Maxima include the settling time, the RMS of the contour error does not. `max_volts` None: the
+    drives do not report their volts.
 
-    `units`, `counts_per_unit` by axis. An rotary axis has degrees where names say mm, and thousandths of a degree
-    where they say um; the greatest following error is that of the axes in mm. Axes after x, y, z have an orientation
-    error: how far they are from where the curve has them beside the point nearest to the tool.
+    `units`, `counts_per_unit` by axis. For a rotary axis mm in names stands for degrees, and um for thousandths of a
+    degree. The greatest following error is that of the axes in mm. Axes after x, y, z have an orientation error: the
+    difference between their position and that of the curve at its point nearest to the tool.
     """
 
     kernel: str
@@ -62,13 +66,13 @@ class Motion:
     orientation_error: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     """(n, A - 3), actual less exact, in mm or degrees."""
     max_orientation_error: tuple[float, ...] = ()
-    """Of each axis after x, y, z, in mm or degrees."""
+    """Greatest orientation error of each axis after x, y, z, in mm or degrees."""
     max_following_error_mdeg: float | None = None
-    """Of the rotary axes; None: there is none."""
+    """Greatest following error of the rotary axes; None: there is none."""
     event_ticks: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """(E,) the tick in which each event of the program acted; -1: in none."""
     events: Events = field(default_factory=no_events)
-    """Of the program."""
+    """Events of the program."""
     outputs: Outputs | None = None
     """The machine's outputs, which name what the events switch; None: it has none."""
 
@@ -84,13 +88,13 @@ class Motion:
 
     @property
     def acted_outputs(self) -> list[ActedOutput]:
-        """What became of the outputs, in the order of their places."""
+        """The switched outputs, in the order of their places."""
         return acted_outputs(self.outputs, self.events, self.event_ticks, self.period_us)
 
     @property
     def output_columns(self) -> dict[str, NDArray[Any]]:
-        """By name of an output its value in each row, (n,): 0 and 1 of a digital one, that of an analogue one in its
-        unit.
+        """The value of each output in each row, (n,), by its name: 0 or 1 of a digital one, that of an analogue one in
+        its unit.
         """
         rows, channels = self.rows, self.outputs.channels if self.outputs is not None else ()
         return {
@@ -166,7 +170,7 @@ class Motion:
 
     @property
     def set_counts(self) -> NDArray[np.int32]:
-        """The same in counts."""
+        """Setpoint in counts, (n, A)."""
         return self._by_axis("set_counts")
 
     @property
@@ -192,7 +196,7 @@ class Motion:
 
 
 class MotionTotals:
-    """Hashes and maxima of a run, added chunk by chunk, so that a run of any length needs bounded memory."""
+    """Hashes and maxima of a run, which is added in parts, so that a run of any length needs bounded memory."""
 
     def __init__(
         self,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run from what was recorded on the bus."""
+"""The result of a run from a recording of the bus; for `hodograph run`, `replay` and tests."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def analyse(
 ) -> Motion:
     """The `Motion` of a recording, as `simulate` gives it.
 
-    All three arrays are (n, A), by axis (`names` and `units`, default x, y, … in mm); row k holds setpoint k and what
-    the drives reported for SYNC k+2, n being the program's ticks and 0.2 s of settling (`settling_ticks`). The
-    commanded points are computed again by the kernel that the controller used, and compared with the setpoints.
+    All three arrays are (n, A), by axis (`names` and `units`, default x, y, … in mm); row k holds setpoint k and the
+    reports of the drives for SYNC k+2; n is the program's ticks and 0.2 s of settling (`settling_ticks`). The commanded
+    points are computed again by the kernel that the controller used, and compared with the setpoints.
 
-    outputs  of the machine; `latched`: what its I/O module had at SYNC k+2, records with "digital", "analogue"
+    outputs  of the machine; `latched`: outputs of its I/O module at SYNC k+2, records with "digital", "analogue"
 
-    Raises RunError when rows are missing, an output is not the program's or a setpoint is not the kernel's, InputError
-    for a bad image.
+    Raises RunError: rows are missing, or an output or setpoint differs from the program. Raises InputError: the image
+    cannot be read.
     """
     program = NativeProgram(image)
     wanted = program.ticks + settling_ticks(program.period_us)
@@ -74,7 +74,7 @@ def _rows(
     volts_mv: NDArray[np.int16],
     counts_per_mm: Counts,
 ) -> NDArray[np.void]:
-    """A row (n,) for each tick: its point by the kernel, the setpoint, and what the drives reported, with the contour
+    """A row (n,) for each tick: its point by the kernel, the setpoint, the reports of the drives, and the contour
     error.
     """
     rows = np.zeros(len(points), dtype=ROW)
@@ -95,9 +95,10 @@ def _rows(
 def _put_outputs(
     rows: NDArray[np.void], program: NativeProgram, outputs: Outputs, latched: NDArray[np.void]
 ) -> None:
-    """The outputs in the rows. Raises RunError: they are not those of the program, held back by the machine's delay.
+    """Puts the outputs into the rows. Raises RunError: they differ from those of the program, delayed as in the machine
+    file.
 
-    An output that is held back by one tick is latched when the setpoint is reached, which is row k.
+    An output that is delayed by one tick is latched when its setpoint is reached, which is row k.
     """
     if len(latched) < len(rows):
         raise RunError(f"recording: holds {len(latched)} of {len(rows)} ticks: run again")
@@ -108,7 +109,7 @@ def _put_outputs(
     digital, analogue = program.outputs(rows["arc_length_q40_mm"], rows["feed_q32_mm_s"])
     ticks = program.ticks
     shift = outputs.delay_ticks - 1
-    # Before the first tick the outputs may be those of the program before this one; after the last one they may go off.
+    # Before the first tick the outputs may be those of the last program; after the last tick they may go off.
     found = slice(max(shift, 0), ticks - 1 + min(shift, 0))
     wanted = slice(max(-shift, 0), max(-shift, 0) + found.stop - found.start)
     wrong = (rows["digital"][found] != digital[wanted]) | np.any(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs a program without a bus: the controller's kernel and the simulated axes, as fast as they go (hodograph.native).
+"""Runs a program without a bus: the controller's kernel and the simulated axes in this process, without waiting.
 
 Reads and writes no file. For commands, the report, tuning and the API.
 """
@@ -21,7 +21,7 @@ from ..native.program import Counts
 from .motion import Motion, MotionTotals, settling_ticks
 
 CHUNK_TICKS = 16384
-"""Ticks a call of the C side: small enough to stay in cache, and between two checks for Ctrl-C."""
+"""Ticks in one call of the C side: they fit the cache, and Ctrl-C is checked between calls."""
 
 
 def names_of_driven(
@@ -64,10 +64,10 @@ def simulate(
 
     Gives the same setpoints and encoder positions as a run on the bus, bit for bit.
 
-    image          bytes, or a program that is opened already (faster, if it is run often)
+    image          bytes, or an opened program (faster, if it is run often)
     drives         of the axes of the program, in their order
     counts_per_mm  of all axes, or of each
-    faults         that act on the axes; no controller supervises them
+    faults         of the axes; no controller supervises them
     keep_rows      False: hashes and maxima only, which bounds the memory of very long runs
     progress       called with (ticks done, all ticks) after each chunk
     names, units   of the axes (default x, y, … in mm)

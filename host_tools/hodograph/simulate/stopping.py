@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Runs that are stopped in motion: feed hold, stop and fault stop, without a bus."""
+"""Runs that are stopped in motion, without a bus: feed hold, stop and fault stop. For `hodograph simulate` and
+benchmarks.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +25,7 @@ from .motion import Motion, settling_ticks
 from .simulation import make_totals, names_of_driven
 
 STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
-"""Kinds of a stop, and of the OfflineOrder that asks for it."""
+"""Kinds of a stop, and of its OfflineOrder."""
 
 _HISTORY = 3
 
@@ -79,8 +81,8 @@ def simulate_stop(
     names: Sequence[str] | None = None,
     units: Sequence[str] | None = None,
 ) -> StoppedRun:
-    """A run as `simulate` makes it, that is stopped `at_s` after its first setpoint: the setpoint of this time is the
-    first that follows. Raises InputError: a time outside the program, and as `simulate`.
+    """A run, as by `simulate`, that is stopped `at_s` after its first setpoint: the setpoint at this time is the first
+    of the stop. Raises InputError: the time is outside the program; and as `simulate`.
     """
     period_s = program.period_us * 1e-6
     names = names_of_driven(program, drives, names)
@@ -123,7 +125,9 @@ def simulate_stop(
 
 
 def _peaks(motion: Motion, tick: int, rest_tick: int) -> dict[str, float]:
-    """Of the differences that reach into tick … rest_tick + 3: from the last setpoint before the stop to rest."""
+    """Peaks of the differences that include one of tick … rest_tick + 3: from the last setpoint before the stop to
+    rest.
+    """
     begin = max(tick - _HISTORY, 0)
     rows = slice(begin, rest_tick + 1 + _HISTORY)
     period_s = motion.period_us * 1e-6

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Traces: one CSV row a tick."""
+"""Traces: CSV files with one row for each tick; `hodograph simulate --trace`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def trace_header(
 
 
 TRACE_HEADER = trace_header(AXES[:2])
-"""That of a path in the plane."""
+"""The first line of a trace in the plane."""
 
 _CHUNK = 65536
 

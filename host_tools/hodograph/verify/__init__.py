@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Checks what a program really does, beside the limits it was planned for. It shares the types of limits and peaks with
-the planner, but no computation."""
+"""Compares the motion of a program with its limits; `hodograph verify`. The package shares the types of limits and
+peaks with the planner, but no computation.
+"""
 
 from .setpoints import BusNoise, Sampled, bus_noise, sampled
 from .verification import TOLERANCE, Verification, verify_program

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The motion of a program cut into cells: stretches of time within one feed piece and one segment.
 
-Within a cell everything is smooth: arc length is one polynomial in time, the curve one polynomial in its parameter.
+Within a cell the arc length is one polynomial in time, and the curve one polynomial in its parameter.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Cells:
         return np.asarray(self.start_s[cell] + u * self.duration_s[cell])
 
     def taken(self, which: Int | NDArray[np.bool_]) -> Cells:
-        """Some of them."""
+        """A selection of the cells."""
         return replace(
             self,
             segment=self.segment[which],
@@ -64,7 +64,7 @@ class Cells:
         )
 
     def divided(self, parts: Int) -> Cells:
-        """Each cut evenly into `parts` (C,)."""
+        """The cells, each cut into `parts` (C,) equal parts."""
         cell = np.repeat(np.arange(len(self)), parts)
         width = 1.0 / parts[cell]
         first = np.arange(cell.size) - np.repeat(np.cumsum(parts) - parts, parts)
@@ -78,7 +78,7 @@ class Cells:
 
 
 def cut(program: Program, more_mm: Sequence[float] = ()) -> Cells:
-    """The cells of a program; cut at the arc lengths `more_mm` besides."""
+    """The cells of a program, also cut at the arc lengths `more_mm`."""
     pieces = program.pieces
     exponent = np.array([piece.exponent for piece in pieces], dtype=np.float64)
     duration = pieces.duration_q32_s * 2.0**-32
@@ -125,7 +125,7 @@ def _joints(program: Program, distance: Real, more_mm: Sequence[float]) -> tuple
 
 
 def _stretches(count: int, piece: Int, u: Real) -> tuple[Int, Real, Real]:
-    """Piece, begin and end of what lies between consecutive cuts; ends of pieces are cuts too."""
+    """Piece, begin and end of each interval between consecutive cuts; ends of pieces are cuts too."""
     whole = np.arange(count)
     pieces = np.concatenate((whole, piece))
     lows = np.concatenate((np.zeros(count), u))

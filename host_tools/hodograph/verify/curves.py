@@ -23,7 +23,9 @@ _NEWTON_STEPS = 6
 
 @dataclass(frozen=True, eq=False)
 class Curve(ABC):
-    """N segments: `start_mm` (N,) arc length where each begins, `arc` (N, 6) arc length within it; mm."""
+    """N segments: `start_mm` (N,) arc length at the start of each, `arc` (N, 6) arc length within it as powers of xi;
+    mm.
+    """
 
     start_mm: Real
     arc: Real
@@ -38,13 +40,12 @@ class Curve(ABC):
 
     @abstractmethod
     def turn(self, segment: Int) -> Real | Complex:
-        """Powers (K, 3) of what over sigma^2 is the curvature: signed in the plane, a complex number whose magnitude
-        counts in space.
-        """
+        """Powers (K, 3) of curvature * sigma^2: signed in the plane, in space a complex number of that magnitude."""
 
     def parameter(self, segment: Int, arc_mm: Real) -> Real:
-        """xi at an arc length within the segment, both (K,). Newton; docs/theory/numerics.md 12 says why it
-        converges."""
+        """xi at an arc length within the segment, both (K,). Newton's method; docs/theory/numerics.md 12 proves that it
+        converges.
+        """
         arc = self.arc[segment]
         xi = arc_mm / arc.sum(axis=1)
         for _ in range(_NEWTON_STEPS):

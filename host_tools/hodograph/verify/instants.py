@@ -35,7 +35,7 @@ PerAxis = tuple[Real, ...]
 class Motion:
     """At K instants: derivatives 1 to 3 of arc length, feed^2 times curvature, and velocity … jerk of each axis; mm, s.
 
-    Also what bounds the second derivatives of the same (`bounds.bends`), one for each cell.
+    `bounds.bends` gives bounds of the second derivatives of these, one for each cell, in the same form.
     """
 
     feed: Real

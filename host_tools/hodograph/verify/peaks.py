@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 GAP = 1e-4
-"""How far a quantity may rise between samples, over its least limit or its peak, whichever is greater."""
+"""Greatest rise of a quantity between samples, over its least limit or its peak, whichever is greater."""
 
 _MOST_INTERVALS = 48
 _ROUNDS = 8
@@ -27,7 +27,9 @@ _CHUNK = 1 << 16
 
 @dataclass(frozen=True, eq=False)
 class CellMaxima:
-    """By quantity and cell, (Q, C): the greatest magnitude among samples, where (u), and what it can be at most."""
+    """By quantity and cell, (Q, C): the greatest magnitude among samples, its place (u), and a bound of the
+    magnitude.
+    """
 
     found: Real
     at: Real
@@ -36,7 +38,9 @@ class CellMaxima:
 
 
 def scales(cells: Cells, rows: Sequence[Quantity]) -> Real:
-    """Of each quantity, (Q,): its least limit, or its magnitude at ends and middles of cells where that is more."""
+    """Scale of each quantity, (Q,): its least limit, or its magnitude at ends and middles of cells if that is
+    greater.
+    """
     top = np.full(len(rows), 1e-12)
     for k, row in enumerate(rows):
         if row.limits is not None and np.isfinite(row.limits).any():
@@ -50,7 +54,7 @@ def scales(cells: Cells, rows: Sequence[Quantity]) -> Real:
 
 
 def refine(cells: Cells, rows: Sequence[Quantity], scale: Real) -> tuple[Cells, Motion]:
-    """Cells cut further until their bounds ask for few samples each, and these bounds."""
+    """Cells cut until their bounds need few samples each, and these bounds."""
     for _ in range(_ROUNDS):
         bend = bends(cells)
         need = intervals(cells, bend, rows, scale)
@@ -62,7 +66,7 @@ def refine(cells: Cells, rows: Sequence[Quantity], scale: Real) -> tuple[Cells, 
 
 
 def intervals(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> Int:
-    """How many (C,) keep every quantity within GAP of its scale between their ends."""
+    """Number of intervals (C,) in which each quantity rises by at most GAP of its scale between samples."""
     worst = np.zeros(len(cells))
     for row, one in zip(rows, scale, strict=True):
         worst = np.maximum(worst, row.of(bend) / one)
@@ -70,7 +74,7 @@ def intervals(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real)
 
 
 def cell_peaks(cells: Cells, bend: Motion, rows: Sequence[Quantity], scale: Real) -> CellMaxima:
-    """Samples each cell at the ends of its intervals."""
+    """The samples of each cell at the ends of its intervals."""
     need = intervals(cells, bend, rows, scale)
     found, at = np.zeros((len(rows), len(cells))), np.zeros((len(rows), len(cells)))
     for first, last in _spans(need + 1):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Many polynomials at once: values, shifted intervals, and bounds from Bernstein coefficients.
 
-Arrays of coefficients are (C, n + 1): ascending powers, one row a polynomial; real, or complex where only
-magnitudes count. A polynomial lies between the least
-and the greatest of its Bernstein coefficients (Farouki 2012, section 3), so bounds here are certain, to rounding.
+Arrays of coefficients are (C, n + 1): ascending powers, one polynomial in each row; real, or complex where only
+magnitudes count. A polynomial lies between its least and its greatest Bernstein coefficient (Farouki 2012, section 3),
+so the bounds here are certain up to rounding.
 """
 
 from __future__ import annotations

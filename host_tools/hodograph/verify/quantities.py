@@ -25,7 +25,7 @@ Real = NDArray[np.float64]
 class Quantity:
     """One quantity of the motion, its limit (value inf: none), and the limit in each cell, (C,); None: none anywhere.
 
-    `of` takes it from a motion. It is linear, without negative coefficients, so it takes a bound from bounds too.
+    `of` computes it from a motion. It is linear with coefficients >= 0, so it also computes a bound from bounds.
     """
 
     limit: Limit
@@ -34,7 +34,9 @@ class Quantity:
 
 
 def quantities(cells: Cells, limits: Limits, drives: Sequence[Drive]) -> list[Quantity]:
-    """All that can be limited; volts only with the `drives` of all axes. Raises InputError: limited without."""
+    """All quantities that can be limited; volts only with the `drives` of all axes. Raises InputError: volts are
+    limited, and there are no drives.
+    """
     names = limits.names
     if limits.volts is not None and len(drives) != len(names):
         raise InputError(
@@ -92,7 +94,7 @@ def _volts(drive: Drive, axis: int) -> Callable[[Motion], Real]:
 
 
 def _volts_left(drive: Drive, volts: float) -> float:
-    """What motion may take of the volts: friction takes the rest, in whatever direction."""
+    """The volts that motion may use. Friction uses the others, in any direction."""
     return max(min(volts, drive.volts_limit) - (drive.equipment.friction_volts or 0.0), 1e-9)
 
 

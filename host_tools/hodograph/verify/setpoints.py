@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What the drives see: differences of the setpoints that each kernel makes, before they are rounded to counts."""
+"""Differences of the setpoints that each kernel makes, before they are rounded to counts: the motion that drives
+get.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +37,8 @@ class Sampled:
 
 @dataclass(frozen=True)
 class BusNoise:
-    """What rounding a setpoint to counts of q mm can add: 2q / dt^2 and 4q / dt^3 (signs 1 -2 1 and 1 -3 3 -1, each
-    rounding at most q / 2).
+    """The most that rounding setpoints to counts of q mm can add: 2q / dt^2 and 4q / dt^3 (signs 1 -2 1 and 1 -3 3 -1,
+    each rounding at most q / 2).
     """
 
     acceleration_mm_s2: float
@@ -44,7 +46,7 @@ class BusNoise:
 
 
 def bus_noise(counts_per_mm: int, period_us: int) -> BusNoise:
-    """Of setpoints in `counts_per_mm`."""
+    """The errors for setpoints in `counts_per_mm`."""
     q, dt = 1.0 / counts_per_mm, 1e-6 * period_us
     return BusNoise(2.0 * q / dt**2, 4.0 * q / dt**3)
 
@@ -76,7 +78,7 @@ def sampled(program: NativeProgram) -> tuple[Sampled, ...]:
 
 
 def _stretches(program: NativeProgram) -> Iterator[dict[str, Int]]:
-    """Setpoints (n, A) of each kernel in 2^-40 mm, by stretches that overlap: no difference is missing."""
+    """Setpoints (n, A) of each kernel in 2^-40 mm, in stretches that overlap, so that no difference is missing."""
     ticks = program.ticks
     for first in range(0, ticks, _CHUNK):
         begin, end = max(first - _ORDER, 0), min(first + _CHUNK, ticks)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a program does to the limits of its path file: peaks, and every place beyond a limit;
+"""Checks a program against the limits of its path file: peaks, and each place beyond a limit;
 docs/theory/numerics.md 16."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .quantities import Quantity, quantities
 Real = NDArray[np.float64]
 
 TOLERANCE = 1e-3
-"""A limit is kept when nothing is above it by more than this share."""
+"""A limit counts as kept if its quantity exceeds it by at most this share."""
 
 _HAIR = 1e-6
 
@@ -31,7 +31,7 @@ _HAIR = 1e-6
 class Verification:
     """Peaks of all quantities (limited or not), and each stretch of path in which one is above its limit.
 
-    `excesses` holds the worst place of every stretch, greatest usage first, also of those within TOLERANCE.
+    `excesses` holds the worst place of each stretch, greatest usage first, including those within TOLERANCE.
     """
 
     duration_s: float
@@ -75,7 +75,9 @@ def verify_program(program: Program, limits: Limits, drives: Sequence[Drive] = (
 
 
 def _peak(cells: Cells, row: Quantity, found: CellMaxima, k: int) -> Peak:
-    """The peak of a quantity: where it comes nearest to its limit, or is greatest where it has none."""
+    """The peak of a quantity: the place of its greatest limit usage, or of its greatest magnitude if it has no
+    limit.
+    """
     limit = np.ones(len(cells)) if row.limits is None else row.limits
     worst = int((found.found[k] / limit).argmax())
     at_most = float((found.at_most[k] / limit).max() * limit[worst])
@@ -109,8 +111,8 @@ def _beyond(cells: Cells, row: Quantity, found: CellMaxima, k: int) -> Iterator[
 def _step(cells: Cells, limits: Limits) -> Peak:
     """The greatest jump of an axis' acceleration, rest before and after included.
 
-    Nothing is smooth across joints by itself. To a drive a jump is a jerk of jump / period; it may be TOLERANCE of the
-    least limit of a jerk.
+    No rule makes the acceleration continuous at joints. For a drive a jump is a jerk of jump / period; it may be
+    TOLERANCE of the least limit of a jerk.
     """
     every = np.arange(len(cells))
     first, last = (motion_at(cells, every, np.full(every.size, u)) for u in (0.0, 1.0))

@@ -2,9 +2,9 @@
 """A brake to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/numerics.md
 5.6.
 
-With u = t / T the feed is (1 - u)^2 (v (1 + 2 u) + a T u): it begins with the feed v and the acceleration a, and ends
-with neither. Its distance T (v / 2 + a T / 12) gives T. Such a brake takes about a fifth longer than the fastest one,
-since its jerk falls evenly.
+With u = t / T the feed is (1 - u)^2 (v (1 + 2 u) + a T u): it begins with the feed v and the acceleration a, and both
+are 0 at its end. Its distance T (v / 2 + a T / 12) gives T. Such a brake takes about a fifth longer than the fastest
+one, since its jerk falls evenly.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from .track import Ends
 from .window import State
 
 _PIECE_S = 0.05
-"""About how long a piece lasts."""
+"""Approximate duration of a piece."""
 _FEWEST, _MOST = 3, 12
 _LEAST_PERIODS = 3.0
 
 
 def brake_to_rest(state: State, low: float, high: float, period_s: float) -> Ends | None:
-    """The brake from a moving state at arc length `low` to rest at `high`, in pieces of one duration; None: there is
-    none that never turns back, or its pieces would be too brief. It may exceed limits.
+    """The brake from a moving state at arc length `low` to rest at `high`, in pieces of equal duration. None: it would
+    reverse, or its pieces would be too brief. It may exceed limits.
     """
     if state.q <= 0.0:
         return None

@@ -30,7 +30,7 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """One limited quantity of a kind: c1, c2, c3 (m,) are derivatives by x of what moves."""
+    """One limited quantity: c1, c2, c3 (m,) are the derivatives by x of the position that it depends on."""
 
     limit: Limit
     c1: Real
@@ -51,9 +51,7 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class GridKinematics:
-    """Points (m,) on a grid with everything that does not depend on the feed. `zones` (m,): limit of the feed by
-    zones.
-    """
+    """Points (m,) on a grid with all values that do not depend on the feed. `zones` (m,): feed limits of zones."""
 
     interval: Index
     s: Real
@@ -106,7 +104,7 @@ class GridKinematics:
 
     @cached_property
     def most_p(self) -> Real:
-        """Bound (m,) of p from all that limits the feed alone; inf at rest."""
+        """Bound (m,) of p from all limits of the feed and of velocities; inf at rest."""
         s1 = self.sigma[0]
         with np.errstate(divide="ignore"):
             most = (self.zones / s1) ** 2
@@ -159,7 +157,7 @@ def jerk_by_root(limited: Constraint, p: Real, d: Real, dd: Real) -> Real:
 def make_points(
     spline: Curve, limits: PlanLimits, grid: Grid, interval: Index, u: Real, zones: Real
 ) -> GridKinematics:
-    """Points at u in [0, 1] of intervals; at 0 and 1 the limits from inside. `zones` (n,) by interval."""
+    """Points at u in [0, 1] of intervals; at 0 and 1 the one-sided values from inside. `zones` (n,) by interval."""
     s, s1, s2, s3 = grid.sigma(interval, u)
     s = np.where(u == 0.0, grid.s[interval], np.where(u == 1.0, grid.s[interval + 1], s))
     side = np.where(u == 0.0, RIGHT, np.where(u == 1.0, LEFT, 0)).astype(np.int8)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Infeasible limits: which they are, where, and what would do; docs/theory/numerics.md 5.6.
+"""Finds infeasible limits: which ones, where, and the values that would suffice; docs/theory/numerics.md 5.6.
 
-Every path without corners can be run inside any limits, if slowly enough. The bounds of slowness are LEAST_FEED_MM_S
-at every place and the longest time that the format knows. What each limit allows is taken at constant feed; of
-accelerations and jerks along the way, by the fastest motion from rest to rest.
+Each path without corners can be run inside any limits, if slowly enough. A program needs at least LEAST_FEED_MM_S at
+each place, and has a longest time. The feed that a limit allows is computed for constant feed; for acceleration and
+jerk along the path, from the fastest motion from rest to rest.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ _BEYOND = 2.0
 
 @dataclass(frozen=True, eq=False)
 class LimitedFeed:
-    """What one limit alone allows: feed (n,) at points (inf where it does not bind) and the time of the whole.
+    """The feed (n,) that one limit alone allows at points (inf: any), and the time of the whole path with it.
 
-    `given` is the value in its file. With the feed k times as fast everywhere the limit would have to be
-    offset + (given - offset) k^power.
+    `given` is the value in its file. For k times the feed everywhere, the limit would have to be offset + (given -
+    offset) k^power.
     """
 
     limit: Limit
@@ -51,7 +51,7 @@ class LimitedFeed:
         return f"{limit.source}: {limit.words or limit.entry} = {self.given:g}{less}"
 
     def rounded(self, value: float) -> str:
-        """A value of the limit, what is above `offset` rounded up to three digits."""
+        """A value of the limit whose part above `offset` is rounded up to three digits."""
         return f"{self.offset + float(rounded_up(value - self.offset)):.9g}"
 
     def times(self, k: float) -> float:
@@ -65,7 +65,7 @@ class LimitedFeed:
 
 @dataclass(frozen=True, eq=False)
 class _VoltsFeed(LimitedFeed):
-    """Volts: speed |c1| and T |c2| (n,), what is needed for each feed and feed^2 at points."""
+    """Volts: |c1| and T |c2| (n,), the volts per feed and per feed^2 at points."""
 
     plant: Plant
     speed: Real
@@ -77,9 +77,8 @@ class _VoltsFeed(LimitedFeed):
 
 
 def check_feasible(spline: Curve, limits: PlanLimits, longest_s: float) -> None:
-    """Raises PlanError where limits allow less than LEAST_FEED_MM_S, or take longer than `longest_s`, each by itself.
-
-    The message names all such limits, where each is worst, and the least values that would do.
+    """Raises PlanError: a limit by itself allows less than LEAST_FEED_MM_S somewhere, or makes the path take longer
+    than `longest_s`. The message names all such limits, the worst place of each, and the least values that suffice.
     """
     s = _places(spline)[0]
     slow: dict[str, tuple[float, str]] = {}
@@ -103,7 +102,7 @@ def check_feasible(spline: Curve, limits: PlanLimits, longest_s: float) -> None:
 
 
 def too_long(one: LimitedFeed, s_mm: float, time_s: float, longest_s: float, k: float) -> str:
-    """The message for a limit that makes a program last too long; k times as fast is fast enough."""
+    """The message for a limit that makes a program too long; k times its feed would be enough."""
     return (
         f"{one.name}, lowest at arc length {s_mm:.6g} mm, makes the path take {time_s:.4g} s, longer than the "
         f"{longest_s:.7g} s of a program: {one.rounded(one.times(1.02 * k))} would do"
@@ -117,19 +116,19 @@ def rounded_up(value: float) -> str:
 
 
 def binding_most(spline: Curve, limits: PlanLimits) -> tuple[LimitedFeed, float]:
-    """The limit that by itself takes the longest, and the arc length where it allows least."""
+    """The limit with the longest time, and the arc length where it allows the least feed."""
     found = max(allowed(spline, limits), key=lambda one: one.time_s)
     return found, float(_places(spline)[0][int(np.argmin(found.feed))])
 
 
 def least_time_s(spline: Curve, limits: PlanLimits) -> float:
-    """What the path takes at least."""
+    """The least time of the path."""
     return max(one.time_s for one in allowed(spline, limits))
 
 
 def within_reach(spline: Curve, limits: PlanLimits) -> PlanLimits:
-    """The same with the feed bounded where acceleration and jerk along the path cannot bring it: a bound far beyond
-    spoils the numbers of the programs.
+    """The limits with the feed bounded to what acceleration and jerk along the path can reach: a far higher bound would
+    make the quadratic programs ill-conditioned.
     """
     s, _ = _places(spline)
     reach = min(
@@ -140,7 +139,7 @@ def within_reach(spline: Curve, limits: PlanLimits) -> PlanLimits:
 
 
 def allowed(spline: Curve, limits: PlanLimits) -> Iterator[LimitedFeed]:
-    """All limits, one by one, at points of the path."""
+    """The feed that each limit alone allows, at points of the path."""
     s, side = _places(spline)
     yield from _along(s, limits)
     f = frames(spline, s, side)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """q = feed^2 over arc length, a C1 piecewise cubic, graded next to rest; docs/theory/numerics.md 5.6.
 
-On interval i, q(s) = sigma'(x)^2 p(x), s = sigma(x), p a cubic. Inside the path sigma is the identity. Next to
-rest at s = a it is a + x^3 (or its mirror), since q goes like s^(4/3) there: in x, p is smooth and F''' = 6 p^(3/2).
+On interval i, q(s) = sigma'(x)^2 p(x), s = sigma(x), p a cubic. Inside the path sigma is the identity. Next to rest at
+s = a it is a + x^3 (or its mirror), since q is proportional to s^(4/3) there: in x, p is smooth and F''' = 6 p^(3/2).
 The unknowns at a knot are q and dq/ds; at rest, where both vanish, p and dp/dx.
 """
 
@@ -27,7 +27,7 @@ GAUSS_X = GAUSS_X + 0.5
 class Grid:
     """Knots (n + 1,) in arc length; grade (n,): 1 graded from rest at the first knot, -1 to rest at the last, 0 plain.
 
-    x0, h  (n,) where each interval begins in x, and its length there
+    x0, h  (n,) start of each interval in x, and its length in x
     """
 
     s: Real
@@ -64,7 +64,7 @@ class Grid:
 
 
 def make_grid(s: Real, from_rest: bool) -> Grid:
-    """The grid over knots `s`, its end at rest; its start too, or moving."""
+    """The grid over knots `s`, which ends at rest, and begins at rest or in motion."""
     n = s.size - 1
     step = np.diff(s)
     grade = np.zeros(n, dtype=np.int8)

@@ -15,10 +15,10 @@ from .plan_limits import PlanLimits
 Real = NDArray[np.float64]
 
 _SHARE = 0.6
-"""Of acceleration limits, which the jerk does not let a feed use all the time."""
+"""Share of the acceleration limits that the estimate uses, since jerk limits do not allow all of it all the time."""
 
 FEWEST_INTERVALS = 12
-"""Of a plan that takes long enough."""
+"""Least number of intervals of a plan, if its time is enough."""
 
 _SAMPLES = 16
 _END_SAMPLES = 24
@@ -26,8 +26,10 @@ _PER_SEGMENT = 4
 _PER_RAMP = 0.4
 _MANY_SEGMENTS = 256
 _BRIEFEST = 0.25
-"""Of the time that an interval may last, on a path of many segments: where these are passed sooner, an interval holds
-several. Their joints count inside it; with four times as many intervals a program is 0.02 % faster."""
+"""On a path of many segments, an interval contains several segments if they are passed in less than this share of its
+longest time. Limits are also evaluated at the joints inside it. With four times as many intervals a program is 0.02 %
+faster.
+"""
 _LEAST_PERIODS = 1.7
 _FLAT_STRETCH = 8.0
 _PER_FLAT_SEGMENT = 32
@@ -39,9 +41,11 @@ _LEAST_Q = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class FirstEstimate:
-    """q (n,) at arc lengths s (n,), rising; t (n,) when; `step_s` (n,) how long intervals may last.
+    """q (n,) at rising arc lengths s (n,), with times t (n,).
 
-    pull  the acceleration assumed; `fine_s` (n,) how long intervals may last where it changes at once
+    step_s  (n,) longest duration of intervals
+    pull    the assumed acceleration
+    fine_s  (n,) longest duration of intervals where it changes suddenly
     """
 
     s: Real
@@ -52,12 +56,12 @@ class FirstEstimate:
     pull: float
 
     def squared_feed(self, s: Real) -> Real:
-        """q between."""
+        """q at arc lengths between."""
         return np.asarray(np.interp(s, self.s, self.q))
 
 
 def steady_limit(spline: Curve, limits: PlanLimits, s: Real) -> Real:
-    """The greatest q at which a constant feed keeps every limit."""
+    """The greatest q at which a constant feed keeps each limit."""
     q = _steady_limit(spline, limits, s, LEFT)
     joint = np.flatnonzero(np.isin(s, spline.segment_starts_mm))
     q[joint] = np.minimum(q[joint], _steady_limit(spline, limits, s[joint], RIGHT))
@@ -97,7 +101,7 @@ def first_estimate(
     q_start: float | None,
     period_s: float,
 ) -> FirstEstimate:
-    """From `low`, at rest (q_start None) or moving, to rest at `high`."""
+    """The estimate from `low`, at rest (q_start None) or moving, to rest at `high`."""
     s = _samples(spline, limits, low, high)
     most = steady_limit(spline, limits, s)
     jerk = limits.least_jerk
@@ -150,7 +154,7 @@ def _samples(spline: Curve, limits: PlanLimits, low: float, high: float) -> Real
 
 
 def zone_ends(limits: PlanLimits, low: float, high: float) -> Real:
-    """Where feed zones begin and end, between two arc lengths."""
+    """Starts and ends of feed zones between two arc lengths."""
     ends = np.array([end for zone in limits.zones for end in (zone.from_mm, zone.to_mm)])
     return np.asarray(ends[(ends > low) & (ends < high)])
 
@@ -158,8 +162,8 @@ def zone_ends(limits: PlanLimits, low: float, high: float) -> Real:
 def _steps(
     spline: Curve, s: Real, q: Real, t: Real, pull: float, jerk: float, period_s: float
 ) -> tuple[Real, Real]:
-    """How long an interval may last: a share of the time that full acceleration takes to build up where the
-    acceleration changes at once, more with the distance from there; and how long it may where it does.
+    """Longest duration of intervals, which grows with the distance from sudden changes of the acceleration; and the
+    longest duration at such changes, a share of the time in which full acceleration builds up.
     """
     ramp = pull / _SHARE / jerk
     fine = _PER_RAMP * min(ramp, t[-1] / 6.0)
@@ -181,8 +185,8 @@ def _steps(
 
 
 def refined(estimate: FirstEstimate, s: Real, t: Real, acceleration: Real) -> FirstEstimate:
-    """An estimate with shorter steps beside intervals of a plan in which the acceleration changed much: at arc lengths
-    s (n,), passed at t (n,), were accelerations (n,).
+    """The estimate with shorter steps near intervals of a plan in which the acceleration changed much; accelerations
+    (n,) at arc lengths s (n,), passed at t (n,).
     """
     changed = np.abs(np.diff(acceleration)) > _SUDDEN * estimate.pull
     marked = np.append(changed, False) | np.append(False, changed)
@@ -193,7 +197,7 @@ def refined(estimate: FirstEstimate, s: Real, t: Real, acceleration: Real) -> Fi
 
 
 def _distance(t: Real, places: Real) -> Real:
-    """To the nearest of places, rising."""
+    """Distances to the nearest of rising places."""
     after = places[np.clip(np.searchsorted(places, t), 0, places.size - 1)]
     before = places[np.clip(np.searchsorted(places, t, side="right") - 1, 0, places.size - 1)]
     return np.asarray(np.minimum(np.abs(after - t), np.abs(t - before)))
@@ -208,9 +212,8 @@ def choose_knots(
     period_s: float,
     fewest: int = FEWEST_INTERVALS,
 ) -> Real:
-    """Knots in arc length: at joints and ends of zones where these are far enough apart in time, evenly between.
-
-    `fewest`: intervals at least, where the time is enough for them.
+    """Knots in arc length: at joints and ends of zones that are far enough apart in time, and evenly between them.
+    `fewest`: least number of intervals, if the time is enough.
     """
     low, high = float(s[0]), float(s[-1])
     density = 1.0 / step_s
@@ -242,7 +245,7 @@ def choose_knots(
 
 
 def _short_enough(knots: Real) -> Real:
-    """Intervals longer than a piece may be are cut evenly."""
+    """Cuts intervals that are longer than a piece may be into equal parts."""
     parts = np.ceil(np.diff(knots) / LONGEST_PIECE_MM).astype(np.int64)
     if parts.max() == 1:
         return knots

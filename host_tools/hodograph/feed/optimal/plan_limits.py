@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""All limits of a feed along a path as one object, reserves taken off; docs/theory/numerics.md 5.6. Made from path
-file, machine and drives by `gather`; read by the planner.
+"""All limits of a feed along a path as one object, with reserves subtracted; docs/theory/numerics.md 5.6. `gather`
+makes it from path file, machine and drives; the planner reads it.
 """
 
 from __future__ import annotations
@@ -26,26 +26,27 @@ PerAxis = tuple[Limit, ...]
 """Limits of the axes that follow the path; value inf: none."""
 
 _MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
-"""Greatest feed over the reserve of an acceleration, of a jerk: 2^-16 / s and 2^-8 / s^2 are the least override rate
-and override acceleration of the format, and a factor above 1 and the other one take half of the headroom each;
-docs/theory/numerics.md section 7."""
+"""Greatest feed over the reserve of an acceleration, and of a jerk. They follow from the least override rate and
+override acceleration of the format, 2^-16 / s and 2^-8 / s^2; a factor above 1 and the other bound use half of the
+headroom each. docs/theory/numerics.md section 7.
+"""
 
 _PERIODS_TO_FULL_ACCELERATION = 8
-"""Without any limit of the jerk the acceleration still builds up within so many periods."""
+"""Periods in which the acceleration builds up if no jerk is limited."""
 
 _PERIODS_TO_FULL_FEED = 16
 
 
 @dataclass(frozen=True, eq=False)
 class PlanLimits:
-    """The limits of a plan, each the least of its kind, reserves taken off; value inf: none.
+    """The limits of a plan, each the least of its kind, with reserves subtracted; value inf: none.
 
-    feed, acceleration, jerk, centripetal  along the path. That of the feed may come from an acceleration or a jerk,
-                whose reserve it leaves for a feed hold
+    feed, acceleration, jerk, centripetal  along the path. That of the feed may follow from the reserve that a feed hold
+                                           needs of an acceleration or a jerk
     velocity, axis_acceleration, axis_jerk, volts  of the axes; volts None: not limited
-    plants      of the axes, with the volts that may be used
-    zones       feed zones
-    reserve_zones  where accelerations and jerks leave more free
+    plants         of the axes, with the volts that may be used
+    zones          feed zones
+    reserve_zones  places where more of accelerations and jerks stays free
     """
 
     feed: Limit
@@ -79,7 +80,7 @@ class PlanLimits:
         return min(least((self.feed, *self.velocity)).value, *volts, inf)
 
     def eased(self, least_s: float) -> PlanLimits:
-        """The same with jerks that let all acceleration build up within `least_s` at the soonest."""
+        """The limits with jerks lowered so that full acceleration takes at least `least_s` to build up."""
         most = self.least_acceleration / least_s
         path, *axes = (
             replace(one, value=min(one.value, most)) for one in (self.jerk, *self.axis_jerk)
@@ -87,7 +88,7 @@ class PlanLimits:
         return replace(self, jerk=path, axis_jerk=tuple(axes))
 
     def with_feed(self, most_mm_s: float) -> PlanLimits:
-        """The same with the feed at most `most_mm_s`."""
+        """The limits with the feed at most `most_mm_s`."""
         return replace(self, feed=replace(self.feed, value=min(self.feed.value, most_mm_s)))
 
 
@@ -100,8 +101,7 @@ def gather(
 ) -> PlanLimits:
     """The limits of a request: those of the path file, of the controller less its reserve, of the format.
 
-    Always with a finite jerk: where none is given, one that lets full acceleration, or full feed, build up
-    within a few periods.
+    The jerk is always finite: if none is given, full acceleration, or full feed, builds up within a few periods.
     """
     period_s = 1e-6 * period_us
     longest = Limit(
@@ -127,7 +127,7 @@ def gather(
 
 
 def _with_jerk(limits: PlanLimits, period_s: float) -> PlanLimits:
-    """With a limit of the jerk, where none is given."""
+    """The limits with a limit of the jerk; if none is given, one of few periods."""
     peak = limits.least_acceleration
     if peak < inf:
         jerk = peak / (_PERIODS_TO_FULL_ACCELERATION * period_s)
@@ -140,7 +140,7 @@ def _with_jerk(limits: PlanLimits, period_s: float) -> PlanLimits:
 
 
 def _weaker(plants: Plants, reserve: float) -> Plants:
-    """Plants that may use a part only of what friction leaves of their volts."""
+    """The plants with a share of the volts that remain after friction."""
     return tuple(
         replace(one, volts=one.friction_volts + (1.0 - reserve) * (one.volts - one.friction_volts))
         for one in plants
@@ -148,7 +148,7 @@ def _weaker(plants: Plants, reserve: float) -> Plants:
 
 
 def _volts(limits: Limits, weaker: Plants) -> PerAxis:
-    """Limits of the volts beside friction."""
+    """Limits of the volts without friction."""
     return tuple(
         replace(limit, value=_usable_volts(plant))
         for limit, plant in zip(limits.volts_limits(weaker), weaker, strict=True)
@@ -168,7 +168,7 @@ def _given(limits: Limits, controller: ControllerLimits | None, key: str) -> Ite
 
 
 def _held(limits: Limits, controller: ControllerLimits | None) -> Iterator[Limit]:
-    """Feeds up to which the reserve of a limit leaves a feed hold the least override rates that the format has."""
+    """Feeds up to which the reserve of a limit suffices for a feed hold with the least override rates of the format."""
     for key, by in (
         ("acceleration_mm_s2", _MOST_BY_ACCELERATION),
         ("jerk_mm_s3", _MOST_BY_JERK),

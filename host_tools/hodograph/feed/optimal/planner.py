@@ -22,7 +22,7 @@ from .sequence import NothingFoundError, plan_windows
 from .track import Ends, Track, find_peaks, joined, make_track, track_of
 
 _ABOVE = 3e-4
-"""A plan may be above a limit by this share; what is more is taken out by running it slower."""
+"""A plan may exceed a limit by this share; to remove a greater excess, it runs slower."""
 
 _ZONE_SHARE, _BESIDE_MM = 0.998, 2.0**-12
 
@@ -31,7 +31,7 @@ _POOR = 1.02
 _MANY_PERIODS = 100.0
 
 _POWER = {"acceleration_mm_s2": 2, "centripetal_mm_s2": 2, "jerk_mm_s3": 3}
-"""Of the feed that limited quantities go with; 1 where it is not here."""
+"""Power of the feed to which a limited quantity is proportional; 1 for other keys."""
 
 
 def plan_optimal(
@@ -45,9 +45,8 @@ def plan_optimal(
 ) -> FeedPlan:
     """The fastest feed along `spline` from rest to rest.
 
-    plants  of the axes, where `limits.volts` is given
-    Raises InputError (length, period) and PlanError: limits that no useful feed keeps (which, where, and what
-    would do).
+    plants  of the axes, where `limits.volts` is given Raises InputError (length, period) and PlanError: no useful feed
+    keeps the limits. The message names the limits, the places, and values that would suffice.
     """
     check_period(period_us)
     check_length(spline.length_mm)
@@ -76,7 +75,7 @@ def plan_optimal(
 def replan_optimal(plan: FeedPlan, zones: Sequence[FeedZone], reason: str) -> FeedPlan:
     """A plan of `plan_optimal` made again with further feed zones; `reason` goes to the notes.
 
-    A zone counts for whole pieces: each is widened to those that it touches, and its feed lowered by 0.2 %.
+    A zone applies to whole pieces: it is widened to those that it meets, and its feed is lowered by 0.2 %.
     """
     assert isinstance(plan.curve, Track)
     (path,) = plan.paths
@@ -105,7 +104,7 @@ def plan_peaks(
     controller: ControllerLimits | None,
     plants: Plants | None,
 ) -> dict[str, Peak]:
-    """Where every limited quantity of a plan, of any profile, comes nearest to its limit, by name."""
+    """The peaks of all limited quantities of a plan of any profile, by name."""
     found = gather(plan.request, limits.of_axes(spline.axes), controller, plants, plan.period_us)
     return find_peaks(spline, found, track_of(plan.raw, spline.length_mm))
 
@@ -113,14 +112,14 @@ def plan_peaks(
 def _run(spline: Curve, limits: PlanLimits, period_s: float) -> Track:
     """The curve of the plan.
 
-    Where limits are so far apart that no feed is found, or a poor one, with jerks that let the acceleration build up
-    within a small share of the time that three segments take on average.
+    If limits are so far apart that no feed is found, or a poor one, jerks are lowered: the acceleration then takes a
+    small share of the mean time of three segments to build up.
     """
     near = within_reach(spline, limits)
     tries = [near]
     if near.least_acceleration < inf:
         time_s = 3.0 * least_time_s(spline, limits) / spline.segment_count
-        # Where that costs little it comes first: limits far apart also take long to fail.
+        # If that costs little, it is tried first: with limits far apart the attempt also takes long to fail.
         slow = _EASED[1] * time_s > _MANY_PERIODS * period_s
         eased = [near.eased(max(period_s, share * time_s)) for share in _EASED]
         tries = eased[1:] if slow else [near, *eased]
@@ -146,7 +145,9 @@ def _track(spline: Curve, limits: PlanLimits, ends: Ends) -> Track:
 
 
 def _too_long(spline: Curve, limits: PlanLimits, duration_s: float) -> str:
-    """Several limits together make the path take too long: raised alike, all let it be so much faster exactly."""
+    """The message if several limits together make the path take too long. Raising all of them accordingly makes it
+    faster by the factor.
+    """
     one, s_mm = binding_most(spline, limits)
     k = 1.05 * duration_s / LONGEST_S
     return (
@@ -157,7 +158,9 @@ def _too_long(spline: Curve, limits: PlanLimits, duration_s: float) -> str:
 
 
 def _needed_stretch(peaks: dict[str, Peak]) -> float:
-    """By how much to slow down so that no limit is exceeded by more than is allowed."""
+    """The factor of time by which the plan has to be slower, so that no limit is exceeded by more than the
+    tolerance.
+    """
     stretch = 1.0
     for peak in peaks.values():
         power = _POWER.get(peak.limit.key, 1)

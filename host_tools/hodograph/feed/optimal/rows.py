@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Limits as linear inequalities about a feed near the last one; docs/theory/numerics.md 5.6.
 
-A jerk is sqrt(p) times a linear function of the unknowns: |linear| <= limit / sqrt(p). The right side is
-convex in p, so its tangent at the last p is below it: what keeps the tangent keeps the limit.
+A jerk is sqrt(p) times a linear function of the unknowns: |linear| <= limit / sqrt(p). The right side is convex in p,
+so its tangent at the last p is below it: a feed that keeps the tangent keeps the limit.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 JERK_ROW = 1.5
-"""The right side of a row of a jerk: its greatest share, and half."""
+"""Factors of p between which the tangent of a jerk's right side holds its greatest share, and half of it."""
 
 _NEAR = 0.7
 _LEAST_P = 0.05
@@ -40,7 +40,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class About:
-    """The last feed at the points: p, and its derivatives where they are known (not from a first estimate)."""
+    """The last feed at the points: p, and its derivatives (None: it is a first estimate)."""
 
     p: Real
     derivatives: tuple[Real, Real] | None = None
@@ -48,12 +48,12 @@ class About:
 
 @dataclass(eq=False)
 class Selection:
-    """Which points make rows: those of `basic` near their limit, others once they were above it; for good.
+    """Selects the points that make rows, so that most limits at most points never become rows. Points of `basic` near
+    their limit make rows, other points once they exceeded it; they stay.
 
-    With `everything` all points make rows: safe, and slow.
-    A first estimate, of which nothing is known, has rows at all points of `estimated`.
-    So most limits at most points never become rows.
-    tight  (m,) what limits are divided by at each point; None: 1
+    everything  all points make rows: safe and slow
+    estimated   the points that make rows for a first estimate
+    tight       (m,) factors by which limits are divided at each point; None: 1
     """
 
     basic: Mask
@@ -65,7 +65,7 @@ class Selection:
     low: Mask | None = None
 
     def choose(self, name: str, used: Real | None, among: Mask | None = None) -> Index:
-        """Points for the rows of a quantity, of which the last feed used these shares."""
+        """Points for the rows of a quantity, from its limit usage by the last feed."""
         basic = self.estimated if used is None else self.basic
         wanted = basic if among is None else basic & among
         if used is not None and self.tight is not None:
@@ -81,7 +81,7 @@ class Selection:
         return np.flatnonzero(active)
 
     def choose_low(self, p: Real) -> Index:
-        """Points where p fell much since the last time."""
+        """Points where p decreased much since the last call."""
         if self.last is not None:
             self.low = (p < _FALLEN * self.last) | (self.low if self.low is not None else False)
         self.last = p
@@ -89,7 +89,7 @@ class Selection:
 
 
 def make_rows(points: GridKinematics, about: About, select: Selection, once: Mask) -> Rows:
-    """All rows about a feed. `once` (m,): points where accelerations count, not twice at knots."""
+    """All rows about a feed. `once` (m,): points for rows of accelerations, so that knots do not count twice."""
     flat: list[Rows] = []
     for limited in points.jerks:
         flat += _jerk_rows(points, limited, about, select)
@@ -144,7 +144,7 @@ def _acceleration(points: GridKinematics, limited: Constraint, at: Index) -> Rea
 def _volts_rows(
     points: GridKinematics, limited: Constraint, about: About, select: Selection, once: Mask
 ) -> Rows:
-    """c1 sqrt(p) + lag (acceleration): sqrt by its tangent, which is above it."""
+    """Rows of c1 sqrt(p) + lag (acceleration), with the tangent of sqrt, which is above it."""
     used = None
     if about.derivatives is not None:
         pull = limited.lag_s * acceleration(limited, about.p, about.derivatives[0])
@@ -159,7 +159,7 @@ def _volts_rows(
 
 
 def _speed_rows(points: GridKinematics, about: About, select: Selection) -> list[Rows]:
-    """Bounds of p where it comes near them, and p above 0 where it does not stay so by itself."""
+    """Rows of the bounds of p where it comes near them, and of p > 0 where p might become negative."""
     high = select.choose("feed", about.p / points.most_p)
     one = np.ones(high.size)
     rows = [

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The sequence of planning windows over a whole path; docs/theory/numerics.md 5.6.
 
-Windows make time and memory proportional to length. Every window is planned to rest at its own end, so there always
-is a motion to rest inside all limits. Of each window only the first part is kept, before the stop at its end affects
-it; the next window begins there with the same F, F', F''. A window is planned again where its pieces, not only the
-feed that they stand for, exceed a limit: next to rest and at sudden changes a polynomial of degree 7 differs from the
-feed over arc length that it is made from.
+With windows, time and memory are proportional to length. Each window is planned to rest at its own end, so a motion to
+rest inside all limits always exists. Only the first part of a window is kept, which the stop at the end does not
+affect; the next window begins there with the same F, F', F''. A window is planned again if its pieces exceed a limit:
+next to rest and at sudden changes a polynomial of degree 7 differs from the feed over arc length that it replaces.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from .window import Solution, State, plan_window, tightened
 Real = NDArray[np.float64]
 
 INTERVALS = 960
-"""About so many intervals a window."""
+"""Approximate number of intervals of a window."""
 
 _STOPS = 4.0
-"""The rejected end of a window, in times that stopping takes."""
+"""The part of a window that is not kept, as a multiple of the stopping time."""
 
 _RETREATS = 4
 
@@ -37,11 +36,11 @@ _RETREATS = 4
 _EXCEEDED = 1.003
 _MOST_TIGHTENED = 3
 _INHERITED = 2
-"""Intervals that what a window begins with binds: their limits stay."""
+"""Intervals whose limits stay, since the state at the start of a window determines them."""
 
 
 class NothingFoundError(PlanError):
-    """The programs of a window that begins at rest have no solution, or none that the solver finds."""
+    """The solver finds no feed for a window that begins at rest."""
 
 
 def plan_windows(
@@ -86,7 +85,7 @@ def _continued(
     intervals: int,
     period_s: float,
 ) -> Solution | None:
-    """The window that goes on from knot `count` of the one before."""
+    """The window that continues from knot `count` of the one before."""
     low = float(held.grid.s[count])
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
@@ -96,20 +95,22 @@ def _continued(
 
 
 def kept(found: Solution, stop_s: float) -> int:
-    """How many intervals are far enough from the stop at the end."""
+    """Number of intervals that are far enough from the stop at the end."""
     left = found.duration_s - np.cumsum(found.times)
     count = int(np.count_nonzero(left > _STOPS * stop_s))
     return max(count, found.grid.size // 3)
 
 
 def trusted_to(found: Solution, stop_s: float) -> float:
-    """Arc length up to which the stop at the end affects a window so little that the next one begins with it."""
+    """Arc length up to which the stop at the end affects a window so little that the next one uses its feed as
+    estimate.
+    """
     left = found.duration_s - np.concatenate((np.zeros(1), np.cumsum(found.times)))
     return float(found.grid.s[int(np.count_nonzero(left > 2.0 * stop_s))])
 
 
 class _Overview:
-    """Roughly how long intervals are along the path, and how long stopping takes."""
+    """Estimates of the length of intervals along the path, and of the stopping time."""
 
     def __init__(self, s: Real, count: Real, stop_s: float) -> None:
         self.s, self.count, self.stop_s = s, count, stop_s
@@ -132,14 +133,14 @@ def _overview(spline: Curve, limits: PlanLimits, period_s: float) -> _Overview:
 
 
 def stopping_s(limits: PlanLimits, feed_mm_s: float) -> float:
-    """Roughly how long stopping takes from a feed."""
+    """Estimate of the stopping time from a feed."""
     jerk = limits.least_jerk
     pull = min(0.7 * limits.least_acceleration, math.sqrt(jerk * feed_mm_s))
     return feed_mm_s / pull + pull / jerk
 
 
 def measured(spline: Curve, found: Solution) -> Solution:
-    """A window, with tighter limits on intervals whose piece is above one by more than 0.3 %."""
+    """The window with tighter limits on intervals whose piece exceeds one by more than 0.3 %."""
     best, trial = found, found
     usage = _usage(spline, found)
     least, tight = usage.max(), np.ones(usage.size)

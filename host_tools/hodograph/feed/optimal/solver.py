@@ -37,10 +37,10 @@ class Problem:
 def solve(
     problem: Problem, penalty: float | None = None, tolerance: float = TOLERANCE
 ) -> Real | None:
-    """The unknowns, or None where there is no solution, or none is found.
+    """The unknowns; None: there is no solution, or none is found.
 
-    penalty  rows may be exceeded, each interval's by a share of its own that costs this much (in units of the
-    objective)
+    penalty  cost (in units of the objective) of a share by which all rows of an interval may be exceeded; each interval
+             has its own share
     """
     scale = problem.scale
     gradient = problem.gradient * scale

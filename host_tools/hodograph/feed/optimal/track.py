@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _DRIFT_Q40 = 1024
-"""Joints of a program are within so many 2^-40 mm (1e-9 mm) of those of its path."""
+"""Greatest distance of a program's joints from those of its path, in 2^-40 mm (1e-9 mm)."""
 
 _US = np.linspace(0.0, 1.0, 33)
 _FEW_US = np.sort(np.append(np.linspace(0.0, 1.0, 17), (1.0 / 32.0, 31.0 / 32.0)))
@@ -78,7 +78,7 @@ def ends_of(found: Solution, count: int) -> Ends:
 
 
 def joined(parts: Sequence[Ends]) -> Ends:
-    """Windows one after the other, each beginning where the last ends."""
+    """The states of consecutive windows, joined."""
     last = parts[-1]
     return Ends(
         np.concatenate([*(p.s[:-1] for p in parts), last.s[-1:]]),
@@ -99,7 +99,7 @@ class Track:
     t_q32, s   knots (n + 1,) in time, 2^-32 s, and in arc length, mm
     shape      (n, 8): powers of u over each piece, mm, from the piece's start
     joints_mm  arc lengths of the path's joints, from 0 to its length
-    stretch    what the plan was slowed by in the end, 1.0003 being 0.03 %
+    stretch    factor of time by which the plan was slowed at the end; 1.0003 is 0.03 %
     """
 
     t_q32: Int
@@ -158,7 +158,7 @@ class Track:
         return RawPieces(np.diff(self.t_q32), starts[:-1], c, 0.0, 0.0)
 
     def value(self, order: int, t_s: ArrayLike) -> Real:
-        """F or a derivative of it at times, held within the motion; where F''' jumps, from after the jump."""
+        """F or a derivative of it at times, clipped to the motion; where F''' jumps, the value after the jump."""
         t = np.clip(np.asarray(t_s, dtype=np.float64), 0.0, self.time_s)
         knots = self.t_q32 * 2.0**-32
         piece = np.clip(np.searchsorted(knots, t, side="right") - 1, 0, self.shape.shape[0] - 1)
@@ -170,8 +170,8 @@ class Track:
 def powers(shape: Real, order: int, u: Real) -> Real:
     """A derivative by u of the polynomials (…, 8) at u (…,).
 
-    scipy's PPoly takes 0.4 to 0.9 of the time, but u = 1 from the next piece; its import takes over 100 times what a
-    plan would save.
+    Own code: scipy's PPoly takes 0.4 to 0.9 of the time, but evaluates u = 1 in the next piece, and its import takes
+    over 100 times what a plan would save.
     """
     out = np.zeros(np.broadcast_shapes(shape.shape[:-1], u.shape))
     for k in range(7, order - 1, -1):
@@ -190,16 +190,16 @@ def track_of(raw: RawPieces, length_mm: float) -> Track:
 
 
 def make_track(ends: Ends, stretch: float, joints: Real) -> Track:
-    """Pieces of the plan run slower by the factor `stretch` >= 1: what it uses of all limits falls with it.
+    """Pieces of the plan with all times multiplied by `stretch` >= 1, which lowers the usage of all limits.
 
-    joints  arc lengths of the path's joints; knots there stay exactly, since limited quantities jump
+    joints  arc lengths of the path's joints; knots there stay exact, since limited quantities jump
     """
     t = np.concatenate((np.zeros(1), np.cumsum(ends.times.astype(np.longdouble) * stretch)))
     t_q32 = np.rint(t * 2.0**32).astype(np.int64)
     late = (t_q32 * np.longdouble(2.0**-32) - t).astype(np.float64)
     h = np.diff(t_q32) * 2.0**-32
     j0, j1 = (j / stretch**3 for j in ends.jerk)
-    # The states at the rounded times: a length that is off by feed * 2^-33 s would cost brief pieces much jerk.
+    # The states at the rounded times: an error of the length of feed * 2^-33 s would cost brief pieces much jerk.
     late[np.isin(ends.s, joints)] = 0.0
     feed, acceleration = ends.feed / stretch, ends.acceleration / stretch**2
     s = ends.s + feed * late
@@ -226,8 +226,8 @@ def _hermite(distance: Real, h: Real, feed: Real, acceleration: Real, j0: Real, 
 
 
 def find_peaks(spline: Curve, limits: PlanLimits, track: Track) -> dict[str, Peak]:
-    """The peak of every limited quantity by its dotted name: where it comes nearest to its limit, from 33 places of
-    each piece, its ends from inside. Volts are those beside friction.
+    """The peak of each limited quantity by its dotted name, from 33 places of each piece with one-sided values at its
+    ends. Volts are without friction.
     """
     out: dict[str, Peak] = {}
     for first in range(0, track.shape.shape[0], _CHUNK):
@@ -255,7 +255,7 @@ def piece_usage(spline: Curve, limits: PlanLimits, track: Track) -> Real:
 
 @dataclass(frozen=True, eq=False)
 class _Limited:
-    """Magnitudes (k,) of a quantity at arc lengths (k,), and its limit there: one, or (k,)."""
+    """Magnitudes (k,) of a quantity at arc lengths (k,), and its limit there: one value, or (k,)."""
 
     limit: Limit
     value: Real

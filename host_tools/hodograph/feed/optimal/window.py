@@ -26,7 +26,7 @@ US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 GRADED_US = (0.03125, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 0.96875)
 BASIC_US = (0.0, 0.5, 1.0)
 ALLOWED = 5e-4
-"""By how much a plan may exceed a limit, as a share of it."""
+"""Greatest excess of a plan over a limit, as a share of it."""
 
 _MOST_ROUNDS = 9
 _HURRIED_GAIN = 0.1
@@ -41,10 +41,10 @@ _TRUSTED = 2
 _TOLERABLE = 5e-3
 _LEAST_ESTIMATED = 1e-3
 _BRIEF = 2.01
-"""Periods that two neighbouring intervals last at least, a little more than a program asks for."""
+"""Least duration of two consecutive intervals in periods, a little more than a program needs."""
 _MOST_JOINED, _LEAST_KNOTS = 4, 4
 _PENALTY = 30.0
-"""What it costs to be above limits by their own size on one interval, in times that the window takes."""
+"""Cost of an excess of 100 % on one interval, in times of the window."""
 
 Feed = Callable[[Real], Real]
 """q at arc lengths."""
@@ -52,13 +52,13 @@ Feed = Callable[[Real], Real]
 
 @dataclass(frozen=True)
 class Effort:
-    """How far a plan is improved.
+    """The effort for a plan.
 
     gain       share of the time that a further round has to gain
-    patience   rounds before all points have rows, which takes some ten times as long
-    tolerance  of the quadratic programs. A solution ends short of its limits by about as much.
-    spacing    how much longer intervals are than in a plan that is made once
-    fewest     intervals at least, where the time is enough for them
+    patience   rounds before all points have rows, which takes about ten times as long
+    tolerance  of the quadratic programs; a solution stays below its limits by about as much
+    spacing    length of intervals, as a multiple of that in a plan of highest effort
+    fewest     least number of intervals, if the time is enough
     """
 
     gain: float = 1e-4
@@ -81,7 +81,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A feed over a grid; excess: greatest share by which it is above a limit; rounds: quadratic programs solved."""
+    """A feed over a grid.
+
+    excess  greatest share by which it exceeds a limit
+    rounds  number of quadratic programs that were solved"""
 
     grid: Grid
     q: Real
@@ -103,8 +106,8 @@ class Solution:
         )
 
     def estimate(self, s: Real) -> Real:
-        """The same for further programs to begin with: where q falls below 0 between two knots, which an early round
-        may leave, it is a share of that at the knots. Programs about a q near 0 take tens of rounds to leave it.
+        """q as estimate for further programs. An early round may leave q below 0 between two knots; there the estimate
+        is a share of q at the knots, since programs about a q near 0 take tens of rounds to leave it.
         """
         interval = np.clip(np.searchsorted(self.grid.s, s, side="right") - 1, 0, self.grid.size - 1)
         beside = np.minimum(self.q[interval], self.q[interval + 1])
@@ -113,7 +116,7 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class _Setting:
-    """What stays through the rounds on one grid."""
+    """The data of one grid that stay the same in all rounds."""
 
     limits: PlanLimits
     grid: Grid
@@ -127,7 +130,7 @@ class _Setting:
         Index, Real, Real
     ]  # interval, arc length and basis of p at the points of quadrature
     effort: Effort
-    tight: Real | None = None  # (n,): what the limits of each interval are divided by,
+    tight: Real | None = None  # (n,): factors by which the limits of each interval are divided,
     reserved: Real | None = None  # (n,): and for reserve zones alone
 
 
@@ -145,14 +148,14 @@ def plan_window(
     before_s: float | None = None,
     effort: Effort = _WHOLE,
 ) -> Solution | None:
-    """From `low` to rest at `high`; None where the quadratic programs have no solution (a moving start only).
+    """The fastest feed from `low` to rest at `high`; None: the quadratic programs have no solution (only if the start
+    is moving).
 
-    known     an earlier solution that is good up to arc length known_to
-    hurried   the first feed inside the limits that is found, on the knots of the first estimate: some parts of a
-              hundred slower
-    effort    how far the feed is improved
-    before_s  how long the interval before `low` lasts, where intervals follow at the end too; None: the window is a
-              whole program
+    known     an earlier solution that serves as estimate up to arc length known_to
+    hurried   take the first feed inside the limits, on the knots of the first estimate; it is a few per cent slower
+    effort    for the improvement of the feed
+    before_s  duration of the interval before `low`, if intervals also follow after the end; None: the window is a whole
+              program
     """
     guess = first_estimate(spline, limits, low, high, None if start is None else start.q, period_s)
     guess = replace(
@@ -183,7 +186,9 @@ def plan_window(
 def _without_brief(
     spline: Curve, found: Solution, before_s: float | None, period_s: float, gain: float
 ) -> Solution:
-    """A solution whose brief intervals are joined to a neighbour: no knots were found at which all last long enough."""
+    """A solution whose brief intervals are joined to the next or the last one, since no knots were found at which all
+    last long enough.
+    """
     for _ in range(_MOST_JOINED):
         keep = _long_enough(found.times, before_s, _BRIEF * period_s)
         if keep.all():
@@ -198,7 +203,7 @@ def _without_brief(
 
 
 def _long_enough(times: Real, before_s: float | None, least_s: float) -> NDArray[np.bool_]:
-    """Knots (n + 1,) that stay: one between two intervals that last less together goes, the last one of two in turn."""
+    """Which knots (n + 1,) stay: a knot between two intervals that are too brief together is removed."""
     pairs = times[1:] + times[:-1]
     if not pairs.size:
         return np.ones(times.size + 1, dtype=np.bool_)
@@ -214,7 +219,7 @@ def _long_enough(times: Real, before_s: float | None, least_s: float) -> NDArray
 
 
 def tightened(found: Solution, tight: Real) -> Solution | None:
-    """The same window, on the same knots, with the limits of each interval divided by `tight` (n,)."""
+    """The window on the same knots with the limits of each interval divided by `tight` (n,); None: no solution."""
     reserved = found.setting.reserved
     if reserved is not None:
         tight = tight * reserved
@@ -223,14 +228,14 @@ def tightened(found: Solution, tight: Real) -> Solution | None:
 
 
 def _same_knots(knots: Real, known: Solution, known_to: float) -> Real:
-    """Knots that are the known solution's as long as it is good: then it is one of this grid too."""
+    """The knots, equal to those of the known solution up to `known_to`, so that it is a solution on this grid too."""
     same = known.grid.s[(known.grid.s >= knots[0]) & (known.grid.s <= known_to)]
     gap = 0.6 * (same[-1] - same[-2]) if same.size > 1 else 0.0
     return np.concatenate((same, knots[knots > same[-1] + gap])) if same.size > 1 else knots
 
 
 def _blend(known: Solution, known_to: float, guess: FirstEstimate) -> Feed:
-    """A known feed up to a place, the first estimate after it."""
+    """The known feed up to a place, and the first estimate after it."""
 
     def feed(s: Real) -> Real:
         old = known.squared_feed(np.minimum(s, known_to))
@@ -240,7 +245,7 @@ def _blend(known: Solution, known_to: float, guess: FirstEstimate) -> Feed:
 
 
 def _even(guess: FirstEstimate, known_to: float, period_s: float, found: Solution) -> bool:
-    """Whether intervals last about as long as was wanted, after knots that are given: else knots have to move."""
+    """Whether intervals after the given knots last about as long as intended; otherwise knots have to move."""
     steps, s = _refined(guess, found), found.grid.s
     wanted = np.interp(0.5 * (s[1:] + s[:-1]), steps.s, steps.step_s)
     wanted[s[1:] <= known_to] = np.inf
@@ -250,7 +255,7 @@ def _even(guess: FirstEstimate, known_to: float, period_s: float, found: Solutio
 
 
 def _refined(guess: FirstEstimate, found: Solution) -> FirstEstimate:
-    """The target steps, now that it is known where the acceleration changes."""
+    """The intended durations of intervals, from the changes of the acceleration in a solution."""
     acceleration = 0.5 * found.slope
     acceleration[-1] = 0.0
     if found.grid.grade[0] > 0:
@@ -341,7 +346,7 @@ def _inside(grid: Grid, joints: Real) -> tuple[Index, Real]:
 
 
 def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
-    """The limit of the feed (n,) by zones that touch each interval."""
+    """The limit of the feed (n,) by the zones that meet each interval."""
     most = np.full(knots.size - 1, np.inf)
     slack = 1e-9 * (knots[-1] - knots[0])
     for zone in limits.zones:
@@ -351,7 +356,7 @@ def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
 
 
 def _interval_reserve(limits: PlanLimits, knots: Real) -> Real | None:
-    """What limits are divided by (n,) on intervals that reserve zones touch; None: no zone is there."""
+    """Factors (n,) by which limits are divided on intervals that reserve zones meet; None: there is no such zone."""
     tight = np.ones(knots.size - 1)
     slack = 1e-9 * (knots[-1] - knots[0])
     for zone in limits.reserve_zones:
@@ -362,20 +367,22 @@ def _interval_reserve(limits: PlanLimits, knots: Real) -> Real | None:
 
 
 def _touched(knots: Real, zone: FeedZone | ReserveZone, slack: float) -> slice:
-    """Intervals that a zone touches."""
+    """The intervals that a zone meets."""
     first = int(np.searchsorted(knots, zone.from_mm + slack, side="right")) - 1
     last = int(np.searchsorted(knots, zone.to_mm - slack, side="left"))
     return slice(max(first, 0), max(last, 0))
 
 
 class _Rounds:
-    """Quadratic programs about the last feed, with further rows where it was above a limit between the others.
+    """The rounds of quadratic programs on one grid, each about the last feed, with more rows where that exceeded a
+    limit.
 
-    One without a solution is solved with limits that may be exceeded: the next, about its feed, has one as a rule.
+    A program without a solution is solved with limits that may be exceeded. The next program, about its feed, usually
+    has a solution.
     """
 
     def __init__(self, setting: _Setting, estimate: Feed, known: Solution | None = None) -> None:
-        """Begins about an estimated feed; known: a solution of nearly the same on the same knots."""
+        """Begins about an estimated feed. known  a solution of nearly the same problem on the same knots"""
         self.setting = setting
         reserved = setting.reserved
         by_point = None if reserved is None else reserved[setting.points.interval]
@@ -392,9 +399,10 @@ class _Rounds:
             self.typical_q, self.duration_s = known.q, known.duration_s
 
     def run(self, even: Callable[[Solution], bool] | None, least_gain: float) -> Solution | None:
-        """The last solution; None where there is none, or only one above the limits.
+        """The last solution; None: there is none, or it exceeds the limits.
 
-        even        of a solution: where it is False after _TRUSTED rounds, further rounds on these knots are useless
+        even        whether the intervals of a solution last long enough; if not after _TRUSTED rounds, further rounds
+                    on these knots are useless
         least_gain  share of the time that a further round has to gain
         """
         for rounds in range(1, _MOST_ROUNDS + 1):
@@ -416,7 +424,9 @@ class _Rounds:
         return self.best is not None and self.best.excess < _TOLERABLE
 
     def _solved(self) -> Real | None:
-        """The unknowns of the next program; where a tolerable feed is known already, None rather than exceed limits."""
+        """The unknowns of the next program; None: it has no solution within the limits, and a feed within them is known
+        already.
+        """
         problem = _problem(
             self.setting,
             make_rows(self.setting.points, self.about, self.select, self.setting.once),
@@ -433,7 +443,7 @@ class _Rounds:
         return found
 
     def _take(self, q: Real, slope: Real, rounds: int) -> float:
-        """Makes a feed the last one. Returns by how much it is faster than the one before; s."""
+        """Makes a feed the last one. Returns the time that it gains over the one before; s."""
         setting, grid = self.setting, self.setting.grid
         p, d, dd = setting.points.cubic(grid, q, slope)
         excess = _excess(setting, p, d, dd)
@@ -484,7 +494,7 @@ def _problem(setting: _Setting, rows: Rows, p: Real, typical: Real, least: float
     bounded = np.isfinite(high)
     high[bounded] = np.maximum(high[bounded], low[bounded])
     if setting.start is not None:
-        # The state that the window before ends with may be above its limits by what is allowed.
+        # The state at the end of the window before may exceed its limits by the tolerance.
         rows.high[rows.interval < 2] += 2.0 * ALLOWED
         rows.low[rows.interval < 2] -= 2.0 * ALLOWED
     if setting.tight is not None:
@@ -515,7 +525,7 @@ def _cost(setting: _Setting, p: Real) -> tuple[Real, Real]:
 
 
 def _excess(setting: _Setting, p: Real, d: Real, dd: Real) -> float:
-    """Greatest share by which a feed is above a limit."""
+    """Greatest share by which a feed exceeds a limit."""
     if p.min() <= 0.0:
         return 1.0
     worst = 0.0
