@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The CAN side of the host tools.
 
-sdo          what is sent to the controller: objects, programs, commands, state
-capture      what is received from the bus: frames, recordings, load, setpoints that jump
+sdo          sends to the controller: objects, programs, commands; reads its state
+capture      receives from the bus: frames, recordings, load, setpoint step check
 diagnostics  states, faults and refusals as text
-address      which bus; known to all of these
-The rest uses them: run, goto, analysis, status_text, and the processes of a simulated machine.
+address      names of buses; used by all of these
+clock        real or virtual time of a bus The other modules use them: run, goto, analysis, status_text, and the
+processes of a simulated machine.
 """

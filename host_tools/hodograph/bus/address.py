@@ -15,11 +15,11 @@ from ..errors import BusError, InputError
 
 DEFAULT_BUS = "socketcan:vcan0"
 BUS_VARIABLE = "HODOGRAPH_BUS"
-"""Of the environment: the bus of commands that are not given one."""
+"""Environment variable: the bus of commands without --bus."""
 _SIOCGIFFLAGS = 0x8913
 _IFF_UP = 1
 _SOCKET_PATH_BYTES = 107
-"""Of the path of a local bus: a limit of the system."""
+"""Longest path of a local bus in bytes, a limit of the operating system."""
 
 
 @dataclass(frozen=True)
@@ -34,22 +34,22 @@ class BusAddress:
 
     @property
     def name(self) -> str:
-        """A short name of the bus, as log formats want one."""
+        """A short name of the bus for log formats."""
         return Path(self.channel).name if self.is_local else self.channel
 
     @property
     def is_local(self) -> bool:
-        """Whether hodograph-hub serves it."""
+        """Whether it is a local bus, which hodograph-hub serves."""
         return self.interface == "local"
 
     @property
     def is_raw(self) -> bool:
-        """Whether it gives every frame as it is, fast enough to record a full bus: SocketCAN or a local bus."""
+        """Whether its raw frames can be read fast enough to record a full bus: SocketCAN or a local bus."""
         return self.is_socketcan or self.is_local
 
     @property
     def is_socketcan(self) -> bool:
-        """Whether this is a network interface of the kernel."""
+        """Whether this is a network interface of the Linux kernel."""
         return self.interface == "socketcan"
 
 
@@ -73,7 +73,7 @@ def can_be_bus(path: Path) -> bool:
 
 
 def check_raw(address: BusAddress) -> None:
-    """Raises BusError with the remedy when the interface is missing or down, or nobody serves the local bus."""
+    """Raises BusError with the remedy: the interface is missing or down, or no hub serves the local bus."""
     if address.is_local:
         _check_local(address)
     else:
@@ -90,7 +90,7 @@ def _check_socketcan(address: BusAddress) -> None:
         raise BusError(
             f"{address}: only Linux has SocketCAN: name your adapter, --bus INTERFACE:CHANNEL as python-can calls it"
         )
-    import fcntl  # Windows has none; the rest of the package does without
+    import fcntl  # Windows has none; the other parts of the package do not need it
 
     name = address.channel
     try:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From the frames of a run to its motion and its bus load. Used by `run`, which has just recorded them, and `replay`,
-which reads them from a file.
+"""Motion and bus load from the frames of a run. Used by `run`, which records them, and `replay`, which reads them from
+a file.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ _AROUND = 220
 
 @dataclass(frozen=True, eq=False)
 class BusRun:
-    """A recorded run: the motion, and how the bus did. `frames` counts all that were recorded.
+    """A recorded run: its motion and figures of the bus. `frames`: number of recorded frames.
 
-    `bus` is the file's name when it was read from one; then the deadline misses are not known. `wall_s` is by the clock
-    of the bus. `unhomed_starts`: how many starts in the recording were allowed without homing.
+    `bus` is the name of the file if it was read from one; then the deadline misses are not known. `wall_s` is by the
+    clock of the bus. `unhomed_starts`: number of starts in the recording that were allowed without homing.
     """
 
     motion: Motion
@@ -73,9 +73,9 @@ def analyse_recording(
 
 
 def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: str) -> BusRun:
-    """The run in a recording, with the results that it had when it was recorded. `name`: of the recording.
+    """The run in a recording, with the same results as when it was recorded. `name`: of the recording.
 
-    What was recorded beside a run (booting, going to the start, other runs) is left out. Raises RunError.
+    Frames of other phases (boot, move to the start, other runs) are left out. Raises RunError.
     """
     try:
         motion, load = analyse_recording(frames, image, machine, kernel)
@@ -98,7 +98,7 @@ def replay(frames: Frames, name: str, image: bytes, machine: Machine, kernel: st
 
 
 def _stretch(frames: Frames, image: bytes, machine: Machine, kernel: str) -> Frames | None:
-    """The frames about the program's run, None when its setpoints are not there one after the other."""
+    """The frames around the program's run; None: its setpoints are not there in sequence."""
     program = NativeProgram(image)
     _, setpoints = program.setpoints(kernel, machine.path_counts)
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
@@ -125,7 +125,7 @@ def complete_ticks(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -
 
 
 def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Where flags are set one after the other: (first, after the last)."""
+    """Ranges (first, after the last) of consecutive flags that are set."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
@@ -137,7 +137,7 @@ def _targets(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> NDAr
 
 
 def _run_s(frames: Frames, motion: Motion) -> float:
-    """What the program took by the frames' times, were all of its periods like the average of the recording."""
+    """Duration of the program by the frames' times, if all of its periods were like the average of the recording."""
     times_us = frames["time_us"][frames["id"] == SYNC_ID]
     whole_us = int(times_us[-1]) - int(times_us[0])
     return motion.ticks * whole_us / (1e6 * (int(times_us.size) - 1))
@@ -184,13 +184,15 @@ def _motion(
 
 
 def _columns(machine: Machine, setpoints: NDArray[np.int32]) -> tuple[slice, slice]:
-    """Of rows of all axes of a machine, those that a program moves."""
+    """The columns of the axes that a program moves, from rows of all axes of a machine."""
     first = machine.first_axis
     return np.s_[:, first : first + setpoints.shape[1]]
 
 
 def program_tick(targets: NDArray[np.int32], setpoints: NDArray[np.int32]) -> int | None:
-    """The row of `targets` where the whole program begins, be it among others; None: nowhere."""
+    """The row of `targets` where the whole program begins, also if other programs run before and after it; None: there
+    is none.
+    """
     lead = int(np.argmax(np.any(setpoints != setpoints[0], axis=1)))
     moved = np.any(np.diff(targets, axis=0) != 0, axis=1)
     begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]])) + 1 - lead

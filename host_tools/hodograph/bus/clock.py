@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The time of a bus: that of this computer, or the virtual time of a local bus (docs/reference/virtual-time.md).
 
-Whoever talks to nodes counts its time-outs and pauses by the clock of the connection. In virtual time the hub hands
-out the
-time: it stands still while we compute, and goes on while we wait. One thread of a process is one participant; all its
-connections to a hub share it.
+Time-outs and pauses in communication with nodes are counted by the clock of the connection. In virtual time the hub
+grants the time: it stands still while a participant computes, and advances while all wait. One thread of a process is
+one participant; all its connections to a hub share it.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from typing import Protocol
 from ..errors import BusError
 
 NAME_VARIABLE = "HODOGRAPH_PARTICIPANT"
-"""Of the environment: what a process is called in virtual time."""
+"""Environment variable: the name of a process in virtual time."""
 MOST_FRAMES = 8
 """In a packet from the hub to a member."""
 _NAME_BYTES = 32
@@ -37,21 +36,21 @@ _VERSION = 3
 _HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
 _WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
 _NOTICE_S = 0.05
-"""Of real time, while a process of ours is about to join: between two looks whether it has ended instead."""
+"""Real time between two checks whether a started process has ended instead of joining."""
 _WELCOME_S = 60.0
-"""Of real time: a hub that works answers at once."""
+"""Longest wait in real time for the hub, which answers at once if it works."""
 
 
 class Clock(Protocol):
-    """What passes while nodes are waited for."""
+    """The time by which waits for nodes are counted."""
 
     @property
     def is_virtual(self) -> bool:
-        """Whether a hub sets the time. Such a time stands still while this process computes."""
+        """Whether a hub grants the time, which then stands still while this process computes."""
         ...
 
     def now_s(self) -> float:
-        """Monotonic: only differences mean anything."""
+        """Monotonic time in s; only differences have a meaning."""
         ...
 
     def stamp_ns(self) -> int:
@@ -86,15 +85,17 @@ REAL_CLOCK = RealClock()
 
 
 class Inbox(Protocol):
-    """Something that takes in what came for this thread while it waited."""
+    """Receives the frames that came for this thread while it waited."""
 
     def fill(self) -> None:
-        """Takes what lies in the socket."""
+        """Takes the received frames from the socket."""
         ...
 
 
 class VirtualClock:
-    """Our part in the virtual time of a hub: one for each thread and hub, shared by its connections (`clock_of`)."""
+    """A participant in the virtual time of a hub: one for each thread and hub, shared by its connections
+    (`clock_of`).
+    """
 
     is_virtual = True
 
@@ -131,21 +132,21 @@ class VirtualClock:
             self._wait(until_ns)
 
     def wait(self, until_s: float | None) -> None:
-        """Until this instant (None: without a limit), or before it when a frame comes for this thread, or a process
-        leaves.
+        """Waits until this instant (None: without a limit). Returns earlier if a frame comes for this thread, or a
+        process leaves.
         """
         until_ns = _NEVER_NS if until_s is None else round(until_s * 1e9)
         if until_ns > self._now_ns:
             self._wait(until_ns)
 
     def activate(self) -> None:
-        """After an interrupted wait: time stands still for us again. Call it before sending."""
+        """Ends an interrupted wait, so that time stands still for this participant again. Call it before sending."""
         if self._waiting:
             self._say_wait(0)
             self._await_grant()
 
     def interrupt(self) -> None:
-        """From any thread: ends the wait of the thread that this clock belongs to, before its time."""
+        """Ends the wait of the thread that this clock belongs to; may be called from any thread."""
         with self._saying:
             if self._waiting:
                 with suppress(BusError):
@@ -173,8 +174,8 @@ class VirtualClock:
     def _take(self) -> None:
         """The next message; its kinds other than grants are kept.
 
-        A signal may raise an exception between any two steps of this, Ctrl-C for one. A grant that is lost would hold
-        time for ever: so a message stays in the socket until it has been acted on, and may then be seen twice.
+        A signal such as Ctrl-C may raise an exception between any two steps of this function. A lost grant would stop
+        time for ever. So a message stays in the socket until it has been processed, and may be read twice.
         """
         try:
             self._await_message()
@@ -188,7 +189,7 @@ class VirtualClock:
             raise self._gone()
 
     def _await_message(self) -> None:
-        """Until there is one, or the handler of a signal raises something."""
+        """Waits for a message, or until the handler of a signal raises an exception."""
         signals = self._signals
         watched: list[socket.socket | int] = [self._connection] + ([signals] if signals else [])
         while self._connection not in select.select(watched, [], [])[0]:
@@ -202,7 +203,7 @@ class VirtualClock:
             self._now_ns = now_ns
             self._has_frames = self._has_frames or bool(flags & _FRAMES)
             self._waiting = False
-            self._grant = number  # last: by this it is known to have been taken
+            self._grant = number  # last: this marks it as taken
 
     def _send(
         self, kind: int, *, flags: int = 0, number: int = 0, time_ns: int = 0, name: str = ""
@@ -231,9 +232,9 @@ class VirtualClock:
         name: str,
         start: Callable[[Mapping[str, str]], subprocess.Popen[bytes]],
     ) -> subprocess.Popen[bytes]:
-        """Starts a process that will take part under this name, and returns when it does, or has ended instead.
+        """Starts a process that takes part under this name, and returns when it does, or has ended instead.
 
-        `start` is given what the environment of the process has to have besides ours.
+        `start` gets the variables that the environment of the process needs in addition to that of this process.
         """
         self.activate()
         self._forget(name)
@@ -244,10 +245,10 @@ class VirtualClock:
     def await_end(
         self, name: str, child: subprocess.Popen[bytes], wait_s: float | None = None
     ) -> int:
-        """Lets time pass until a process that was started by `spawn` has ended; its exit status.
+        """Lets time pass until a process that was started by `spawn` has ended; returns its exit status.
 
-        It may leave and take part again: time stands still meanwhile. Raises subprocess.TimeoutExpired after `wait_s`
-        of this time.
+        The process may leave and take part again; time stands still in between. Raises subprocess.TimeoutExpired after
+        `wait_s` of this time.
         """
         limit_s = None if wait_s is None else self.now_s() + wait_s
         while child.poll() is None:
@@ -261,14 +262,16 @@ class VirtualClock:
         return child.wait()
 
     def signal(self, name: str, child: subprocess.Popen[bytes], number: int) -> None:
-        """Sends a signal to a process, and returns when it has acted on it at the present instant, or has ended."""
+        """Sends a signal to a process, and returns when the process has handled it at the present instant, or has
+        ended.
+        """
         self.activate()
         self._forget(name)
         child.send_signal(number)
         self._await_notice(name, child, _INTERRUPTED, _LEFT)
 
     def kill(self, name: str, child: subprocess.Popen[bytes]) -> None:
-        """Kills a process, as a crash would end it, at the present instant."""
+        """Kills a process at the present instant, like a crash."""
         self.activate()
         child.kill()
         child.wait()
@@ -276,17 +279,17 @@ class VirtualClock:
             self._take()
 
     def suspend(self, name: str) -> None:
-        """The process of this name stands still, as if its processor did, while time goes on."""
+        """Suspends the process of this name while time advances, as if its processor stood still."""
         self.activate()
         self._send(_SUSPEND, name=name)
 
     def resume(self, name: str) -> None:
-        """It goes on."""
+        """Resumes a suspended process."""
         self.activate()
         self._send(_CONTINUE, name=name)
 
     def _await_notice(self, name: str, child: subprocess.Popen[bytes], *kinds: int) -> None:
-        """Until the hub has reported one of these of a process, or it has ended; time stands still."""
+        """Waits until the hub has sent one of these notices about a process, or it has ended; time stands still."""
         while child.poll() is None and not any((kind, name) in self._notices for kind in kinds):
             self._take_soon()
 
@@ -296,7 +299,7 @@ class VirtualClock:
             self._take()
 
     def _has_left(self, name: str) -> bool:
-        """Whether that is the last report of it."""
+        """Whether the last notice about a process is that it left."""
         reported = [kind for kind, of in self._notices if of == name and kind in (_JOINED, _LEFT)]
         return bool(reported) and reported[-1] == _LEFT
 
@@ -306,21 +309,21 @@ class VirtualClock:
     # -- connections --------------------------------------------------------------------------
 
     def attach(self, inbox: Inbox) -> None:
-        """It is filled whenever time has passed."""
+        """Adds an inbox, which is filled whenever time has passed."""
         self._inboxes.append(inbox)
 
     def detach(self, inbox: Inbox) -> None:
-        """It is filled no more."""
+        """Removes an inbox."""
         with suppress(ValueError):
             self._inboxes.remove(inbox)
 
     def hold(self) -> VirtualClock:
-        """One more user: time waits for this thread until `release` was called as often."""
+        """Adds a user. Time waits for this thread until `release` was called as often."""
         self._users += 1
         return self
 
     def release(self) -> None:
-        """The last one ends our part: time goes on without us."""
+        """Removes a user. After the last one, time no longer waits for this thread."""
         self._users -= 1
         if self._users == 0:
             self._connection.close()
@@ -328,10 +331,11 @@ class VirtualClock:
 
 
 class _SignalPipe:
-    """Readable once a signal has come for this process, for the main thread, which runs the handlers of Python.
+    """A file descriptor that is readable once a signal has come for this process; for the main thread, which runs the
+    handlers of Python.
 
-    A signal that comes just before a call that blocks would be seen only after it, so after the next grant. But who
-    sent it waits for us to act on it, and time waits for him.
+    Without it, a signal just before a blocking call would be handled only after the next grant. But its sender waits
+    until this process has handled it, and time waits for the sender.
     """
 
     def __init__(self) -> None:
@@ -340,7 +344,7 @@ class _SignalPipe:
         os.set_blocking(self._write, False)
 
     def listen(self) -> int | None:
-        """What to wait for beside other things; None: not in this thread, or another thread receives the signals."""
+        """The descriptor to wait for; None: this is not the main thread, or another thread receives the signals."""
         if threading.current_thread() is not threading.main_thread():
             return None
         before = signal.set_wakeup_fd(self._write, warn_on_full_buffer=False)
@@ -364,7 +368,7 @@ _local = threading.local()
 
 
 def _clocks() -> dict[int, VirtualClock]:
-    """Of this thread, by the process number of the hub, which may serve several buses."""
+    """The clocks of this thread, by the process number of the hub, which may serve several buses."""
     clocks: dict[int, VirtualClock] | None = getattr(_local, "clocks", None)
     if clocks is None:
         clocks = _local.clocks = {}
@@ -372,10 +376,10 @@ def _clocks() -> dict[int, VirtualClock]:
 
 
 def hub_clock(path: str) -> VirtualClock | None:
-    """Our part in the virtual time of the hub at `path`, held for the caller, who calls `release`; None: its time is
-    real.
+    """The participant of this thread in the virtual time of the hub at `path`; the caller has to call `release`. None:
+    its time is real.
 
-    Raises OSError when nobody serves the path.
+    Raises OSError: no hub serves the path.
     """
     connection = _connect(path)
     hub = _peer_process(connection)
@@ -393,7 +397,7 @@ def hub_clock(path: str) -> VirtualClock | None:
 
 
 def has_virtual_time(path: str) -> bool:
-    """Whether the time of the hub at `path` is virtual. Raises OSError when nobody serves the path."""
+    """Whether the time of the hub at `path` is virtual. Raises OSError: no hub serves the path."""
     with _connect(path) as connection:
         flags, _, _ = _handshake(connection, _HELLO_MEMBER, 0, 0, "")
         return bool(flags & _VIRTUAL)
@@ -406,14 +410,14 @@ def _peer_process(connection: socket.socket) -> int:
 
 
 def member_connection(path: str, participant: int) -> socket.socket:
-    """A connection for frames; those that come wake `participant` (0: nobody). Raises OSError."""
+    """A connection for frames, which wake `participant` (0: none). Raises OSError."""
     connection = _connect(path)
     _handshake(connection, _HELLO_MEMBER, 0, participant, "")
     return connection
 
 
 def filter_message(filters: Sequence[tuple[int, int]]) -> bytes:
-    """Names to the hub the frames that a member wants: identifier and mask of each kind."""
+    """Sends the frames that a member receives to the hub: identifier and mask of each kind."""
     packed = b"".join(struct.pack("=II", identifier, mask) for identifier, mask in filters)
     return struct.pack("=IHH", _MARK, _FILTER, len(filters)) + packed
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Straight, jerk-limited moves from where the axes stand: programs like any other."""
+"""Straight, jerk-limited moves from the present position of the axes, as programs. For `hodograph goto` and runs."""
 
 from __future__ import annotations
 
@@ -27,15 +27,16 @@ SHORTEST_MOVE_MM = 0.002
 """Shorter moves (the format ends near 1 um) go through a point DETOUR_MM away."""
 DETOUR_MM = 0.1
 DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
-"""The same where axes after x, y, z move and these do not: mm for each degree or mm of the longest of those moves."""
+"""Length of the move of x if only axes after z move: mm for each degree or mm of the longest of their moves."""
 FOLLOWING_SHARE = 0.5
-"""Of the axis limits, for moves of axes after x, y, z: at their full speed they could not stop within stop_time_ms."""
+"""Share of the axis limits for moves of axes after z: at full speed they could not stop within stop_time_ms."""
 QUICK_ABOVE_MM = 50.0
-"""Stops of longer moves in space are searched with few trials. All trials take up to 36 s of processor time, and make
-stops 8 % shorter at most."""
+"""Stops of longer moves in space are searched with few trials. All trials would take up to 36 s of processor time and
+make stops at most 8 % shorter.
+"""
 
 Place = tuple[float, ...]
-"""Of path axes, mm or degrees: the two or three that draw a path, or these and the axes that follow them."""
+"""A position of path axes, mm or degrees: of the two or three that draw a path, or of all."""
 
 
 def line_image(start_mm: Place, end_mm: Place, machine: Machine) -> bytes:
@@ -78,9 +79,10 @@ def _image(
 
 
 def _along(machine: Machine, start_mm: Place, end_mm: Place) -> Machine:
-    """The machine with limits along the straight line at which the axes after x, y, z keep theirs.
+    """The machine with limits along the straight line that keep the limits of the axes after z.
 
-    Stops are looked for down to a share of the limits along the distance, which such axes may be far below.
+    The search for stops uses values down to a share of the limits along the path, which may be far above those of such
+    axes.
     """
     distance_mm = math.dist(start_mm[:SPACE_AXES], end_mm[:SPACE_AXES])
     axes = zip(machine.path_axes, start_mm, end_mm, strict=True)
@@ -103,9 +105,8 @@ def _line(start_mm: Place, end_mm: Place) -> PHSpline | SpatialPHSpline:
 
 
 def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, Place]]:
-    """The straight moves that lead from one point to another: none, one, or two for a tiny move of x, y, z.
-
-    Axes after x, y, z move on the first of two.
+    """The straight moves from one point to another: none, one, or two for a tiny move of x, y, z. Axes after z move on
+    the first of two.
     """
     if start_mm == end_mm:
         return []
@@ -129,13 +130,13 @@ def goto(
     *,
     unhomed: bool = False,
 ) -> float:
-    """Moves from the present setpoint to a point in counts of the path's axes, in the order of the path; returns the
-    distance in mm, at standstill. Axes that it does not name hold their position. Where axes after x, y, z move and
-    these do not, x moves a small distance and comes back: a program has no motion without a distance.
+    """Moves from the present setpoint to a point in counts of the path's axes, in the order of the path. Returns the
+    distance in mm, at standstill. Axes that the point does not have hold their position. If only axes after z move, x
+    moves a small distance and back, since a program needs a distance.
 
-    The drives have to be on (state ready). Each move replaces the program that is loaded. `unhomed`: also when axes
-    with a homing method are not homed. Raises RefusedError when the feed override is 0, with which nothing would move,
-    and RunError when another command has stopped the axes on the way.
+    The drives have to be on (state ready). Each move replaces the loaded program. `unhomed`: also if axes with a homing
+    method are not homed. Raises RefusedError: the feed override is 0. Raises RunError: another command has stopped the
+    axes.
     """
     axes = machine.path_axes
     for axis, counts in zip(axes, end_counts, strict=False):
@@ -169,7 +170,7 @@ def goto(
 
 
 def _require_arrival(controller: Controller, machine: Machine, end: Place) -> None:
-    """Raises RunError: the axes rest, but not where the move ends."""
+    """Raises RunError: the axes stand at another place than the end of the move."""
     axes, at = machine.path_axes[: len(end)], controller.targets(len(end))
     wanted = [round(place * scale) for place, scale in zip(end, machine.path_counts, strict=False)]
     if any(abs(own - there) > 1 for own, there in zip(at, wanted, strict=True)):

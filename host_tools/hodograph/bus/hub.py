@@ -28,7 +28,7 @@ def is_served(path: Path) -> bool:
 
 
 def _folder() -> Path:
-    """Where buses without a path are served: the folder for temporary files, unless its name is too long."""
+    """The folder of buses without a path: that for temporary files, unless its name is too long."""
     folder = Path(tempfile.gettempdir())
     return folder if can_be_bus(folder / "hodograph-abcdefgh" / "bus99") else Path("/tmp")
 
@@ -44,8 +44,8 @@ class LocalHub:
         speed: float | None = None,
         paths: Sequence[Path] | None = None,
     ) -> None:
-        """`virtual`: its time is virtual, and goes on `speed` times as fast as real time at most (None: as fast as
-        it can). `paths`: where the buses are served, instead of in a new folder for temporary files.
+        """virtual its time is virtual, and advances at most `speed` times as fast as real time (None: not limited)
+        paths    paths of the buses, in place of ones in a new temporary folder
         """
         self._paths = paths
         self._words = ["--time", "virtual" if virtual else "real"]
@@ -57,7 +57,7 @@ class LocalHub:
 
     @property
     def address(self) -> BusAddress:
-        """Of the first bus."""
+        """Address of the first bus."""
         return self.addresses[0]
 
     def __enter__(self) -> LocalHub:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A local bus: what hodograph-hub (sim/hub) serves to processes of one machine, whose kernel need not have CAN.
+"""The client of a local bus, which hodograph-hub (sim/hub) serves to processes of one computer without CAN in the Linux
+kernel.
 
 A member sends struct can_frame of linux/can.h and receives the same with a time stamp, in virtual time several in a
 packet (firmware/port/linux/local_bus.h).
@@ -52,7 +53,7 @@ class LocalBus(can.BusABC):
     """
 
     def __init__(self, channel: str, **options: Any) -> None:
-        """Raises OSError when nobody serves the path."""
+        """Raises OSError: no hub serves the path."""
         self._virtual: VirtualClock | None = hub_clock(channel)
         self.clock: Clock = self._virtual or REAL_CLOCK
         try:
@@ -92,7 +93,7 @@ class LocalBus(can.BusABC):
             raise can.CanOperationError(str(error), error.errno) from error
 
     def fill(self) -> None:
-        """Takes what lies in the socket: in virtual time the hub waits for those who do not."""
+        """Takes the received frames from the socket: in virtual time the hub waits until they are taken."""
         while self._take_packet():
             pass
 
@@ -119,8 +120,8 @@ class LocalBus(can.BusABC):
         return self._waiting.popleft() if self._waiting else None
 
     def _take_packet(self) -> bool:
-        """Keeps the frames of the next packet that pass the filters; false: there is none now. No message is made of
-        the others: a full bus has some thousand a second.
+        """Keeps the frames of the next packet that pass the filters; False: there is no packet. No message object is
+        made of the others, since a full bus has some thousand frames a second.
         """
         try:
             packet = self.socket.recv(MOST_FRAMES * _STAMPED.size, socket.MSG_DONTWAIT)
@@ -138,7 +139,9 @@ class LocalBus(can.BusABC):
 
     def _apply_filters(self, filters: can.typechecking.CanFilters | None) -> None:
         self._wanted = [(each["can_id"], each["can_mask"]) for each in filters or ()]
-        if len(self._wanted) <= _MOST_FILTERS:  # else the hub gives us more, and we choose
+        if (
+            len(self._wanted) <= _MOST_FILTERS
+        ):  # else the hub sends more frames, and the filters choose
             self.socket.send(filter_message(self._wanted))
 
     def _release(self) -> None:

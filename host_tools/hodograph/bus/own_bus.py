@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The bus of commands that are not given one.
+"""The bus of commands without --bus.
 
-$HODOGRAPH_BUS, else vcan0 where the kernel has it, else the local bus of this user: `hodograph run` and `hodograph rig`
-serve it while they run, at a path that all commands know, so that `hodograph status` and the others find it.
+It is $HODOGRAPH_BUS, else vcan0 if the Linux kernel has it, else the local bus of this user. `hodograph run` and
+`hodograph rig` serve the latter while they run, at a fixed path at which `hodograph status` and other commands find it.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from .hub import LocalHub, is_served
 
 
 def own_path() -> Path:
-    """Where the local bus of this user is served: below $XDG_RUNTIME_DIR, else below the folder for temporary files,
-    else, where the names of these are too long for a bus, below /tmp.
+    """The path of this user's local bus: below $XDG_RUNTIME_DIR, else below the folder for temporary files, else, if
+    these names are too long for a bus, below /tmp.
     """
     runtime = os.environ.get("XDG_RUNTIME_DIR")
     if runtime and Path(runtime).is_absolute() and os.access(runtime, os.W_OK):
@@ -75,7 +75,7 @@ def _has_vcan() -> bool:
 
 
 def _make_private(folder: Path) -> None:
-    """Makes the folder of the bus, for this user alone. Raises BusError where it belongs to somebody else."""
+    """Makes the folder of the bus, for this user alone. Raises BusError: it belongs to another user."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         owner = folder.stat().st_uid

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The simulated machine as processes: controller and drives on a virtual CAN bus."""
+"""The simulated machine as processes: controller and drives on a vcan interface or a local bus."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 CONTROLLER, DRIVE = "hodograph-controller", "hodograph-drive"
 END_S = 8.0
-"""For a process to end: a controller stops the axes and switches them off in 6 s at most."""
+"""Longest wait for the end of a process: a controller stops the axes and switches them off within 6 s."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 _REPOSITORY = _PACKAGE.parents[1]
 
@@ -115,7 +115,7 @@ def _axis_text(axis: Axis, drive: Drive) -> str:
 
 
 def guarded(command: list[str]) -> list[str]:
-    """The same command, that gets SIGTERM when we die, where the system can do that."""
+    """The command, changed so that the process gets SIGTERM when this one dies, if the operating system can do that."""
     guard = shutil.which("setpriv")
     return [guard, "--pdeathsig", "TERM", "--", *command] if guard else command
 
@@ -123,8 +123,8 @@ def guarded(command: list[str]) -> list[str]:
 class Process:
     """A child process with its output. In virtual time (`clock`) it takes part under `name`.
 
-    It forms its own session, so that Ctrl-C reaches only us and the axes can be stopped first, and gets SIGTERM when we
-    die. All are pinned to one core: waking across cores costs more than it gains.
+    It has its own session, so that Ctrl-C reaches only this process and the axes can be stopped first. It gets SIGTERM
+    when this process dies. All are pinned to one core: wake-ups across cores cost more than they gain.
     """
 
     def __init__(self, name: str, command: list[str], clock: VirtualClock | None = None) -> None:
@@ -148,18 +148,18 @@ class Process:
             os.sched_setaffinity(self.child.pid, {max(os.sched_getaffinity(0))})
 
     def ended(self) -> bool:
-        """Whether it has ended, by itself or by us."""
+        """Whether it has ended."""
         return self.child.poll() is not None
 
     def check(self) -> None:
-        """Raises BusError with its last words when it has ended."""
+        """Raises BusError with the end of its output if it has ended."""
         if self.ended():
             raise BusError(
                 f"{self._program} ended by itself (status {self.child.returncode}): {self._last_line()}"
             )
 
     def kill(self) -> None:
-        """As a crash would end it."""
+        """Kills it, like a crash."""
         if self._clock is not None and not self.ended():
             self._clock.kill(self.name, self.child)
         else:
@@ -167,7 +167,7 @@ class Process:
             self.child.wait()
 
     def text(self) -> str:
-        """All it has said."""
+        """Its whole output."""
         self._output.seek(0)
         return self._output.read().decode(errors="replace")
 
@@ -176,7 +176,7 @@ class Process:
         return lines[-1] if lines else "it said nothing"
 
     def ask_to_end(self) -> None:
-        """SIGTERM."""
+        """Sends SIGTERM."""
         if self.ended():
             return
         if self._clock is not None:
@@ -185,7 +185,7 @@ class Process:
             self.child.terminate()
 
     def end(self, wait_s: float = END_S) -> None:
-        """SIGTERM, and SIGKILL after `wait_s`."""
+        """Sends SIGTERM, and SIGKILL after `wait_s`."""
         try:
             self.ask_to_end()
             if self._clock is not None:
@@ -199,7 +199,9 @@ class Process:
 
 
 def virtual_clock(address: BusAddress) -> VirtualClock | None:
-    """Our part in the virtual time of a bus, for the caller to release; None: its time is real. Raises BusError."""
+    """The participant in the virtual time of a bus; the caller has to release it. None: its time is real. Raises
+    BusError.
+    """
     if not address.is_local:
         return None
     try:
@@ -223,7 +225,7 @@ class SimulatedMachine:
 
     def __enter__(self) -> SimulatedMachine:
         self._clock = virtual_clock(self._address)
-        # In virtual time ticks cost what they take to compute: nothing is gained by leaving out the time between them.
+        # In virtual time a tick takes only its computing time, so skipping the time between ticks gains nothing.
         pace = self._pace if self._clock is None else "real-time"
         try:
             self._spawn("drives", drive_command(self._machine, self._address))
@@ -247,7 +249,7 @@ class SimulatedMachine:
         return drives, controller
 
     def check(self) -> None:
-        """Raises BusError with its last words when a child has ended."""
+        """Raises BusError with the end of its output if a child has ended."""
         for child in self._children:
             child.check()
 

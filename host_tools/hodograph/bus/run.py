@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A program on the bus: bring up, move to the start, run, record, analyse."""
+"""Runs a program on the bus: configures the machine, moves to the start, runs, records and analyses."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ __all__ = [
 
 _SYNCS, _TICK, _MISSES = 1, 2, 3
 _MARGIN_TICKS = 50
-"""Recorded beyond what is needed, so that late answers differ from lost ones."""
+"""Ticks recorded beyond the necessary ones, so that late answers differ from lost ones."""
 _REST_TICKS = 10
-"""Recorded before the start: `hodograph identify` wants to see that a motion begins at rest."""
+"""Time recorded before the start: `hodograph identify` needs the rest before a motion."""
 
 Progress = Callable[[int], None]
 
@@ -54,7 +54,9 @@ def _silent(text: str) -> None:
 
 @dataclass(frozen=True)
 class RunSession:
-    """A controller that answers; `pace` is known when its processes are ours. `note` takes lines for the user."""
+    """A run session: a controller that answers; `pace` is None unless this process started it. `note` takes lines for
+    the user.
+    """
 
     controller: Controller
     pace: str | None
@@ -71,11 +73,12 @@ def run_session(
     note: Callable[[str], None],
     controller_program: str | None = None,
 ) -> Iterator[RunSession]:
-    """The machine's controller on this bus, with a simulated machine started on a virtual bus without one.
+    """A session with the machine's controller on this bus. On a virtual bus without a controller a simulated machine is
+    started.
 
-    `controller_program`: what is started as its controller, instead of hodograph-controller.
+    `controller_program`: command of its controller in place of hodograph-controller.
 
-    On an error or an interrupt the axes are stopped, and what was started is ended.
+    On an error or an interrupt the axes are stopped, and started processes are ended.
     """
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
@@ -119,10 +122,10 @@ def run_program(
     on: Machine | None = None,
     start: list[int] | None = None,
 ) -> BusRun:
-    """Runs a program image from wherever the axes stand, and analyses the recording, which is kept in `record`.
+    """Moves to the start of a program image, runs it, and analyses the recording, which is kept in `record`.
 
-    unhomed    also when axes with a homing method are not homed
-    on, start  the machine with all axes of its path, and where these start, in counts; None: those of the program
+    unhomed    also if axes with a homing method are not homed
+    on, start  the machine with all axes of its path, and their start in counts; None: those of the program
 
     Raises RefusedError, BusError, and RunError when the recording is incomplete, a setpoint jumps, or the setpoints are
     not those that the same kernel gives here.
@@ -145,9 +148,9 @@ def bring_up(at: RunSession, machine: Machine, kernel: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What was on the bus from a little before a program's start until its axes had settled.
+    """The frames from shortly before a program's start until its axes have settled.
 
-    dropped  frames that the kernel of this computer dropped
+    dropped  frames that the Linux kernel dropped
     misses   deadline misses of the controller
     took_s   from the start to standstill, by the clock of the bus
     """

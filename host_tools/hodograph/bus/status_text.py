@@ -55,7 +55,7 @@ _STREAM_STATES = (
 
 
 def stream_words(stream: StreamStatus) -> str:
-    """A job in chunks: line, motion ahead, time left."""
+    """A job in chunks: line, motion ahead, remaining time."""
     left = "time left not known"
     if stream.remaining_s is not None:
         left = f"{stream.remaining_s:.0f} s left"
@@ -194,7 +194,7 @@ def _statistics_rows(statistics: Statistics) -> list[Row]:
 
 
 def status_line(status: Status, load: BusLoad | None = None) -> str:
-    """The gist in one line."""
+    """The status in one line."""
     motion = status.motion
     words = [
         status.state,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The input files (TOML) as checked, frozen dataclasses."""
+"""Reads the input files (TOML): path, machine and drive files as checked, frozen dataclasses."""
 
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive

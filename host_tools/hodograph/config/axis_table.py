@@ -19,14 +19,16 @@ COUNTS_PER_UNIT_MAX = 2**23
 """The controller's own bound (firmware/app/machine/config.h)."""
 I32_MAX, U32_MAX = 2**31 - 1, 2**32 - 1
 HOMING_METHODS = (0, 17, 18, 19, 20, 21, 22, 35, 37)
-"""Of CiA 402: 0 not homed, 17, 18 limit switches, 19 to 22 home switch, 35 and 37 here."""
+"""Homing methods of CiA 402: 0 not homed, 17, 18 limit switches, 19 to 22 home switch, 35 and 37 at the present
+position.
+"""
 
 
 @dataclass(frozen=True)
 class Homing:
-    """How `hodograph home` finds this axis' zero; method 0: not at all. Degrees instead of mm where the axis turns.
+    """Homing of an axis (`hodograph home`); method 0: it is not homed. A rotary axis has degrees in place of mm.
 
-    Axes home one after the other, from the lowest `sequence` on, those of one number in the order of the controller.
+    Axes home one after the other, from the lowest `sequence` on; axes of one number in the order of the controller.
     """
 
     method: int = 0
@@ -39,7 +41,8 @@ class Homing:
 
 @dataclass(frozen=True)
 class Feedforward:
-    """What the controller sends beside the target: a share of its velocity, torque in per mille of the rated one.
+    """Feedforward that the controller sends with the target: a share of its velocity, torque in per mille of the rated
+    one.
 
     Of a rotary axis, torque is for 1000 deg/s^2 and 1000 deg/s in place of m/s^2 and m/s.
     """
@@ -50,7 +53,7 @@ class Feedforward:
 
     @property
     def velocity_permille(self) -> int:
-        """As the controller has it: object 0x2018."""
+        """Object 0x2018 of the controller."""
         return round(self.velocity * 1000)
 
     @property
@@ -81,7 +84,7 @@ class Scaling:
 
 @dataclass(frozen=True)
 class Identity:
-    """What the drive has to say of itself in 0x1018 subs 1 to 3; 0: anything."""
+    """The identity that the drive has to report in 0x1018 subs 1 to 3; 0: any."""
 
     vendor: int = 0
     product: int = 0
@@ -90,15 +93,15 @@ class Identity:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: CANopen node, travel limits in machine coordinates, limits of its motion, what is written to its
-    drive, and its model.
+    """One axis: CANopen node, travel in machine coordinates, limits of its motion, settings of its drive, and its
+    model.
 
-    An rotary axis (`unit` "deg") has degrees where the names of its fields, and of its drive's model, say mm.
-    No program moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it
-    before it accepts a program (docs/guides/limits.md).
+    A rotary axis (`unit` "deg") has degrees where names of its fields, and of its drive's model, have mm. No program
+    moves the axis beyond its velocity, acceleration and jerk: plans keep them, and the controller proves it before it
+    accepts a program (docs/guides/limits.md).
 
     Without a drive file (`drive` None) the axis can be run, but not simulated. `following_window_mm` None: the drive
-    keeps its own, and the controller looks for an axis that does not follow at all.
+    keeps its own, and the controller only detects an axis that does not follow at all.
     """
 
     name: str
@@ -155,9 +158,7 @@ _SCALING = (
 
 
 class _AxisTable:
-    """One [[axis]], or a table in it, of an axis that is measured in `unit`: its keys are looked up by what they are
-    called in mm.
-    """
+    """One [[axis]], or a table in it, of an axis in `unit`; its keys are read by their names in mm."""
 
     def __init__(self, table: Table, unit: str) -> None:
         """Raises InputError: the table has a key of the other unit."""
@@ -209,7 +210,7 @@ def _in_units(names: tuple[str, ...]) -> tuple[str, ...]:
 def read_axes(root: Table, controller_node: int, acceleration_mm_s2: float) -> tuple[Axis, ...]:
     """The axes of a machine file, in its order.
 
-    `acceleration_mm_s2`, the controller's limit, is what quick stops brake with where nothing else is said.
+    Quick stops brake with `acceleration_mm_s2`, the controller's limit, unless the file gives another value.
     """
     tables = root.tables("axis", _in_units(_AXIS))
     if len(tables) > MAX_AXES:
@@ -275,7 +276,7 @@ def _axis(keyed: _AxisTable, counts_per_unit: int, acceleration_mm_s2: float) ->
 
 
 def _drive(table: Table) -> Drive | None:
-    """Of the drive file that `drive` names, or of the table that it is."""
+    """The drive of the file that `drive` names, or of the table `drive`."""
     if not table.has("drive"):
         return None
     if table.is_table("drive"):
@@ -318,7 +319,7 @@ def _homing(axis: _AxisTable, counts_per_unit: int, reach_mm: float) -> Homing:
     slow = _counted(table, "slow_mm_s", min(usual.slow_mm_s, speed), counts_per_unit)
     if slow > speed:
         raise table.error("slow_mm_s", f"is {slow:g}, above {table.key('speed_mm_s')} = {speed:g}")
-    first = axis.table.text("name").lower() == "z"  # the tool leaves the work first
+    first = axis.table.text("name").lower() == "z"  # so that the tool leaves the workpiece first
     return Homing(
         method=method,
         offset_mm=table.number("offset_mm", usual.offset_mm, low=-reach_mm, high=reach_mm),

@@ -14,7 +14,7 @@ from .table import Table, read_toml
 
 @dataclass(frozen=True)
 class Equipment:
-    """What stands around a simulated motor (sim/node/equipment.h). None: no switch, or what belongs to the motor."""
+    """The equipment of a simulated motor (sim/node/equipment.h). None: no switch, or the default of the motor."""
 
     limit_negative_mm: float | None = None
     limit_positive_mm: float | None = None
@@ -52,10 +52,10 @@ class Drive:
     encoder_counts_per_rev: int
     loop_rate_hz: int
     interpolation: str = "linear"
-    """How it goes from setpoint to setpoint: "linear", "cubic", or "none": the setpoint is the command at once
+    """Interpolation between setpoints: "linear", "cubic", or "none": the setpoint takes effect at once
     (docs/theory/numerics.md section 13)."""
     speed: str = "exact"
-    """Of the motor for the loop: "exact", or "differences" of the encoder between two servo samples."""
+    """Source of the loop's speed: "exact", or "differences" of the encoder between two servo samples."""
     delay_samples: int = 0
     """Servo samples from the encoder to the volts, 0 or 1."""
     integral: str = "backward"
@@ -64,7 +64,7 @@ class Drive:
 
     @property
     def rated_torque_nm(self) -> float:
-        """What torque offsets are per mille of: given, or half of what the voltage limit makes."""
+        """The torque to which torque offsets in per mille refer: given, or half of that at the voltage limit."""
         if self.equipment.rated_torque_nm is not None:
             return self.equipment.rated_torque_nm
         return 0.5 * self.volts_limit / self.torque_to_volts
@@ -83,7 +83,7 @@ def load_drive(file: Path) -> Drive:
 
 
 def drive_of(file: Path, contents: Mapping[str, Any]) -> Drive:
-    """The drive that the contents of a drive file describe; `file` is what messages name. Raises InputError."""
+    """The drive that the contents of a drive file describe; `file` is its name in messages. Raises InputError."""
     root = Table(file, "", contents, _SECTIONS)
     plant = root.table("plant", _PLANT)
     pdff = root.table("pdff", (*_PDFF, *MOTOR_GAINS.values()))

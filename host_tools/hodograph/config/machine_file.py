@@ -21,7 +21,9 @@ PLANE_AXES, SPACE_AXES = 2, 3
 
 @dataclass(frozen=True)
 class Supervision:
-    """When answers or setpoints that stay away become a fault (docs/reference/protocol.md section 3, object 0x2004)."""
+    """Times after which missing answers or setpoints are a fault (docs/reference/protocol.md section 3, object
+    0x2004).
+    """
 
     answer_wait_ms: int = 100
     missed_max: int = 1
@@ -30,7 +32,7 @@ class Supervision:
 
 @dataclass(frozen=True)
 class Machine:
-    """The contents of a machine file. The limits are the controller's own: they always bind.
+    """The contents of a machine file. The limits are the controller's own and always apply.
 
     stop_time_ms  a program whose fault stop may take longer is refused
     offset_mm     one number for each axis of the path
@@ -54,11 +56,11 @@ class Machine:
     axes: tuple[Axis, ...]
     path_count: int
     program_bytes: int | None = None
-    """Room for a program in the controller's memory (0x2041 sub 1), for `compile`'s warning; None: not known."""
+    """Bytes for a program in the controller's memory (0x2041 sub 1), for the warning of `compile`; None: not known."""
     outputs: Outputs | None = None
     """The outputs that a path switches; None: there is no I/O module."""
     first_axis: int = 0
-    """The first axis that a program moves; not 0 only in what `turning` gives."""
+    """Number of the first axis that a program moves; above 0 only in `turning`."""
 
     @property
     def start_tolerance_counts(self) -> int:
@@ -72,7 +74,7 @@ class Machine:
 
     @property
     def torque_feedforward(self) -> bool:
-        """Whether setpoints carry a torque offset: where one axis needs it, all have room for it."""
+        """Whether setpoints have a torque offset: all have it if one axis needs it."""
         return any(axis.feedforward.has_torque for axis in self.axes)
 
     @property
@@ -82,7 +84,7 @@ class Machine:
 
     @property
     def counts_per_mm(self) -> int:
-        """Of the axes in mm, which all have the same; of a machine that only turns, of its first axis."""
+        """Counts of a mm, the same for all axes in mm; if all axes are rotary, counts of a degree of the first."""
         straight = [axis for axis in self.axes if not axis.turns]
         return (straight or self.axes)[0].counts_per_unit
 
@@ -90,7 +92,7 @@ class Machine:
     def path_axes(self) -> tuple[Axis, ...]:
         """The axes that follow a path, in its order: two in the plane; three in space, and up to three more.
 
-        Raises InputError: there is only one axis, or one of those that draw the path turns.
+        Raises InputError: there is only one axis, or one of those that draw the path is rotary.
         """
         if len(self.axes) < PLANE_AXES:
             raise InputError(
@@ -102,8 +104,8 @@ class Machine:
 
     @property
     def turning(self) -> Machine:
-        """This machine for programs that move its extra axes alone, while x and y stand: its path axes are those after
-        z, and z where there is only one. The unit of length of such a program is that of these axes, the degree.
+        """This machine for programs that move rotary axes alone, while x and y stand. Its path axes are those after z,
+        and also z if there is only one such axis. The unit of length of such a program is the degree.
 
         Asserts that the machine has extra axes.
         """
@@ -118,7 +120,7 @@ class Machine:
 
     @property
     def path_names(self) -> tuple[str, ...]:
-        """What the axes that follow a path are called: x, y in the plane, their own names in space."""
+        """Names of the axes that follow a path: x, y in the plane, their own names in space."""
         axes = self.path_axes
         plane = len(axes) == PLANE_AXES and not self.first_axis
         return AXES[:PLANE_AXES] if plane else tuple(axis.name for axis in axes)
@@ -134,7 +136,9 @@ class Machine:
         return tuple(axis.unit for axis in self.path_axes)
 
     def require_plane(self, what: str) -> tuple[Axis, Axis]:
-        """The two axes of a path, for a command that knows no more. Raises InputError: there are more, or one."""
+        """The two axes of a path, for a command that supports the plane only. Raises InputError: there are more, or
+        one.
+        """
         axes = self.path_axes
         if len(axes) > PLANE_AXES:
             names = ", ".join(axis.name for axis in axes)
@@ -151,7 +155,7 @@ class Machine:
 
     @property
     def plane_feedforward(self) -> tuple[Feedforward, Feedforward] | None:
-        """That of the two axes of a path in the plane."""
+        """The feedforward of the two axes of a path in the plane."""
         forward = self.path_feedforward
         return None if forward is None else (forward[0], forward[1])
 
@@ -189,7 +193,7 @@ def load_machine(file: Path) -> Machine:
 def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
     """The machine that the contents of a machine file describe. Raises InputError.
 
-    file  what messages name; drive files are relative to its folder
+    file  name in messages; drive files are relative to its folder
     """
     root = Table(file, "", contents, _SECTIONS)
     bus = root.table("bus", ("bitrate", "period_us"), required=False)
@@ -241,7 +245,7 @@ def _path(root: Table, axes: tuple[Axis, ...]) -> tuple[Axis, ...]:
 
 
 def _drawn(file: Path, path: tuple[Axis, ...]) -> tuple[Axis, ...]:
-    """The axes of a path again. Raises InputError: one of those that draw it turns."""
+    """The same axes. Raises InputError: one of those that draw the path is rotary."""
     for axis in path[:SPACE_AXES]:
         if axis.turns:
             raise InputError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outputs: the channels of an I/O module that a machine file names, and where a path file switches them."""
+"""Outputs: the channels of an I/O module in a machine file, and the places at which a path file switches them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ class Channel:
         return Event(place_q40, ANALOGUE, self.number, 0, raw)
 
     def proportional(self, place_q40: int, per_mm_s: float, where: str) -> Event:
-        """The event from which on an analogue output follows the feed. Raises InputError: too large."""
+        """The event from which on an analogue output is proportional to the feed. Raises InputError: the value is too
+        large.
+        """
         gain = round(per_mm_s * self.scale * 65536)
         if abs(gain) > _GAIN_HIGH_Q16:
             raise InputError(
@@ -63,7 +65,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class CodeOutputs:
-    """Which outputs carry out M3 to M5, S and M7 to M9 of G-code; None: none.
+    """The outputs that execute M3 to M5, S and M7 to M9 of G-code; None: the word has no output.
 
     spindle          on while the spindle turns, in either direction
     spindle_reverse  on while it turns counterclockwise
@@ -82,12 +84,12 @@ class CodeOutputs:
 
     @property
     def has_spindle(self) -> bool:
-        """Whether M3, M4 and M5 do something."""
+        """Whether M3, M4 and M5 switch an output."""
         return self.spindle is not None or self.speed is not None
 
     @property
     def has_coolant(self) -> bool:
-        """Whether M7, M8 and M9 do something."""
+        """Whether M7, M8 and M9 switch an output."""
         return self.mist is not None or self.flood is not None
 
 
@@ -95,10 +97,10 @@ class CodeOutputs:
 class Outputs:
     """The I/O module of a machine (docs/reference/protocol.md 2.1), and its channels by name.
 
-    delay_ticks  by which the module's outputs are held back, so that they coincide with the axes
-    keep_at_stop, keep_at_fault, off_at_end, off_in_hold   what becomes of them then
-    vendor, product   that the module has to have; 0: any
-    codes  outputs that carry out words of G-code
+    delay_ticks  delay of the module's outputs, so that they coincide with the axes
+    keep_at_stop, keep_at_fault, off_at_end, off_in_hold   whether outputs stay on, or go off, then
+    vendor, product   identity of the module; 0: any
+    codes  outputs that execute words of G-code
     """
 
     node: int
@@ -233,7 +235,7 @@ def _channel(channels: Table, name: str) -> Channel:
 
 @dataclass(frozen=True)
 class PathOutput:
-    """One [[output]] of a path file: what becomes of the output `name`, at one of three kinds of place.
+    """One [[output]] of a path file: it switches the output `name`, at a place of one of three kinds.
 
     at_mm        arc length
     at_point     number of a point of `through`, from 0
@@ -306,8 +308,8 @@ def _path_output(table: Table, where: str, through_points: int | None) -> PathOu
 class PlacedOutput:
     """One output that switches at a place of a path.
 
-    value  true or false of a digital output; of an analogue one in its own unit; `per_mm_s`: from there on it follows
-           the feed, by so much for each mm/s
+    value  true or false for a digital output; for an analogue one in its own unit; `per_mm_s`: factor by which it is
+           proportional to the feed from there on
     """
 
     name: str
@@ -317,7 +319,7 @@ class PlacedOutput:
 
     @property
     def words(self) -> str:
-        """What becomes of it, in short."""
+        """The switched state in short."""
         if isinstance(self.value, bool):
             return "on" if self.value else "off"
         return f"{self.value:g}" if self.per_mm_s is None else f"{self.per_mm_s:g} by mm/s"
@@ -329,14 +331,14 @@ def words_of(placed: Sequence[PlacedOutput]) -> str:
 
 
 def placed_outputs(outputs: Outputs | None, events: Events) -> list[PlacedOutput]:
-    """What the events of a path switch, in their order; nothing where no outputs are known."""
+    """The outputs that the events of a path switch, in their order; empty if the machine has none."""
     if outputs is None:
         return []
     return [one for event in events.tolist() for one in placed_by(outputs, Event(*event))]
 
 
 def placed_by(outputs: Outputs, event: Event) -> list[PlacedOutput]:
-    """What one event switches."""
+    """The outputs that one event switches."""
     out = []
     place_mm = event.place_q40 * MM_PER_Q40
     for one in outputs.channels:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files: the curve, the requested feed, its limits, and the machine to run it on."""
+"""Reads path files: the curve, the requested feed, its limits, and the machine to run it on."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class PathSpec:
 class SpacePathSpec:
     """The same in space: points (n, 3) in mm, and directions (3,).
 
-    extra  (n, E): the extra axes at the points, in mm, or in degrees where they turn
+    extra  (n, E): the extra axes at the points, in mm; rotary axes in degrees
     """
 
     closed: bool
@@ -72,7 +72,7 @@ class SpacePathSpec:
 
     @property
     def turns_alone(self) -> bool:
-        """Whether the extra axes move while x, y and z rest: the unit of length is then the degree."""
+        """Whether rotary axes move while x, y and z stand: the unit of length is then the degree."""
         return bool(np.ptp(self.extra, axis=0).any()) and not np.ptp(self.points, axis=0).any()
 
 
@@ -99,7 +99,7 @@ class PathFile:
         return self.require_planar()
 
     def require_planar(self) -> PathSpec:
-        """The path in the plane. Raises PlanError for a path in space, for what knows the plane only."""
+        """The path in the plane, for callers that support the plane only. Raises PlanError: the path is in space."""
         if isinstance(self.given_path, SpacePathSpec):
             raise PlanError(
                 f"{self.file}: [path] has points [x, y, z]: this command takes a path in the plane; "
@@ -110,7 +110,7 @@ class PathFile:
 
 @dataclass(frozen=True, eq=False)
 class ListedPath:
-    """One of the paths of a file, and what happens at rest before it.
+    """One of the paths of a file, and the rest before it.
 
     dwell_ms  standstill
     stop      one of STOPS
@@ -125,7 +125,7 @@ STOPS = ("none", "program", "optional")
 LONGEST_DWELL_MS = 86_400_000
 _RESTS = ("dwell_ms", "stop")
 _OWN = ("feed", "limits")
-"""Sections that a path of a list may have for itself, in place of those of the file."""
+"""Sections that a path of a list may have in place of those of the file."""
 _SECTIONS = ("path", "feed", "limits", "machine", "output")
 _PATH = ("closed", "control_points", "through", "ends", "start_tangent", "end_tangent", "knots")
 _FEED = ("profile", "nominal_mm_s", "nominal_deg_s", "ramp_time_s", "n_c", "degree")
@@ -153,7 +153,7 @@ _FEEDS, _ACCELERATIONS, _JERKS = (
 
 
 def load_path_file(file: Path) -> PathFile:
-    """The path file `file`; raises InputError. The machine file is named, not looked for."""
+    """The path file `file`; raises InputError. Its machine file is not read."""
     if is_toolpath(file):
         raise InputError(
             f"{file}: is a toolpath, which only import, simulate, verify, report, compile, run and stream take: "
@@ -272,10 +272,10 @@ def _path(table: Table) -> PathSpec | SpacePathSpec:
 
 
 def _check_closing(table: Table, key: str, points: NDArray[np.float64]) -> None:
-    """Refuses a tail that seems meant to repeat the first points of a closed path and does not.
+    """Refuses the last points of a closed path if they nearly repeat the first ones.
 
-    It seems so where the last point, or two of the last three, lie within `_CLOSING` of the median
-    distance between consecutive points; exact repeats are left to the spline, which drops them.
+    That is: the last point, or two of the last three, are within `_CLOSING` of the median distance between consecutive
+    points. The spline drops exact repeats.
     """
     count = points.shape[0]
     legs = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -342,7 +342,7 @@ class _Lengths:
         )
 
     def _place(self, table: Table) -> str:
-        """Where a path of a list has keys for itself; "": they are there already, or there is no list."""
+        """The place for keys of a path of a list, for messages; "": they are there already, or there is no list."""
         if self.number is None or table.section not in _OWN:
             return ""
         return f" in [path.{table.section}] after its [[path]]"

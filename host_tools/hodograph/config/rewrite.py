@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Machine and drive files with other figures: everything else in them stays, comments and order too."""
+"""Writes figures into machine and drive files; all other text stays, also comments and order. Used by `hodograph
+tune`.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +34,8 @@ def rewritten(
 ) -> dict[Path, str]:
     """The texts of the machine file `output` and of drive files beside it, by path; nothing is written.
 
-    `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by` says in the drive
-    files who changed them.
+    `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by`: author of the
+    change, for a comment in the drive files.
     """
     document = _parsed(machine.file)
     tables: Any = {int(table["node"]): table for table in document["axis"]}
@@ -56,7 +58,7 @@ def rewritten(
 
 
 def drive_text(source: Path, given: Drive, wanted: Drive) -> str:
-    """A drive file with the figures of `wanted` where they are not those that it gives."""
+    """A drive file with the figures of `wanted` that differ from its own."""
     document = _parsed(source)
     for section, keys in _KEYS.items():
         for key in keys:

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Reading TOML tables with checks whose messages name the file, the key and the remedy.
 
-A `Table` knows the file it came from and the name of its section, and every getter either returns a value of
-the promised type and range or raises `InputError` with one line such as
-`path.toml: [feed] nominal_mm_s must be a number, but is "fast"`.
+A `Table` keeps its file and the name of its section. Each getter returns a value of the promised type and range, or
+raises `InputError` with one line such as `path.toml: [feed] nominal_mm_s must be a number, but is "fast"`.
 
-No schema library: the messages of msgspec name neither the value nor near keys, so this walk would stay beside it.
+No schema library is used: the messages of msgspec name neither the value nor near keys, so these getters would still be
+needed.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def read_toml(file: Path) -> dict[str, Any]:
 
 
 def is_there(file: Path) -> bool:
-    """Whether there is a file of this name. A name that no file can have, such as one that is too long, is of none."""
+    """Whether there is a file of this name; False also for a name that no file can have, such as one that is too
+    long.
+    """
     try:
         return file.is_file()
     except OSError:
@@ -188,7 +190,7 @@ class Table:
         return one, two
 
     def vector(self, key: str, count: int, *, low: float, high: float) -> tuple[float, ...]:
-        """So many (2 to 6) finite numbers from `low` to `high`."""
+        """`count` (2 to 6) finite numbers from `low` to `high`."""
         form = f"[{', '.join('abcdef'[:count])}]"
         value = self._get(key, _MISSING, form)
         if not isinstance(value, (list, tuple)) or len(value) != count:
@@ -197,7 +199,7 @@ class Table:
         return tuple(one.number(key, low=low, high=high) for one in each)
 
     def numbers(self, key: str, *, low: float = -1e9, high: float = 1e9) -> tuple[float, ...]:
-        """A list of one or more finite numbers from `low` to `high`, each another."""
+        """A list of one or more different finite numbers from `low` to `high`."""
         value = self._get(key, _MISSING, "[a, b, ...]")
         if not isinstance(value, list) or not value:
             raise self.error(key, f"must be a list of numbers, but is {_show(value)}")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The C core and simulator, called from Python: the same objects as in the controller.
 
-The compiled module is made by `make build` (build_native.py); without it every call raises a HodographError that
-says so. Arrays go in and out without copies; the interpreter lock is released during the calls.
+`make build` makes the compiled module (build_native.py); without it each call raises a HodographError with that
+message. Arrays go in and out without copies; the interpreter lock is released during the calls.
 """
 
 from ..names import KERNELS

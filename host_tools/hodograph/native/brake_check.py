@@ -10,7 +10,9 @@ from .program import NativeLimits, NativeProgram, limits_fields
 
 
 class BrakeCheck:
-    """A program that keeps the other rules of program_check, on a machine; its stop table is not read."""
+    """The proof for a program on a machine. The program has to keep the other rules of program_check; its stop table is
+    not read.
+    """
 
     def __init__(self, program: NativeProgram, limits: NativeLimits) -> None:
         ffi, lib = library()
@@ -21,7 +23,7 @@ class BrakeCheck:
 
     @property
     def looks(self) -> int:
-        """Stretches of brakes that the last proof has followed: its cost."""
+        """Number of stretches of brakes that the last proof evaluated: its cost."""
         return int(self._check.looks)
 
     def proves(self, piece: int, kind: int, codes: Sequence[int]) -> bool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Builds `_native`, the package's door to the C core and the simulator (cffi, API mode).
+"""Builds `_native`, the compiled module of this package, from the C core and the simulator (cffi, API mode).
 
     python build_native.py [--build DIR]
 

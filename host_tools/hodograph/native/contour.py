@@ -11,7 +11,7 @@ from .program import Counts, NativeProgram, counts_by_axis
 
 
 class Contour:
-    """The curve of a checked program, expanded once; asks are independent of each other."""
+    """The curve of a checked program, expanded once. Calls are independent of each other."""
 
     def __init__(self, program: NativeProgram) -> None:
         """Expand the segments; raises InputError when the program does not pass its check."""
@@ -35,9 +35,9 @@ class Contour:
         act_counts: NDArray[np.int32],
         counts_per_mm: Counts,
     ) -> NDArray[np.float64]:
-        """Contour errors in um, (n,), of encoder positions (n, A) beside commanded arc lengths (n,).
+        """Contour errors in um, (n,), of encoder positions (n, A) at commanded arc lengths (n,).
 
-        A is 2 in the plane and at least 3 in space; what is after z counts for nothing (`extra_errors`).
+        A is 2 in the plane and at least 3 in space; axes after z are not used (`extra_errors`).
         """
         ffi, lib = library()
         arc = np.ascontiguousarray(arc_length_q40_mm, dtype=np.int64)
@@ -67,7 +67,7 @@ class Contour:
         act_counts: NDArray[np.int32],
         counts_per_mm: Counts,
     ) -> NDArray[np.float64]:
-        """How far the extra axes are from where the curve has them beside the point nearest to the tool.
+        """Errors of the extra axes against the curve at its point nearest to the tool.
 
         (n, A - 3), actual less exact, in mm or degrees; arguments as above, with the counts of all axes.
         """

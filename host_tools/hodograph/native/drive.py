@@ -41,7 +41,7 @@ class DriveModel:
     def __init__(
         self, drive: Drive, *, counts_per_mm: int = 1_000_000, period_us: int = 1000
     ) -> None:
-        """Parked at 0; raises InputError when the figures are out of range."""
+        """The axis stands at 0, in standstill lock. Raises InputError: figures are out of range."""
         ffi, lib = library()
         config = ffi.new("struct drive_config *", drive_config(drive, counts_per_mm, period_us))
         self._drive = ffi.new("struct drive *")
@@ -50,7 +50,7 @@ class DriveModel:
             raise InputError(f"drive: {text(lib.drive_error_text(error))}: correct the drive file")
 
     def place(self, target_counts: int) -> None:
-        """Park the axis at a target, counts."""
+        """Puts the axis at a target, counts, in standstill lock."""
         _, lib = library()
         lib.drive_place(self._drive, target_counts)
 

@@ -13,7 +13,7 @@ from .program import NativeProgram
 
 
 class State(IntEnum):
-    """What is wanted, and whether it is reached: enum feed_state."""
+    """The commanded motion, and whether it is reached: enum feed_state."""
 
     RUNNING = 0
     STOPPING = 1
@@ -25,7 +25,7 @@ class State(IntEnum):
 
 @dataclass(frozen=True)
 class PlanStep:
-    """Where a setpoint of the plan is from: program time, override (1: 100 %), override rate per second."""
+    """The origin of a setpoint of the plan: program time, override (1: 100 %), override rate per second."""
 
     time_s: float
     override: float
@@ -52,7 +52,7 @@ class FeedCommands:
 
     @property
     def state(self) -> State:
-        """After the last tick."""
+        """The state after the last tick."""
         return State(self._lib.feed_override_state(self._feed))
 
     @property
@@ -62,15 +62,15 @@ class FeedCommands:
 
     @property
     def time_s(self) -> float:
-        """Program time (of a job: in the chunk under way) of the last tick; in a brake that of its begin."""
+        """Program time of the last tick (of a job: in the executed chunk); in a brake that of its start."""
         return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
 
     def hold(self) -> None:
-        """To rest, until resumed."""
+        """Feed hold: to rest, until resumed."""
         self._lib.feed_override_hold(self._feed)
 
     def resume(self) -> None:
-        """Back to the override."""
+        """Resumes, up to the commanded override."""
         self._lib.feed_override_resume(self._feed)
 
     def override(self, percent: int) -> None:
@@ -78,11 +78,11 @@ class FeedCommands:
         self._lib.feed_override_set(self._feed, percent)
 
     def stop(self) -> None:
-        """To rest inside the program's limits, for good."""
+        """Controlled stop: to rest inside the program's limits; the program ends."""
         self._lib.feed_override_stop(self._feed)
 
     def fault_stop(self) -> None:
-        """To rest inside the machine's limits, for good."""
+        """Fault stop: to rest inside the machine's limits; the program ends."""
         self._lib.feed_override_fault_stop(self._feed)
 
 
@@ -90,7 +90,7 @@ class FeedOverride(FeedCommands):
     """One program from its start, tick by tick. Commands take effect from the next step."""
 
     def __init__(self, program: NativeProgram, kernel: str = "fixed") -> None:
-        """Raises InputError: a program that does not pass the controller's check, no such kernel."""
+        """Raises InputError: the program does not pass the controller's check, or there is no such kernel."""
         ffi, self._lib = library()
         self._program = program  # keeps the image alive
         self._axes = program.axis_count
@@ -115,7 +115,7 @@ class FeedOverride(FeedCommands):
 
     @property
     def plan(self) -> PlanStep | None:
-        """Of the last step; None in a brake and at rest."""
+        """The origin of the setpoint of the last step; None: in a brake, or at rest."""
         if self._feed.phase != 0:
             return None
         now = self._feed.plan.now

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the compiled module; everything else in this package goes through `library`."""
+"""Finds the compiled module; all other modules of this package use `library`."""
 
 from __future__ import annotations
 

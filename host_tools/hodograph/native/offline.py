@@ -35,15 +35,16 @@ ROW = np.dtype(
         ("analogue", "<i2", (ANALOGUES,)),
     ]
 )
-"""One tick, struct offline_row of sim/offline/offline.h: setpoint k beside the drives' report for
-SYNC k+2. Axes beyond those of the program are 0."""
+"""One tick, struct offline_row of sim/offline/offline.h: setpoint k, and the drives' report for SYNC k+2. Axes beyond
+those of the program are 0.
+"""
 
 
 FAULT_KINDS = ("encoder-freeze", "encoder-jump", "saturate", "load", "setpoint-lost")
-"""What an `OfflineFault` can be, in the order of enum offline_fault_kind."""
+"""Kinds of an `OfflineFault`, in the order of enum offline_fault_kind."""
 
 ORDER_KINDS = ("hold", "resume", "override", "stop", "fault-stop")
-"""What a `OfflineOrder` can be, in the order of enum offline_order_kind."""
+"""Kinds of an `OfflineOrder`, in the order of enum offline_order_kind."""
 
 FOR_EVER = 2**32 - 1
 """`ticks` of a fault that does not end."""
@@ -51,7 +52,7 @@ FOR_EVER = 2**32 - 1
 
 @dataclass(frozen=True)
 class OfflineFault:
-    """What happens to an axis (from 0) for `ticks` ticks from tick `at` on (sim/offline/offline_fault.h).
+    """A fault of an axis (from 0) for `ticks` ticks from tick `at` on (sim/offline/offline_fault.h).
 
     `value`: bus counts of a jump, volts of a voltage limit or load. Ticks count as in
     docs/reference/protocol.md section 4.
@@ -66,7 +67,7 @@ class OfflineFault:
 
 @dataclass(frozen=True)
 class OfflineOrder:
-    """A command that setpoint `tick` is the first to follow; `percent` of an override."""
+    """A command that takes effect with setpoint `tick`; `percent` of an override."""
 
     kind: str
     tick: int
@@ -75,10 +76,11 @@ class OfflineOrder:
 
 @dataclass(frozen=True)
 class RigStop:
-    """What became of the last hold, stop or fault stop: struct offline_stop.
+    """The last hold, stop or fault stop: struct offline_stop.
 
-    tick       the first setpoint that could follow; rest_tick the first one at rest, None: there was none yet
-    bound_s    of the stop table, at the place where it was commanded
+    tick       the first setpoint after the command
+    rest_tick  the first one at rest; None: there is none yet
+    bound_s    of the stop table, at the place of the command
     from_mm, rest_mm  arc lengths of the last setpoint before it and at rest
     """
 
@@ -90,7 +92,9 @@ class RigStop:
 
 
 class OfflineSimulation:
-    """Interpolator, the drives of a program's axes and contour error; begins with these parked at the start."""
+    """Interpolator, drives of a program's axes, and contour error. The drives begin at the program's start, in
+    standstill lock.
+    """
 
     def __init__(
         self,
@@ -104,9 +108,9 @@ class OfflineSimulation:
     ) -> None:
         """Set up, with the controller's feedforward (None: none), faults, and orders by ascending tick.
 
-        counts_per_mm  of all axes, or of each (of a degree where it turns)
+        counts_per_mm  of all axes, or of each (of a degree for a rotary axis)
 
-        Raises InputError: unknown kernel, figures out of range, program not acceptable.
+        Raises InputError: the kernel is unknown, figures are out of range, or the program is not accepted.
         """
         ffi, lib = library()
         precomputed = program.precomputed(kernel)
@@ -178,7 +182,7 @@ class OfflineSimulation:
 
 
 def _gains(feedforward: Feedforward) -> dict[str, int]:
-    """Struct feedforward_gains with the figures that the controller is given; the simulation adds the rest."""
+    """Struct feedforward_gains with the figures of the controller; the simulation adds the other fields."""
     return {
         "velocity_permille": feedforward.velocity_permille,
         "torque_per_acceleration_q16": feedforward.torque_per_acceleration_q16,

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Places and derivatives by arc length on a chain of PH segments, in C (host_tools/numerics/ph_chain.h)."""
+"""Locates places on a chain of PH segments by arc length, and computes derivatives there, in C
+(host_tools/numerics/ph_chain.h).
+"""
 
 from __future__ import annotations
 

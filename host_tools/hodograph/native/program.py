@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The controller's own view of a program image: opening, checking, interpolating (firmware/core)."""
+"""Opens, checks and interpolates a program image with the controller's own code (firmware/core)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ AXES = 6
 """Greatest number of path axes, PROGRAM_AXES of core/program.h."""
 
 Counts = int | Sequence[int]
-"""Counts of a mm, the same for all axes, or of each axis (for one that turns, of a degree)."""
+"""Counts of a mm, the same for all axes, or for each axis (for a rotary axis counts of a degree)."""
 
 POINT = np.dtype(
     [
@@ -36,7 +36,7 @@ POINT = np.dtype(
 
 @dataclass(frozen=True)
 class NativeLimits:
-    """What a controller allows: struct program_limits. 0 stands for no limit, but of the travel.
+    """The limits of a controller: struct program_limits. 0, except for the travel: no limit.
 
     Those of travel and axes have one number for each path axis, travel in mm * 2^40; period in us, feed and velocity in
     um/s, acceleration in um/s^2, jerk in mm/s^3. Axes that are not given have no limits. `axis_count` is the number of
@@ -106,7 +106,7 @@ class NativeProgram:
 
     @property
     def first_axis(self) -> int:
-        """The axis of the machine that the program's first one is; more than 0: it moves rotary axes alone."""
+        """The machine's number of the program's first axis; above 0: the program moves rotary axes alone."""
         return int(self.pointer.header.flags) >> FIRST_AXIS_SHIFT
 
     @property
@@ -145,9 +145,9 @@ class NativeProgram:
         return NativeFault(int(code), int(fault.index), text(lib.program_error_text(code)))
 
     def accept_as(self, other: NativeProgram) -> None:
-        """Counts as accepted if `other` does. The caller ensures that `other` has the same integers but for a shift of
-        all points, and that the points and boxes of this program are within range and travel
-        (`program.check.leaves_range`): no other rule depends on the place.
+        """Marks the program as accepted if `other` is. The caller ensures that the integers of both differ only by a
+        shift of all points, and that points and boxes of this one are within range and travel
+        (`program.check.leaves_range`). No other rule depends on the place.
         """
         self._accepted = other._accepted
 
@@ -189,7 +189,7 @@ class NativeProgram:
         return times
 
     def points(self, kernel: str, times_q42_s: NDArray[np.uint64]) -> NDArray[np.void]:
-        """Points at any program times (ascending is quick), as an array of POINT, (n,).
+        """Points at any program times, as an array of POINT, (n,); ascending times are fastest.
 
         Raises InputError for an unknown kernel and for a program that does not pass `check`.
         """
@@ -253,7 +253,7 @@ class NativeProgram:
 
 
 def limits_fields(given: NativeLimits) -> dict[str, object]:
-    """As cffi takes a struct program_limits: axes that are not given have all travel that an image can have."""
+    """The fields of a struct program_limits for cffi. Axes that are not given have the whole travel of the format."""
     fields = {name: getattr(given, name) for name in given.__dataclass_fields__}
     for name, far in (("min_q40_mm", -(2**52)), ("max_q40_mm", 2**52)):
         fields[name] = (*fields[name], *[far] * (AXES - len(fields[name])))

@@ -28,7 +28,8 @@ class Status(IntEnum):
 class QuadraticProgram:
     """Least gradient @ x + x @ hessian @ x / 2 over low <= x <= high and least <= coefficients @ x <= most.
 
-    Unknowns are two at each of n + 1 knots, in units that make them, rows and gradient about 1. Bounds may be infinite.
+    There are two unknowns at each of n + 1 knots. Units have to make unknowns, rows and gradient about 1. Bounds may be
+    infinite.
     """
 
     gradient: Real  # (2 n + 2,)
@@ -64,8 +65,8 @@ def solve_quadratic(
     """Solves from a first guess (2 n + 2,).
 
     curvature  above 0, added to the hessian's diagonal
-    penalty    0: rows are kept. Above 0: those of each interval may be exceeded by a share of their own, which costs
-               this much
+    penalty    0: rows are kept. Above 0: cost of a share by which all rows of an interval may be exceeded; each
+               interval has its own share
     """
     ffi, lib = library()
     intervals, rows = program.hessian.shape[0], program.interval.size

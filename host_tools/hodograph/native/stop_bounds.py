@@ -11,7 +11,7 @@ from .program import NativeProgram
 
 
 def stop_bounds(program: NativeProgram, kind: int) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
-    """Times in us and distances in um (M,) from the command to rest at most, with the numbers that the program has.
+    """Bounds (M,) of time in us and distance in um from the command to rest, with the stop parameters of the program.
 
     kind  HOLD or FAULT of hodograph.program.stops
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The numbers of stops, found in C (sim/offline/stop_search.h)."""
+"""Searches stop parameters ("numbers") in C (sim/offline/stop_search.h). Used by program/stop_planning."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ FREE: tuple[float, ...] = (inf, inf)
 
 @dataclass(frozen=True)
 class StopLimits:
-    """What a brake has to keep; inf: no limit. mm and s; those of axes have one number
-    for each path axis, missing ones: no limit.
+    """The limits of a brake; inf: no limit. mm and s; limits of axes have one number for each path axis, missing ones:
+    no limit.
 
     feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
     reach                      of |velocity + time_constant * acceleration| of the axis
     caps                       (from_mm, to_mm, feed_mm_s) each
-    reach_at_pace              `reach` counts at the rate 1 only
-    rise_is_cut                a brake begins when a rising rate adds a quarter of its deceleration at most
+    reach_at_pace              `reach` applies at an override of 1 only
+    rise_is_cut                a brake begins when a rising override adds at most a quarter of its deceleration
     quick                      few numbers are tried: for long programs
     """
 
@@ -45,8 +45,8 @@ class StopLimits:
     quick: bool = False
 
     def raised(self, used: StopLimits) -> StopLimits:
-        """The greater of each limit and of what is used of it with the margin of the search. Caps, constants and what
-        the numbers never exceed stay.
+        """The greater of each limit and the program's usage of it, with the margin of the search. Caps, constants, and
+        the limits that numbers never exceed stay.
         """
 
         def greater(limit: Any, use: Any) -> Any:
@@ -87,7 +87,7 @@ class StopSearch:
         self._count = int(program.pointer.header.piece_count)
 
     def used(self, limits: StopLimits) -> StopLimits:
-        """What the program itself uses at the rate 1: the greatest value of each quantity that is limited."""
+        """The program's own usage at an override of 1: the greatest value of each limited quantity."""
         ffi, lib = library()
         given = limits_struct(limits)
         found = ffi.new("struct stop_limits *")
@@ -114,7 +114,9 @@ class StopSearch:
         return np.array([tuple(one.codes) for one in found], dtype=np.uint8).reshape(-1, 3)
 
     def mean_s(self, limits: StopLimits, codes: NDArray[np.uint8]) -> NDArray[np.float64]:
-        """Mean time to rest (M,) of stops from the instants of each piece at the rate 1, with these codes (M, 3)."""
+        """Mean time to rest (M,) of stops from the instants of each piece at an override of 1, with these codes (M,
+        3).
+        """
         found = self._found(limits, codes, np.ones(self._count, dtype=np.bool_), NO_HINTS)
         return np.array([one.mean_s for one in found])
 

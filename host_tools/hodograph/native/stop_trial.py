@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Random sequences of commands that end in a stop, beside limits and bounds (sim/offline/stop_trial.h)."""
+"""Runs random sequences of commands that end in a stop, and compares them with limits and bounds
+(sim/offline/stop_trial.h).
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from .stop_search import StopLimits, limits_struct
 
 @dataclass(frozen=True)
 class StopTrials:
-    """What trials found: struct stop_trial. Greatest shares of limits by quantity, and of bounds by kind (hold, fault).
+    """The results of trials: struct stop_trial. Greatest limit usage by quantity, and greatest share of the bound by
+    kind (hold, fault).
 
     most, longest, failed  seed and first tick of the trials with the greatest share of a limit, of a bound, and of the
                            last that failed
@@ -32,11 +35,11 @@ class StopTrials:
 
     @property
     def kept(self) -> bool:
-        """No limit and no bound was passed, no stop was late, none failed."""
+        """Whether no limit and no bound was exceeded, no stop was late, and none failed."""
         return self.within(0.0)
 
     def within(self, share: float) -> bool:
-        """The same, but limits may have been passed by this share of them."""
+        """The same, but limits may be exceeded by this share."""
         uses = max(*self.of_hold.values(), *self.of_fault.values())
         return (
             uses <= 1.0 + share
@@ -56,7 +59,7 @@ def run_trials(
     tick: int | None = None,
     kernel: str = "fixed",
 ) -> StopTrials:
-    """Spreads `trials` over the program; with `tick` only the one with this seed and first tick.
+    """Runs trials at instants spread over the program; with `tick` only the one with this seed and first tick.
 
     Raises InputError: a program that is refused, no such kernel.
     """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A job in chunks as the controller runs it, without a bus (sim/offline/stream.h)."""
+"""Runs a job in chunks with the controller's code, without a bus (sim/offline/stream.h). Used by stream/simulation and
+tests.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,10 @@ CACHE_BYTES = 8192
 
 
 class OfflineStream(FeedCommands):
-    """Chunks of docs/reference/protocol.md 1.7 in, setpoints out. Chunks and commands take effect from the next tick.
+    """Takes chunks (docs/reference/protocol.md 1.7) and gives setpoints. Chunks and commands take effect from the next
+    tick.
 
-    Memory of a chunk is given back when a later one has been taken over.
+    The memory of a chunk is freed after the takeover of a later one.
     """
 
     def __init__(
@@ -50,7 +53,9 @@ class OfflineStream(FeedCommands):
         self._lib.offline_stream_begin(self._stream, self._kernel, given, memory, size)
 
     def give(self, chunk: bytes) -> NativeFault | None:
-        """A chunk behind the newest accepted one; None: accepted. A refused one has changed nothing."""
+        """Adds a chunk after the newest accepted one. Returns why it is refused; None: it is accepted. A refused one
+        has no effect.
+        """
         ffi, lib = self._ffi, self._lib
         part = ffi.new("struct offline_part *")
         buffer = ffi.from_buffer("uint8_t[]", chunk)
@@ -68,8 +73,8 @@ class OfflineStream(FeedCommands):
     def run(self, ticks: int, *, until_rest: bool = False) -> NDArray[np.void]:
         """Up to `ticks` setpoints as an array of POINT, (n,), with arc lengths of the job.
 
-        Fewer when the job has ended or was stopped and, with `until_rest`, at the end of a tail behind which no chunk
-        is known. Raises HodographError where the interpolator fails.
+        Fewer if the job has ended or was stopped; with `until_rest` also at the end of a tail after which no chunk is
+        known. Raises HodographError: the interpolator fails.
         """
         return self.run_with_outputs(ticks, until_rest=until_rest)[0]
 
@@ -98,16 +103,16 @@ class OfflineStream(FeedCommands):
 
     @property
     def sequence(self) -> int | None:
-        """Of the chunk under way; None before the first."""
+        """Sequence number of the executed chunk; None: the first has not begun."""
         active = self._stream.active
         return None if active == self._ffi.NULL else int(active.chunk.sequence)
 
     @property
     def takeovers(self) -> tuple[int, int]:
-        """In motion, at rest."""
+        """Number of takeovers in motion, and at rest."""
         return int(self._stream.moving), int(self._stream.resting)
 
     @property
     def underruns(self) -> int:
-        """How often it has come to rest at the end of a tail."""
+        """Number of rests at the end of a tail."""
         return int(self._stream.underruns)

@@ -29,9 +29,9 @@ STOP_TICKS = 9
 END_TICKS = 2
 """Ticks until a command takes effect, and until the end of the program is a setpoint."""
 WINDOW_TICKS = 6
-"""Periods of program time in which the piece whose numbers count may still change,"""
+"""Periods of program time in which the piece whose stop parameters apply may still change,"""
 WINDOW = 8
-"""and how many pieces may begin in them."""
+"""and the number of pieces that may begin in them."""
 HALVINGS = 3
 """Each eighth of a piece is checked by itself."""
 LITTLE = 0.25

@@ -35,9 +35,9 @@ _ROWS = 12
 
 
 def inspect_dict(program: Program) -> dict[str, Any]:
-    """What a program holds, as plain numbers in mm and s, for JSON.
+    """The content of a program as plain numbers in mm and s, for JSON.
 
-    Where `first_axis` is not 0, rotary axes move alone: mm stands for their degrees.
+    If `first_axis` is not 0, rotary axes move alone, and mm stands for degrees.
     """
     pieces = program.pieces
     feed, acceleration, jerk = derivative_peaks(pieces.duration_q32_s, pieces.c_q40)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Plans the stops of a program: the numbers of its brakes, and the bounds that follow from them;
-docs/theory/numerics.md
-section 7.
+"""Plans the stops of a program: stop parameters and stop time bounds; docs/theory/numerics.md section 7. Used by
+compiler.py and stream/. In this module "numbers" are stop parameters.
 """
 
 from __future__ import annotations
@@ -26,24 +25,26 @@ from .image import Program, encode
 from .stops import DECELERATION, FAULT, HOLD, Stops, no_stops
 
 WORTH_SHARE = 0.9
-"""Parts of a piece, and numbers, have to make the bound shorter to this share of what it is without them."""
+"""A halving, and numbers, have to reduce the bound to this share of its value without them."""
 LEAST_PERIODS = 2
 """A part of a piece is not halved below this."""
 MOST_MISSES = 2
-"""Halvings without numbers, after which a part is not halved again."""
+"""Consecutive halvings without numbers, after which a part is not halved again."""
 LONGEST_PART_S = 0.08
-"""Parts that last longer are halved where the numbers of their halves are better by WORTH_GAIN."""
+"""Longer parts are halved if the numbers of their halves are better by WORTH_GAIN."""
 MOST_PARTS = 256
-"""Parts of that length; those of a longer program last longer, which bounds the time of the search."""
+"""Most parts of that length; in a longer program parts last longer, which bounds the time of the search."""
 WORTH_GAIN = 0.05
-"""Share by which finer numbers have to make the mean of the bounds of a part shorter."""
+"""Share by which the numbers of halves have to reduce the mean bound of a part."""
 LONGEST_WAIT_S = 0.04
-"""Where a hold may wait longer for a brake, the pieces that it waits in are halved down to FINE_PART_S."""
+"""Pieces in which a hold may wait longer than this for a brake are halved down to FINE_PART_S."""
 FINE_PART_S = 0.004
 MOST_FINE_PARTS = 1024
-"""Parts of that length; those of a longer program last longer, which bounds the time of the search and the image."""
+"""Most parts of that length; in a longer program parts last longer, which bounds the time of the search and the
+image.
+"""
 FINE_WORTH_SHARE = 0.97
-"""Numbers of these parts have to make the mean time to rest shorter to this share of that of waiting."""
+"""Numbers of these parts have to reduce the mean time to rest to this share of the time with waiting."""
 
 
 class LongStopError(PlanError):
@@ -69,14 +70,14 @@ class LongStopError(PlanError):
 
 @dataclass(frozen=True)
 class StopTerms:
-    """What stops have to keep beside the limits of a plan.
+    """The limits of stops in addition to those of a plan.
 
-    plants        of the axes with the volts that the path file gives them; for holds. None: any
-    drives        the same with all the volts that their drives have; for fault stops. None: any
+    plants        of the axes with the volts of the path file; for holds. None: volts are not limited
+    drives        the same with all volts of their drives; for fault stops. None: volts are not limited
     axis          limits of the machine's axes, for both
     stop_time_ms  greatest bound of a fault stop; 0: any
     quick         few numbers are tried: for long programs
-    only_fault    with `quick`: no numbers for holds are searched, enough to see where fault stops may begin
+    only_fault    with `quick`: no numbers for holds are searched
     """
 
     plants: Plants | None = None
@@ -88,10 +89,10 @@ class StopTerms:
 
 
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
-    """The program with its stop table. Feed pieces in which no numbers are found are halved, as far as that helps: a
-    place where no brake may begin, such as a narrow bend that is passed as fast as its limits allow, need not keep the
-    whole piece from braking. Long pieces are halved too: such a bend need not make all stops of a piece longer.
-    Raises LongStopError: a fault stop may take longer than `stop_time_ms`.
+    """The program with its stop table. Feed pieces without numbers are halved while that helps: in a narrow bend at its
+    limits no brake may begin, but the remainder of the piece then gets numbers. Long pieces are halved too, so that
+    such a bend does not make all stops of a piece longer. Raises LongStopError: a fault stop may take longer than
+    `stop_time_ms`.
     """
     search = StopSearch(NativeProgram(encode(program)))
     limits = [
@@ -129,8 +130,8 @@ def stop_codes(
 
 
 def without_long_stops(program: Program) -> Program:
-    """The program without stop parameters whose brakes take longer than the way on to where the next ones may begin, or
-    to its end.
+    """The program without the numbers of pieces whose brakes take longer than continuing to the next piece with
+    numbers, or to the end.
     """
     codes = program.stops.codes.copy()
     for kind in (HOLD, FAULT):
@@ -153,26 +154,26 @@ def _searched_quickly(
     found.alone = found.codes[:, FAULT].copy()
     codes = _searched(tree, limits, found, (HOLD,)).codes
     if _late(_bounded(tree, codes), terms):
-        # No hold may brake where no fault stop out of it would keep the limits as soon.
+        # No hold may brake in a piece without numbers for a fault stop during it.
         lost = (codes[:, FAULT] != found.alone).any(axis=1) & (found.alone[:, DECELERATION] != 0)
         codes[lost, HOLD], codes[lost, FAULT] = 0, found.alone[lost]
     return codes
 
 
 def _bounded(tree: _Halves, codes: NDArray[np.uint8]) -> Program:
-    """The program of a search with the bounds that its fault stops will have."""
+    """The program of a search with the bounds of its fault stops."""
     kept = codes.copy()
     kept[_better_without(_with_codes(tree.program, codes), FAULT, tree.groups), FAULT] = 0
     return with_bounds(_with_codes(tree.program, kept))
 
 
 class _Found:
-    """What a search has found so far.
+    """The results of a search so far.
 
     codes   (M, 2, 3)
-    known   which of them are final (M, 2)
-    misses  halvings (M,) without success, one after the other
-    alone   codes (M, 3) of fault stops that come out of no hold
+    known   (M, 2) which of them are final
+    misses  (M,) consecutive halvings without success
+    alone   (M, 3) codes of fault stops that are not requested during a hold
     """
 
     def __init__(self, count: int) -> None:
@@ -185,9 +186,9 @@ class _Found:
 def _searched(
     tree: _Halves, limits: Sequence[StopLimits], out: _Found, kinds: Sequence[int] = (HOLD, FAULT)
 ) -> _Found:
-    """Codes of some kinds of a program whose pieces without numbers of such a kind are halved until all have them, or
-    are too short to be halved, or MOST_MISSES halvings one after the other have found none. What has numbers keeps
-    them, so nothing is searched twice.
+    """Finds codes of some kinds. Pieces without numbers of such a kind are halved until all have them, or are too
+    short, or MOST_MISSES consecutive halvings have found none. Pieces with numbers keep them, so that none is searched
+    twice.
     """
     others = _all_but(*kinds)
     while True:
@@ -208,15 +209,15 @@ def _searched(
 
 
 def _all_but(*kinds: int) -> NDArray[np.bool_]:
-    """The kinds of stops (2,) that are none of these."""
+    """The other kinds of stops (2,)."""
     return np.array([kind not in kinds for kind in (HOLD, FAULT)])
 
 
 def _refined(
     tree: _Halves, limits: Sequence[StopLimits], codes: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Codes (M, 2, 3) of a program whose long parts with numbers are halved, where that makes stops shorter. Parts with
-    the greatest numbers of the program have nothing to gain. A half without numbers of its own keeps those of its part.
+    """Codes (M, 2, 3) of a program whose long parts with numbers are halved, if that makes stops shorter. Parts with
+    the greatest numbers of the program are not tried. A half without numbers of its own keeps those of its part.
     """
     whole, parents = codes, np.arange(tree.program.piece_count)
     longest_s = max(LONGEST_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_PARTS)
@@ -243,9 +244,9 @@ def _refined(
 def _waiting_less(
     tree: _Halves, limits: Sequence[StopLimits], codes: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """Codes (M, 2, 3) of a program whose pieces are halved to short parts where a hold waits for long: in a bend that
-    uses its limits fully a brake may begin at some instants only. Parts get numbers for holds where these are better
-    than to wait, and where numbers for a fault stop are found that may follow them.
+    """Codes (M, 2, 3) of a program whose pieces are halved to short parts where a hold waits long: in a bend at its
+    limits a brake may begin at some instants only. Parts get numbers for holds if these are better than waiting, and if
+    numbers for a fault stop during such a hold are found.
     """
     waits = _long_waits(tree.program, limits[HOLD], codes)
     longest_s = max(FINE_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_FINE_PARTS)
@@ -266,8 +267,8 @@ def _waiting_less(
 
 
 def _better_than_waiting(program: Program, limits: StopLimits) -> NDArray[np.bool_]:
-    """Parts (M,) whose numbers for holds make the mean time to rest shorter to FINE_WORTH_SHARE of that of the way on
-    into the next part; or shorter at all, where they are those of the next part.
+    """Parts (M,) whose numbers for holds reduce the mean time to rest to FINE_WORTH_SHARE of that with waiting for the
+    next part; or reduce it at all, if they are the numbers of the next part.
     """
     codes = program.stops.codes[:, HOLD]
     mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes)
@@ -286,9 +287,9 @@ def _better_than_waiting(program: Program, limits: StopLimits) -> NDArray[np.boo
 def _long_waits(
     program: Program, limits: StopLimits, codes: NDArray[np.uint8]
 ) -> NDArray[np.bool_]:
-    """Pieces (M,) in which a hold may wait for more than LONGEST_WAIT_S; not those at the end of the program, before
-    which no brake fits. A hold also waits in a piece whose numbers gain nothing: where the program brakes hard by
-    itself, no brake with a lower jerk of release can begin.
+    """Pieces (M,) in which a hold may wait for more than LONGEST_WAIT_S, except those at the end of the program, where
+    no brake fits. A hold also waits in a piece whose numbers gain nothing: while the program itself brakes hard, no
+    brake with a lower jerk of release can begin.
     """
     seconds = program.pieces.duration_s
     mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes[:, HOLD])
@@ -324,9 +325,9 @@ def _search_round(
     codes: NDArray[np.uint8],
     known: NDArray[np.bool_],
 ) -> None:
-    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may come during the brake of a hold: where
-    the codes of a hold are found now, those of the fault stop are known but for such stops. A search of few trials
-    tries them for the hold first, and keeps them if it can.
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may be requested during the brake of a hold.
+    So its codes, although known, are checked again with the codes found for the hold. A search with few trials tries
+    the codes of the fault stop for the hold first, and keeps them if possible.
     """
     search, quick = StopSearch(NativeProgram(encode(program))), limits[FAULT].quick
     hold, fault = codes[:, HOLD], codes[:, FAULT]
@@ -340,9 +341,9 @@ def _search_round(
 
 
 def _better_without(program: Program, kind: int, groups: Sequence[object]) -> NDArray[np.bool_]:
-    """Parts (M,) that had better have no numbers of a kind: those whose numbers give a bound that is longer by a tenth
-    than the way on into the next part, and all of a group (`groups`, (M,)) where numbers that differ between its parts
-    make no bound shorter by that.
+    """Parts (M,) that should have no numbers of a kind: their numbers give a bound that is a tenth longer than
+    continuing into the next part. Also all parts of a group (`groups`, (M,)) in which different numbers reduce no bound
+    by a tenth.
     """
     own_s, _, waits = own_bounds(program, kind)
     duration_s = program.pieces.duration_s
@@ -370,9 +371,9 @@ def _with_codes(program: Program, codes: NDArray[np.uint8]) -> Program:
 class _Halves:
     """A program some of whose feed pieces are halved, and their halves again.
 
-    A part is known by the piece that it is of, and its number as in a binary heap: 1 is the whole piece, 2 n and
-    2 n + 1 are the halves of n. A group is the parts of a piece, or of a half that was made `apart`: it is known by the
-    part that it began as.
+    A part is identified by its piece and its number as in a binary heap: 1 is the whole piece, 2 n and 2 n + 1 are the
+    halves of n. A group is the parts of a piece, or of a half that was made `apart`; the part that it began as
+    identifies it.
     """
 
     def __init__(self, program: Program) -> None:
@@ -382,8 +383,9 @@ class _Halves:
         self._new: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
 
     def long_enough(self) -> NDArray[np.bool_]:
-        """Which parts may be halved (M,): no two neighbours may last two periods or less
-        (docs/reference/protocol.md 1.3)."""
+        """Which parts may be halved (M,): no two consecutive ones may last two periods or less
+        (docs/reference/protocol.md 1.3).
+        """
         least_q32 = (LEAST_PERIODS * self.program.period_us << 32) // 1_000_000
         return np.asarray(self.program.pieces.duration_q32_s >= 2 * least_q32)
 
@@ -400,8 +402,8 @@ class _Halves:
         self._parts, self.groups = parts, groups
 
     def count_misses(self, misses: NDArray[np.int64], found: NDArray[np.bool_]) -> None:
-        """Counts in `misses` (M,) the last halvings of each part, one after the other, after which neither half had
-        numbers that it had not had (`found`, (M,)).
+        """Counts in `misses` (M,) the consecutive last halvings of each part that gave no half new numbers (`found`,
+        (M,)).
         """
         either = found[self._new].reshape(-1, 2).any(axis=1).repeat(2)
         misses[self._new] = np.where(either, 0, misses[self._new] + 1)
@@ -444,7 +446,7 @@ def with_bounds(program: Program) -> Program:
 
 
 def _late(program: Program, terms: StopTerms) -> bool:
-    """Whether a fault stop may take longer than it may."""
+    """Whether a fault stop may take longer than allowed."""
     return 0 < terms.stop_time_ms * 1e-3 < program.stops.worst(FAULT).time_s
 
 
@@ -455,7 +457,7 @@ def _checked(program: Program, terms: StopTerms) -> Program:
 
 
 def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
-    """What feed hold and stop keep: the limits of the path file and of the machine."""
+    """The limits of feed hold and stop: those of the path file and of the machine."""
     own = plan.limits
     machine, axes = fault_limits(plan, StopTerms(axis=terms.axis)), len(own.names)
     return replace(
@@ -476,7 +478,7 @@ def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
 
 
 def fault_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
-    """What fault stops keep: the limits of the machine."""
+    """The limits of fault stops: those of the machine."""
     machine, axes = plan.controller, len(plan.limits.names)
     free = (inf,) * axes
     return StopLimits(

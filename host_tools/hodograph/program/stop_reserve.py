@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Where a plan has to leave more of its limits free, so that stops may begin soon enough;
-docs/theory/toolpath-fitting.md section 8.
+"""Places at which a plan has to leave more of its limits free, so that stops may begin soon enough;
+docs/theory/toolpath-fitting.md section 8. Used by late_stops.py.
 
-A plan that uses the limits of the axes fully, all along a winding path, leaves a brake nothing to begin with. Short
-stretches with a reserve, some tenths of a second apart, cost little and bound the time that a stop waits. The feed
-override may not use the reserve (feed/override.py).
+If a plan uses the axis limits fully all along a winding path, no brake may begin. Short stretches with a reserve, some
+tenths of a second apart, cost little and bound the stop delay. The feed override may not use the reserve
+(feed/override.py).
 """
 
 from __future__ import annotations
@@ -23,26 +23,27 @@ from .stops import DECELERATION, FAULT
 Real = NDArray[np.float64]
 
 EVERYWHERE = (0.16, 0.25, 0.4, 0.6)
-"""Shares of all limits that are left free, one after the other: everywhere in a plan that shows where stops may begin
-then, and around such places in the plan that is used."""
+"""Shares of all limits that are left free, tried one after the other: everywhere in a plan that shows where stops may
+begin, and around such places in the plan that is used.
+"""
 
 SPREADS = (1.0, 3.0)
-"""Times the usual length: zones around places where shorter ones have not been enough."""
+"""Factor of the length of zones around places at which shorter ones were not enough."""
 
 _BEFORE_S, _BEHIND_S = 0.03, 0.015
-"""A zone around a place begins so long before it and ends so long behind it, in the time of the lowered plan."""
+"""Time from the start of a zone to its place, and from there to its end, in the time of the lowered plan."""
 
 _USED_SHARE = 0.96
-"""Of the longest stop: what the wait for a place and the stop from there may take."""
+"""Share of the longest stop for the wait for a place and the stop from there."""
 
 _OWN_SHARE = 0.4
-"""Of that time: places that need no zone are taken if they are so far from the next one."""
+"""Share of that time: places that need no zone are used if they are this far from the next one."""
 
 _SAME_S = 1e-4
-"""Places that are so close are the same one."""
+"""Places that are this close count as one."""
 
 _MOST_LATE = 0.3
-"""Share of the time: where more is late in a plan, it shows too few places where stops may begin."""
+"""Share of the time: if stops are late for more of it, the plan shows too few places where stops may begin."""
 
 
 def late_too_often(program: Program, stop_time_s: float) -> bool:
@@ -75,7 +76,7 @@ def stop_places(program: Program) -> StopPlaces:
     given = (program.stops.codes[:, FAULT, DECELERATION] > 0) & (waits == 0.0)
     time_s, place_mm = _piece_ends(program)
     count = own_s.size
-    # A piece counts that begins less than the window behind the end of the first one.
+    # Pieces that begin within the window after the end of the first one count.
     after_s = time_s[1:] + WINDOW_TICKS * program.period_us * 1e-6
     last = np.minimum(np.searchsorted(time_s[:-1], after_s), np.arange(count) + 1 + WINDOW)
     lacking = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(~given)))
@@ -90,9 +91,9 @@ def stop_places(program: Program) -> StopPlaces:
 def zones_at_places(
     program: Program, lowered: Program, stop_time_s: float, share: float, spread: float
 ) -> list[ReserveZone]:
-    """Zones around places where stops may begin in a program `lowered`, all of whose limits are lower by `share`, such
-    that one comes soon enough after each place of `program`. Its own places need no zone. Where neither has one, none
-    is returned.
+    """Zones around places at which stops may begin in `lowered`, a program with all limits lower by `share`: one soon
+    enough after each place of `program`. Places at which stops may begin in `program` need no zone. Empty, if there are
+    no such places.
     """
     own, other = stop_places(program), stop_places(lowered)
     own_time, own_place = _piece_ends(program)
@@ -112,7 +113,7 @@ def zones_at_places(
             next_s, bound_s = float(begin_s[k]), float(other.bound_s[k])
             zones.append(_zone_around(lowered, other, k, share, spread))
             continue
-        # Stops are late in any case: on with the nearest place before.
+        # Stops are late in any case: continue with the nearest place before.
         near = [
             (float(at_s[n - 1]), float(places.bound_s[n - 1]))
             for at_s, places in ((own.begin_s, own), (begin_s, other))

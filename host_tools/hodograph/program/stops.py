@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The stop table of a program: what a brake along the path may use, and how long it takes;
-docs/reference/protocol.md 1.4."""
+"""The stop table of a program: stop parameters and stop time bounds of each feed piece; docs/reference/protocol.md
+1.4.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ GREATEST_CODE = 255
 _EIGHTHS = np.array([65536, 71468, 77935, 84990, 92681, 101070, 110217, 120193], dtype=np.uint64)
 """2^16 2^(i/8), rounded down."""
 _UNITS = np.array([2.0**-18, 2.0**-24, 2.0**-18])
-"""What one unit of a mantissa is: mm/s^3, mm/s^2, mm/s^3."""
+"""The unit of a mantissa in each column: mm/s^3, mm/s^2, mm/s^3."""
 
 
 def mantissas(codes: ArrayLike) -> NDArray[np.uint64]:
@@ -41,7 +42,7 @@ def numbers(codes: ArrayLike) -> Real:
 
 
 def code_below(column: int, value: float) -> int:
-    """The greatest code of a column whose number is at most `value` (mm, s); 0: even code 1 is more."""
+    """The greatest code of a column whose number is at most `value` (mm, s); 0: that of code 1 is greater."""
     own = numbers(np.repeat(np.arange(GREATEST_CODE + 1)[:, None], 3, axis=1))[:, column]
     return int(np.searchsorted(own, value, side="right")) - 1
 
@@ -86,7 +87,7 @@ class Stops:
 
 
 def no_stops(count: int) -> Stops:
-    """A table without any brake, which no controller accepts: what a program has before its stops are planned."""
+    """A table without any brake, which no controller accepts. A program has it before its stops are planned."""
     return Stops(
         np.zeros((count, 2, 3), dtype=np.uint8),
         np.zeros((count, 2), dtype=np.uint32),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Integers of more than 64 bits, many at once: high * 2^52 + low, exact as Python's own and some 50 times as fast.
+"""Arrays of integers of more than 64 bits: high * 2^52 + low, exact like Python's own and about 50 times as fast.
 
 For sums of products of q44 numbers (docs/theory/numerics.md section 8). Products are taken of halves of 26 bits, whose
-weighted sums stay within 64 bits as long as the factors are below 2^50 in magnitude. Beyond that results are of no
-use, which is the caller's business.
+weighted sums stay within 64 bits as long as the factors are below 2^50 in magnitude. The caller ensures this; beyond it
+results are wrong.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Wide:
         return _carried(self.high - other.high, self.low - other.low)
 
     def __le__(self, other: Wide) -> Bool:
-        """By element."""
+        """The sum by element."""
         same = (self.high == other.high) & (self.low <= other.low)
         return np.asarray((self.high < other.high) | same)
 
@@ -42,17 +42,17 @@ class Wide:
         return Wide(np.asarray(self.high[index]), np.asarray(self.low[index]))
 
     def doubled(self) -> Wide:
-        """Twice each."""
+        """The doubles by element."""
         return _carried(2 * self.high, 2 * self.low)
 
     def within(self, limit: Wide) -> Bool:
-        """Whether each is from -limit to limit."""
+        """Whether each number is from -limit to limit."""
         return (self <= limit) & (
             Wide(np.zeros_like(self.high), np.zeros_like(self.low)) <= self + limit
         )
 
     def sums(self) -> Wide:
-        """The sums of the first 0, 1, … of them, one more than there are."""
+        """The sums of the first 0, 1, … n numbers, (n + 1,)."""
         middle, low = self.low >> _HALF, self.low & _LOW
         high, middle, low = (np.append(0, np.cumsum(part)) for part in (self.high, middle, low))
         middle = middle + (low >> _HALF)
@@ -62,7 +62,7 @@ class Wide:
         )
 
     def exact(self) -> NDArray[np.object_]:
-        """The same as Python's integers."""
+        """The numbers as Python's integers."""
         return np.asarray(self.high.astype(object) * (1 << _WHOLE) + self.low)
 
 
