@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Decides whether the frames of a machine fit its period, and which period, bit rate or number of drives would. Used by
-all commands that configure a machine.
+"""Decides whether the frames of a machine fit its period, and which period, bit rate or number of drives would fit.
+Used by all commands that configure a machine.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .traffic import machine_drives, messages
 
 PERIODS_US = (1000, 2000, 4000, 8000)
 BITRATES = (125_000, 250_000, 500_000, 800_000, 1_000_000)
-"""Of CiA 301, as far as a tick could ever fit."""
+"""Bit rates of CiA 301 at which a tick can fit."""
 
 
 def bus_time(
@@ -65,7 +65,7 @@ def max_drives(period_us: int, bitrate: int, choice: PdoChoice | None = None) ->
 
 
 def require_fit(machine: Machine) -> None:
-    """Raises InputError when the frames of a tick do not fit the period; the message has what would fit."""
+    """Raises InputError: the frames of a tick do not fit the period; the message names values that fit."""
     found = machine_bus_time(machine)
     if found.fits:
         return
@@ -97,7 +97,7 @@ def _advice(machine: Machine) -> str:
 
 
 def _fewer(machine: Machine) -> int:
-    """How many of the drives fit, the first ones; 0: not even one."""
+    """The number of drives, from the first, that fit; 0: not even one."""
     for count in range(len(machine.axes) - 1, 0, -1):
         if _with(machine, machine_drives(machine, count)).fits:
             return count
@@ -105,7 +105,7 @@ def _fewer(machine: Machine) -> int:
 
 
 def _less(machine: Machine, drives: Mapping[int, PdoChoice]) -> list[str]:
-    """What drives could do without, if that is enough: the first remedy that helps."""
+    """The first PDO content whose removal is enough, as a remedy."""
     remedies = (
         ("[axis.feedforward] velocity = 0", {"velocity": False}),
         ("no [axis.feedforward]", {"velocity": False, "torque": False}),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the periodic frames of a machine take of the bus's time, at worst; docs/reference/bus-time.md section 2."""
+"""Worst-case bus time of the periodic frames of a machine; docs/reference/bus-time.md section 2."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ COMPUTE_US = 55
 
 _SCALE = 1_000_000
 _SENT_WITH_SYNC = ("setpoints", "offsets", "outputs")
-"""By the controller, ready `compute_us` after the request of SYNC: while it is on the wire, as a rule."""
+"""Frames of the controller, ready `compute_us` after the request of SYNC, usually while SYNC is on the wire."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class BusTime:
 
     @property
     def plain_load_percent(self) -> float:
-        """The same without a single stuff bit and with inputs at rest: no run can be below."""
+        """Bus load without stuff bits and with constant inputs: a lower bound."""
         return self._percent(self.messages, self._least_length)
 
     def load_of(self, kind: str) -> tuple[float, float]:
@@ -57,7 +57,7 @@ class BusTime:
 
     @property
     def sync_jitter_us(self) -> float:
-        """How much the end of SYNC moves about: a frame in the way, and the stuffing of its counter."""
+        """Jitter of the end of SYNC: a frame before it, and the stuff bits of its counter."""
         sync = self.messages[0]
         if self.data_bitrate:
             stuffing = self._length(sync) - self._least_length(sync)
@@ -76,7 +76,7 @@ class BusTime:
 
     @property
     def tick_us(self) -> float:
-        """From the request of SYNC until the last frame is through that the next SYNC needs."""
+        """Time from the request of SYNC to the end of the last frame that the next SYNC needs."""
         return max(
             found
             for message, found in zip(self.messages, self.responses_us, strict=True)
@@ -85,7 +85,7 @@ class BusTime:
 
     @property
     def fits(self) -> bool:
-        """Setpoints and positions of a tick are through before the next, and all frames find time."""
+        """Whether setpoints and positions of a tick end before the next one, and all frames have a bound."""
         return self.tick_us <= self.period_us and self.load_percent < 100
 
     # Below: integers in units of 1 us / bitrate, so that bits and microseconds are both whole.
@@ -116,7 +116,7 @@ class BusTime:
         return self._blocking(sync) + self._length(sync)
 
     def _released(self, message: Message) -> int:
-        """When a setpoint can be on the bus but for those that win: after SYNC, or later, after any frame."""
+        """The earliest start of a setpoint without frames of higher priority: after SYNC, or later, after any frame."""
         return max(self._sync_end, self.compute_us * self.bitrate + self._blocking(message))
 
     def _response(self, message: Message) -> int | None:

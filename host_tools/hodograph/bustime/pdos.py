@@ -24,7 +24,7 @@ STATUSWORD, ACTUAL, VOLTS, INPUTS = 0x60410010, 0x60640020, 0x21000010, 0x60FD00
 
 @dataclass(frozen=True)
 class PdoChoice:
-    """What is mapped for a drive beside setpoint (RPDO1) and position (TPDO1)."""
+    """The PDO contents of a drive in addition to setpoint (RPDO1) and position (TPDO1)."""
 
     torque: bool = False
     """A torque offset in RPDO1."""
@@ -37,7 +37,7 @@ class PdoChoice:
 
 
 def axis_choice(machine: Machine, axis: Axis) -> PdoChoice:
-    """The choice that a machine file makes; an axis without a model is no simulated drive."""
+    """The choice of a machine file; an axis without a model is no simulated drive."""
     return PdoChoice(
         machine.torque_feedforward, machine.velocity_feedforward, axis.drive is not None
     )

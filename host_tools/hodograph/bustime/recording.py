@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The load of recorded traffic, with its real bits counted, beside the load by the model.
+"""The load of recorded traffic from its counted bits, compared with the load by the model.
 
-Time on the bus is that of the SYNCs (their number times the period), so the load of a run at full pace is that of
-the same run at its nominal pace, as far as the frames of the ticks go. Heartbeats and SDO follow the wall clock.
+Time on the bus is the number of SYNCs times the period. So the frames of ticks give the same load in a run at full pace
+as in real time. Heartbeats and SDO follow the wall clock.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ OTHER = "SDO and other"
 
 @dataclass(frozen=True)
 class KindLoad:
-    """One kind of frames: how many, bits, load in per cent beside the model's bounds (None: no model)."""
+    """One kind of frames: their number, bits, load in per cent, and the model's bounds (None: no model)."""
 
     kind: str
     frames: int
@@ -71,7 +71,7 @@ class RecordedLoad:
         }
 
     def text(self) -> str:
-        """One line for people."""
+        """The load as one line of text."""
         plain, measured, worst = self.cyclic()
         return (
             f"{measured:.1f} % at {self.bitrate} bit/s (model {plain:.1f} … {worst:.1f} %), "

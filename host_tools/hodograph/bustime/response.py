@@ -26,8 +26,9 @@ def response_time(task: Task, urgent: Sequence[Task], blocking: int, bit: int) -
 
     Releases keep their order: no jitter is longer than its period.
 
-    `urgent`: all frames that win arbitration against it; `blocking`: the longest frame that does not, which may have
-    begun just before; `bit`: one bit time.
+    urgent    all frames of higher priority
+    blocking  the longest frame of lower priority, which may have begun just before
+    bit       one bit time
     """
     if sum(_share(t) for t in (task, *urgent)) >= 1:
         return None
@@ -41,7 +42,7 @@ def response_time(task: Task, urgent: Sequence[Task], blocking: int, bit: int) -
 
 
 def _fixed_point(constant: int, ahead: int, tasks: Sequence[Task], start: int) -> int:
-    """The least t with t = constant + what `tasks` send in t + ahead."""
+    """The least t with t = constant + the time of the frames that `tasks` release within t + ahead."""
     now, following = -1, start
     while following != now:
         now = following

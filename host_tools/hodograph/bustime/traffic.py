@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The frames of a machine in steady motion: who sends what, how often (docs/reference/protocol.md section 2)."""
+"""The frames of a machine in steady motion, with their senders and periods (docs/reference/protocol.md section 2)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ HEARTBEAT_MS = 100
 SDO_BYTES = 8
 
 INHIBIT_US = 10_000
-"""Of TPDO3: it comes when an input changes, but not sooner than this after the last one."""
+"""Inhibit time of TPDO3, which is sent when an input changes."""
 
 SPORADIC = ("inputs", "outputs")
-"""Kinds of frames that may stay away altogether."""
+"""Kinds of frames that may be absent."""
 CYCLIC = ("SYNC", "setpoints", "offsets", "positions", "volts")
 """Kinds of frames that come once a tick."""
 NEEDED = ("SYNC", "setpoints", "offsets", "outputs", "positions")
-"""Those that must be through before the next SYNC: the drive latches, the controller supervises."""
+"""Kinds of frames that have to end before the next SYNC: the drive latches, the controller supervises."""
 _KINDS = {
     "RPDO1": "setpoints",
     "RPDO2": "offsets",
@@ -39,7 +39,7 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Message:
-    """A frame that comes every `period_us`, or at most so often."""
+    """A frame that is sent every `period_us`, or at most so often."""
 
     kind: str
     identifier: int
@@ -100,4 +100,4 @@ def machine_drives(machine: Machine, count: int | None = None) -> dict[int, PdoC
 
 
 SDO = Message("SDO", SDO_ID, SDO_BYTES, 0)
-"""An SDO frame, as it may come at any time: the longest that can be in the way."""
+"""An SDO frame, which may be sent at any time: the longest frame of low priority."""

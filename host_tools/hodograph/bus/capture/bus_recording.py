@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A recording of any length: frames go to a file as they come, and the setpoints in them are watched."""
+"""A recording of any length: frames go to a file as they come, with the setpoint step check. For `hodograph record`,
+`stream` and `run`.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +17,13 @@ from .setpoint_watch import SetpointWatch
 
 
 class BusRecording:
-    """A file in the making; keeps the worst step of setpoints by each rule. Call `keep` now and then.
+    """A recording in progress; keeps the worst setpoint step by each rule. Call `keep` regularly.
 
-    unhomed_starts  starts that were allowed without homing
+    unhomed_starts  number of starts that were allowed without homing
     """
 
     def __init__(self, address: BusAddress, file: Path, nodes: tuple[int, ...] | None) -> None:
-        """`nodes`: of the drives whose setpoints are watched; None: all that get some. Raises BusError, InputError."""
+        """`nodes`: drives whose setpoints are checked; None: all that get setpoints. Raises BusError, InputError."""
         self.file = file
         self.unhomed_starts = 0
         self._closed = False
@@ -35,7 +37,7 @@ class BusRecording:
             raise
 
     def keep(self) -> None:
-        """Writes what has come."""
+        """Writes the frames received since the last call."""
         self._take(self._recorder.take())
 
     def close(self) -> None:
@@ -74,16 +76,16 @@ class BusRecording:
 
     @property
     def nodes(self) -> tuple[int, ...]:
-        """That got setpoints."""
+        """Nodes that got setpoints."""
         return self._watch.seen
 
     @property
     def steps(self) -> list[Step]:
-        """The worst ones, in their order."""
+        """The worst steps, in their order."""
         return sorted(self._worst.values(), key=lambda step: step.sync)
 
     def dropped_text(self) -> str:
-        """What to say about missing frames; empty: none are."""
+        """A message about missing frames; empty: none are missing."""
         if not self.dropped:
             return ""
         return (

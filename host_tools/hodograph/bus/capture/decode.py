@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""From recorded frames to ticks: what was set, what was answered, by SYNC.
+"""From recorded frames to ticks: setpoints and answers by SYNC.
 
 Order on the bus (docs/reference/protocol.md section 2): SYNC j, then the setpoints of tick j; the drives
 answer SYNC j with TPDO1
 and TPDO2, which may come before or after the setpoints, on a late host even after SYNC j+1, but never out of
-order. So the n-th answer belongs to the n-th SYNC; what sits between two SYNCs only checks that.
+order. So the n-th answer belongs to the n-th SYNC; the answers between two SYNCs only confirm that.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ SYNC_OVERFLOW = 240
 _UNHOMED_START = bytes([0x2F, 0x55, 0x20, 0x01, 0x01])
 """Expedited write of 1 to 0x2055 sub 1 (docs/reference/protocol.md section 3.3)."""
 _LONGEST_LAG = 250
-"""SYNCs by which an answer may be late: a slow host delays drives, but frames keep their order."""
+"""Greatest lateness of an answer in SYNCs: a slow host delays drives, but frames keep their order."""
 _LEAD_IN = 200
-"""SYNCs at both ends of a recording (standstill) within which lateness shows itself or is made up for."""
+"""SYNCs at both ends of a recording (standstill) in which lateness becomes visible or disappears."""
 
 Int32 = NDArray[np.int32]
 
@@ -37,8 +37,8 @@ Int32 = NDArray[np.int32]
 class Ticks:
     """Rows by SYNC, columns by axis: targets sent after SYNC j, answers to SYNC j.
 
-    `volts_mv` is None when the drives send no TPDO2. Only SYNCs of which everything surely came are here:
-    up to the last one that was answered in time, since a lost frame shows as lateness for ever.
+    `volts_mv` is None when the drives send no TPDO2. Only SYNCs with certainly complete answers are included: up to the
+    last one that was answered in time, since a lost frame appears as permanent lateness.
     """
 
     targets: Int32
@@ -53,7 +53,7 @@ class Ticks:
 
 
 def unhomed_starts(frames: Frames, controller_node: int | None = None) -> int:
-    """How many starts were allowed although axes were not homed, as written to a controller; None: to any."""
+    """Number of starts that were allowed with axes not homed, as written to this controller; None: to any."""
     low = SDO_REQUEST if controller_node is None else SDO_REQUEST + controller_node
     high = SDO_REQUEST + 0x7F if controller_node is None else low
     asked = (frames["id"] >= low) & (frames["id"] <= high)
@@ -102,8 +102,8 @@ def decode_offsets(frames: Frames, node: int, count: int) -> tuple[Int32, NDArra
 
 
 def decode_outputs(frames: Frames, outputs: Outputs) -> NDArray[np.void]:
-    """What the I/O module's outputs are from each SYNC on: the last frame before it; records of "digital" and
-    "analogue" as `native.ROW` has them. All off before the first frame.
+    """The outputs of the I/O module from each SYNC on, by the last frame before it; records of "digital" and "analogue"
+    as in `native.ROW`. All are off before the first frame.
     """
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     found = np.zeros(sync_at.size, dtype=[("digital", "<u2"), ("analogue", "<i2", (ANALOGUES,))])
@@ -136,12 +136,12 @@ def _check_counters(counters: NDArray[np.int64]) -> None:
 def _by_sync(
     frames: Frames, sync_at: NDArray[np.intp], identifier: int, what: str
 ) -> NDArray[np.uint8]:
-    """Data (n, 8) of the frames with this identifier, row j belonging to SYNC j, as far as that is sure."""
+    """Data (n, 8) of the frames with this identifier, row j belonging to SYNC j, up to the last certain one."""
     at = np.flatnonzero(frames["id"] == identifier)
     interval = np.searchsorted(sync_at, at) - 1
     at, interval = at[interval >= 0], interval[interval >= 0]
     lag = interval - np.arange(at.size)
-    # Late answers to SYNCs before the recording shift all others, which shows when the drive has caught up.
+    # Late answers to SYNCs before the recording shift all others, which becomes visible when an answer is in time.
     foreign = -int(lag[:_LEAD_IN].min(initial=0))
     at, interval = at[foreign:], interval[foreign:]
     lag = interval - np.arange(at.size)
@@ -151,7 +151,7 @@ def _by_sync(
     late = np.flatnonzero(lag > _LONGEST_LAG)
     if late.size:
         raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
-    on_time = np.flatnonzero(lag == 0)  # a lost frame is never made up for
+    on_time = np.flatnonzero(lag == 0)  # after a lost frame no answer is in time
     sure = int(on_time[-1]) + 1 if on_time.size else 0
     if sure < sync_at.size - _LEAD_IN:
         raise RunError(f"{what}: no frame for SYNC {sure}: the recording is incomplete")

@@ -2,8 +2,8 @@
 """Receives frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
 
 For `recorder` and the live page. One system call takes up to about a thousand frames. The frames stay raw structures of
-linux/can.h, which numpy reads. Each frame has the time at which the kernel received it (SO_TIMESTAMP) and the number of
-frames that the kernel dropped for this socket (SO_RXQ_OVFL). A local bus sends the time with each frame.
+linux/can.h, which numpy reads. Each frame has the time at which the Linux kernel received it (SO_TIMESTAMP) and the
+number of frames that it dropped for this socket (SO_RXQ_OVFL). A local bus sends the time with each frame.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from .frames import FRAME_DTYPE, RECORD_DTYPE, Frames
 __all__ = ["BATCH", "FRAME_DTYPE", "RECORD_DTYPE", "FrameBatch", "Frames", "open_socket"]
 
 BATCH = 1024
-"""Packets of a call, at most: of one frame each, on a local bus of up to MOST_FRAMES."""
+"""Most packets of a call. A packet has one frame, on a local bus up to MOST_FRAMES."""
 _LOCAL_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_ns", "<u8")])
 _CONTROL_BYTES = 64
 _BUFFER_BYTES = 64 * 2**20
@@ -134,7 +134,7 @@ class FrameBatch:
         )
 
     def receive(self, descriptor: int) -> int:
-        """Fills the buffers with what is there; the number of packets, 0 when there is none. Raises OSError."""
+        """Fills the buffers with the waiting packets; returns their number. Raises OSError."""
         count = int(self._call(descriptor, self._messages, BATCH, _MSG_DONTWAIT, None))
         if count < 0:
             error = ctypes.get_errno()
@@ -161,14 +161,14 @@ class FrameBatch:
         return records
 
     def dropped(self, last: int) -> int | None:
-        """The kernel's drop count that came with packet `last`; None when none did."""
+        """The drop count of the Linux kernel that came with packet `last`; None: none came."""
         for kind, data in self._words_beside(last):
             if kind == _SO_RXQ_OVFL:
                 return int(struct.unpack_from("<I", data)[0])
         return None
 
     def _stamps_us(self, count: int) -> NDArray[np.int64]:
-        """When the kernel got each of the first `count` frames."""
+        """The times at which the Linux kernel received the first `count` frames."""
         stamps = self._stamps[:count]
         times = stamps["seconds"] * 1_000_000 + stamps["microseconds"]
         is_stamp = (stamps["level"] == socket.SOL_SOCKET) & (stamps["kind"] == _SO_TIMESTAMP)
@@ -187,5 +187,5 @@ class FrameBatch:
             start += (length + 7) & ~7
 
     def rearm(self, count: int) -> None:
-        """Makes the control buffers of the first `count` messages whole again."""
+        """Restores the control buffers of the first `count` messages."""
         self._control_lengths[:count] = _CONTROL_BYTES

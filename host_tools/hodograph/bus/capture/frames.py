@@ -15,4 +15,4 @@ RECORD_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_us", "<i8")])
 """A frame and when it came: microseconds since 1970 (UTC)."""
 
 Frames = NDArray[np.void]
-"""An array of `RECORD_DTYPE`, in the order of the bus. Who needs no times takes `FRAME_DTYPE` as well."""
+"""An array of `RECORD_DTYPE`, in the order of the bus; where times are not needed, also of `FRAME_DTYPE`."""

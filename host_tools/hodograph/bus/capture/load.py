@@ -21,7 +21,7 @@ from .recorder import Recorder
 
 LEAST_LISTEN_S = 0.25
 LONGEST_S = 1.0
-"""How long captured frames are kept when nobody asks."""
+"""How long captured frames are kept for the next call."""
 
 _CLASSES = (
     ("NMT", 0x000, 0x000),
@@ -53,7 +53,7 @@ class ClassLoad:
 
 @dataclass(frozen=True)
 class BusLoad:
-    """What was on the bus during `seconds`; classes that did not show up are left out."""
+    """The load of a bus during `seconds`; classes without frames are left out."""
 
     bitrate: int
     seconds: float
@@ -94,7 +94,7 @@ def _kinds(identifiers: NDArray[np.uint32]) -> NDArray[np.int64]:
 
 
 class LoadCapture:
-    """Bus load of captured frames since the last question."""
+    """Bus load of the frames captured since the last call."""
 
     def __init__(self, bitrate: int) -> None:
         self._bitrate = bitrate
@@ -115,7 +115,7 @@ class LoadCapture:
         self._last_s = last_s
 
     def measure(self) -> BusLoad | None:
-        """From the last frame of the last question to the last one received; None: that is no time."""
+        """The load from the last frame of the last call to the last one received; None: no time passed between them."""
         if self._since_s is None or self._last_s <= self._since_s:
             return None
         load = bus_load(np.concatenate(self._heard), self._last_s - self._since_s, self._bitrate)
@@ -125,7 +125,7 @@ class LoadCapture:
 
 
 class LoadMeter:
-    """Listens to a bus; a context manager. `clock` is that of a connection to it. Raises BusError."""
+    """Measures the load of a bus; a context manager. `clock` is that of a connection to it. Raises BusError."""
 
     def __init__(self, address: BusAddress, bitrate: int, clock: Clock = REAL_CLOCK) -> None:
         self._clock = clock

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Recording every frame of a bus, fast enough for a bus at full pace.
+"""Records each frame of a bus, fast enough for a full bus.
 
-A thread takes frames in batches (frame_batch). On a local bus it takes no part in virtual time, and has everything
-that was sent up to the present instant of whoever asks.
+A thread takes frames in batches (frame_batch). On a local bus it is no participant in virtual time. A call returns all
+frames that were sent up to the present instant of the caller.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ class Recorder:
 
     @property
     def dropped(self) -> int:
-        """Frames that the kernel dropped because nobody took them in time."""
+        """Number of frames that the Linux kernel dropped because they were not taken in time."""
         return self._dropped
 
     def stop(self) -> None:
@@ -83,20 +83,19 @@ class Recorder:
         self._socket.close()
 
     def frames(self) -> Frames:
-        """Everything recorded (`RECORD_DTYPE`), in the order of the bus, less what `take` took away.
-
-        Raises BusError when the bus went away.
+        """All recorded frames (`RECORD_DTYPE`), in the order of the bus, without those that `take` returned. Raises
+        BusError: the bus has ended.
         """
         self._check()
         return _joined(list(self._chunks))
 
     def so_far(self) -> Frames:
-        """Everything that was on the bus up to now, as `frames`; the recording goes on."""
+        """All frames up to now, as `frames`; the recording continues."""
         self._catch_up()
         return self.frames()
 
     def take(self) -> Frames:
-        """What came since the last call, up to now; it is forgotten here. Raises BusError as `frames`."""
+        """The frames since the last call, which are no longer kept here. Raises BusError as `frames`."""
         self._catch_up()
         self._check()
         chunks = self._chunks[: len(self._chunks)]  # the thread appends only
@@ -104,7 +103,7 @@ class Recorder:
         return _joined(chunks)
 
     def _catch_up(self) -> None:
-        """Waits until the thread has found the socket empty, having begun to look after now."""
+        """Waits until the thread has found the socket empty in a check that began after this call."""
         wanted = self._emptied + 2
         while self._emptied < wanted and self._thread.is_alive():
             time.sleep(_PAUSE_S / 2)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""No setpoint jumps: every step that a recording holds is one that the controller's limits allow.
+"""The setpoint step check: each setpoint step in a recording has to keep the controller's limits.
 
-Checked is what a drive acts on: a target that follows another one, both sent with controlword bits 0 to 3 set, to a
-drive that has said it is in Operation enabled. (Before that, targets follow the axis; while homing, which controlword
-bit 4 shows, drives ignore them.) With T the period, d = r_k - r_(k-1) the step of the plane's axes in counts:
+It checks the targets that a drive executes: a target after another one, both sent with controlword bits 0 to 3 set, to
+a drive that has reported Operation enabled. (Before that, targets follow the axis. During homing, with controlword bit
+4, drives ignore them.) With T the period, d = r_k - r_(k-1) the step of the plane's axes in counts:
 
 speed         |d| <= v T. A chord is never longer than its arc, so only rounding is added: half a count a
               coordinate at either end, at most sqrt(2) counts, and as much for the kernel's own error.
@@ -20,12 +20,11 @@ axis          Of each axis by itself, as far as the limits of the machine's axes
               (docs/guides/limits.md), and
               a difference may reach over two. A recording that begins in motion shows no jerk before its third step.
 
-Where a SYNC passed without a setpoint the drive stood at its target, and the next setpoint is the step of one period:
-that is what the drive makes of it. Where a SYNC is missing, the drive stood as well, and acts on the last of the
-setpoints that came: their steps together are the step of one period. One garbled statusword in a row does not hide a
-drive that follows. A path in space is drawn by three axes, with sqrt(3) in place of sqrt(2). Axes beyond those that
-draw the path are checked by their own limits, one by one; those that hold their position for speed and acceleration
-too.
+If a SYNC passed without a setpoint, the drive stood at its target, and it executes the next setpoint within one period.
+If a SYNC is missing, the drive stood too, and executes the last of the setpoints that came: their steps together are
+the step of one period. A single garbled statusword does not hide a drive that follows. Three axes draw a path in space,
+with sqrt(3) in place of sqrt(2). Axes that do not draw the path are checked one by one by their own limits; axes that
+hold their position also for speed and acceleration.
 """
 
 from __future__ import annotations
@@ -49,13 +48,13 @@ SPEED, ACCELERATION, TURN = "speed", "acceleration", "turn"
 AXIS_RULES = ("axis speed", "axis acceleration", "axis jerk")
 """By the number of differences less one."""
 _DRAWN = (2, 3)
-"""So many axes may draw a path: in the plane, in space."""
+"""Number of axes that draw a path: in the plane, in space."""
 _ROUNDING_COUNTS = 2 * math.sqrt(2.0)
 _ENABLED, _HOMING = 0x0F, 0x10
 _STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
 _LARGEST_TURN = 0.5
 _JOINTS = 1.01
-"""Times the limits of acceleration and jerk of an axis."""
+"""Factor on the limits of acceleration and jerk of an axis."""
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
@@ -67,15 +66,15 @@ AxisSteps = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class StepLimits:
-    """In counts per period and per period squared; infinite where there is no limit."""
+    """Limits in counts per period and per period squared; infinite: no limit."""
 
     speed: float
     acceleration: float
     normal: float = math.inf
     axes: tuple[AxisSteps, ...] = ()
-    """Of each axis; none where they are not known."""
+    """Limits of each axis; empty: not known."""
     path: int = 2
-    """So many axes follow a path: the first three at most draw it."""
+    """Number of axes that follow a path; at most the first three draw it."""
 
     def of(self, rule: str, group: tuple[int, ...]) -> float:
         """What a rule allows to this group of axes, which count from 1."""
@@ -92,7 +91,7 @@ class StepLimits:
 
 @dataclass(frozen=True)
 class Step:
-    """A step by one rule: what was found, what of it is rounding and the bow of the path."""
+    """A step by one rule: the found value, and the parts of it for rounding and for the curvature of the path."""
 
     sync: int
     axes: tuple[int, ...]
@@ -104,11 +103,11 @@ class Step:
 
     @property
     def needed(self) -> float:
-        """The least limit that allows it."""
+        """The least limit that allows the step."""
         return self.found_counts - self.aside_counts
 
     def jump(self, limits: StepLimits) -> Jump:
-        """What is said of it where it breaks the limit."""
+        """The message for a step that breaks the limit."""
         allowed = limits.of(self.rule, self.group) + self.aside_counts
         return Jump(self.sync, self.axes, self.rule, self.found_counts, allowed)
 
@@ -198,13 +197,13 @@ def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list
 
 
 def worst_steps(frames: Frames, nodes: Sequence[int], syncs: range) -> list[Step]:
-    """Of each rule and each group of axes the step at one of these SYNCs that comes nearest to its limit."""
+    """For each rule and each group of axes, the step at one of these SYNCs that comes nearest to its limit."""
     steps = (measured.worst(syncs) for measured in _measured(frames, nodes))
     return [step for step in steps if step is not None]
 
 
 def find_rough_starts(frames: Frames, nodes: Sequence[int], tolerance_counts: int) -> list[str]:
-    """Where a drive began to follow at a target that is not where it said it was."""
+    """Steps of drives that began to follow at a target other than their reported position."""
     found = []
     for node in nodes:
         at, control, target = _setpoints(frames, node)
@@ -222,7 +221,7 @@ def find_rough_starts(frames: Frames, nodes: Sequence[int], tolerance_counts: in
 
 
 def _setpoints(frames: Frames, node: int) -> tuple[NDArray[np.intp], NDArray[np.uint16], Float]:
-    """Of one node: places in the recording, controlwords, targets."""
+    """The setpoints of one node: places in the recording, controlwords, targets."""
     at = np.flatnonzero((frames["id"] == RPDO1 + node) & (frames["length"] >= 6))
     control = np.ascontiguousarray(frames["data"][at, 0:2]).view("<u2")[:, 0]
     return at, control, _integers(frames["data"][at])
@@ -258,7 +257,7 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
         commanded = _commanded(control)
         follows = commanded & _enabled(frames, node, at)
         valid = follows[1:] & commanded[:-1]
-        # Two setpoints for one SYNC: the larger step counts, or both together, which the drive makes in one period.
+        # Two setpoints for one SYNC: the larger step counts, or both together, which the drive executes in one period.
         steps.followed[sync[1:][valid], axis] = True
         step = np.where(valid, np.diff(target), 0.0)
         larger = np.argsort(np.abs(step), kind="stable")
@@ -275,7 +274,7 @@ def _steps(frames: Frames, sync_at: NDArray[np.intp], nodes: Sequence[int]) -> _
 
 
 def _commanded(control: NDArray[np.uint16]) -> Bool:
-    """Commanded to follow, in no stretch of enabled setpoints that homes."""
+    """Whether each setpoint commands to follow, outside of homing."""
     enabled = (control & _ENABLED) == _ENABLED
     stretch = np.cumsum(~enabled)
     homing = np.unique(stretch[enabled & ((control & _HOMING) != 0)])
@@ -296,7 +295,7 @@ def _enabled(frames: Frames, node: int, at: NDArray[np.intp]) -> Bool:
 
 @dataclass(frozen=True)
 class _Measured:
-    """One rule for one group of axes, by SYNC from the second on: what it limits, how much it leaves aside."""
+    """One rule for one group of axes, by SYNC from the second on: the limited value, and its allowance."""
 
     rule: str
     axes: tuple[int, ...]
@@ -343,7 +342,7 @@ def _measured(frames: Frames, nodes: Sequence[int]) -> list[_Measured]:
 
 
 def _axis_rules(steps: _Steps, axes: tuple[int]) -> list[_Measured]:
-    """Of one axis: its differences. Before it followed it stood."""
+    """The differences of one axis. Before it followed, it stood."""
     counts = np.where(steps.followed, steps.counts, 0.0)[:, 0]
     followed, known = steps.followed[1:], ~steps.guessed[:, 0]
     out = []
@@ -360,7 +359,7 @@ def _axis_rules(steps: _Steps, axes: tuple[int]) -> list[_Measured]:
 
 
 def _rules(steps: _Steps, axes: tuple[int, ...]) -> list[_Measured]:
-    # The step before the first followed one is no step: the axis stood.
+    # There is no step before the first followed one: the axis stood.
     followed = steps.followed
     both = followed[1:] & followed[:-1]
     now, before = steps.counts[1:], np.where(both, steps.counts[:-1], 0.0)

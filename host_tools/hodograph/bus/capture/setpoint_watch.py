@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The rules of setpoint_check for frames that come one after another: in windows that overlap."""
+"""The setpoint step check for frames as they come, in windows that overlap; used by bus_recording."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .frames import Frames
 from .setpoint_check import Jump, Step, StepLimits, worst_steps
 
 WINDOW = 1000
-"""SYNCs that are checked together; each verdict has a quarter of them before it and after it."""
+"""SYNCs that are checked together. A quarter of them at both ends only serve as context."""
 _STEP, _EDGE = WINDOW // 2, WINDOW // 4
 _MOST_FRAMES = 100_000
-"""Kept without a SYNC."""
+"""Most frames kept without a SYNC."""
 _NODES = 0x7F
 
 
 class SetpointWatch:
-    """`nodes` are those of the axes in their order; None: whoever gets setpoints, by node number."""
+    """`nodes` are those of the axes in their order; None: all that get setpoints, by node number."""
 
     def __init__(self, nodes: Sequence[int] | None) -> None:
         self._nodes = None if nodes is None else tuple(nodes)
@@ -29,7 +29,7 @@ class SetpointWatch:
         self._frame_count = 0
         self._sync_count = 0
         self._before = 0
-        """SYNCs that came before those that are kept."""
+        """Number of SYNCs before those that are kept."""
         self._seen: set[int] = set()
 
     @property
@@ -38,7 +38,7 @@ class SetpointWatch:
         return tuple(sorted(self._seen))
 
     def feed(self, frames: Frames) -> list[Step]:
-        """Of each window that is complete the worst step by each rule; SYNCs count from the first one fed."""
+        """The worst step by each rule in each complete window; SYNCs count from the first one fed."""
         relevant = frames[_is_relevant(frames)]
         self._kept.append(relevant)
         self._frame_count += relevant.size
@@ -59,7 +59,7 @@ class SetpointWatch:
         return found
 
     def close(self) -> list[Step]:
-        """The rest at the end."""
+        """The worst steps of the remaining frames at the end."""
         if not self._kept:
             return []
         kept = np.concatenate(self._kept)

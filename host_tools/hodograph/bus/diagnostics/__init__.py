@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""States, faults and refusals in words."""
+"""Diagnostics texts: states, faults and refusals in words, with remedies. Pure functions."""

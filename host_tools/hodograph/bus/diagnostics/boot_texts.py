@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Why the boot of the drives does not end (object 0x2025), in words."""
+"""Texts for the reason why the configuration of the drives does not end (object 0x2025)."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ _PDO_REMEDY = (
 
 @dataclass(frozen=True)
 class BootTrouble:
-    """What keeps the controller in boot."""
+    """The reason why the controller stays in boot."""
 
     node: int
     index: int
@@ -107,9 +107,9 @@ class BootTrouble:
 def boot_trouble(
     node: int, place: int, abort_code: int, value: int, expected: int | None = None
 ) -> BootTrouble | None:
-    """The content of 0x2025 with words for it; None when nothing is wrong.
+    """The content of 0x2025 with its text; None: there is no trouble.
 
-    `place` is index << 8 + sub; `expected`: what should be there, where that is known.
+    `place` is index << 8 + sub; `expected`: the right value, if known.
     """
     if node == 0:
         return None

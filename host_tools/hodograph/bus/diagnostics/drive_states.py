@@ -41,14 +41,14 @@ def state_of_statusword(statusword: int) -> str:
 
 
 def state_of_number(number: int) -> str:
-    """The state in object 0x2026: 0 not there, else enum cia402_state + 1."""
+    """The state in object 0x2026: 0: missing, else enum cia402_state + 1."""
     if number == 0:
         return NOT_THERE
     return DRIVE_STATES[number - 1] if number <= len(DRIVE_STATES) else f"unknown ({number})"
 
 
 def inputs_on(inputs: int) -> tuple[str, ...]:
-    """Names of the digital inputs (0x60FD) that are on; the manufacturer's, from bit 16, by number."""
+    """Names of the digital inputs (0x60FD) that are on; those of the manufacturer, from bit 16 on, by number."""
     named = [name for bit, name in INPUTS if inputs & bit]
     named += [f"input {bit - 16}" for bit in range(16, 32) if inputs >> bit & 1]
     return tuple(named)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Emergency error codes (CiA 301 table 26, CiA 402-2, and our own 0xFFxx) in words: what it is, and what to do.
-
-When that is done, `hodograph reset` resets the fault.
+"""Texts of emergency error codes (CiA 301 table 26, CiA 402-2, and 0xFFxx of this project): the fault and its remedy.
+After the remedy, `hodograph reset` resets the fault.
 
 Single codes come before the classes that contain them. The codes that the controller (firmware/app/machine/fault.h)
 and the simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.
@@ -255,7 +254,7 @@ _CLASSES = (
 
 
 def known_code(code: int) -> bool:
-    """Whether this very code has words of its own."""
+    """Whether exactly this code has a text."""
     return code in _SINGLE
 
 

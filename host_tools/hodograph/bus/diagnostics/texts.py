@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words for the codes of the controller's objects (docs/reference/protocol.md section 3)."""
+"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ STATES = {
     10: "quick stop",
 }
 TIMINGS = {0: "kept", 1: "not permitted", 2: "not permitted, accepted"}
-"""Object 0x2040: whether the computer that runs the controller lets ticks come in time."""
+"""Object 0x2040: whether the operating system of the controller allows ticks in time."""
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
 CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}

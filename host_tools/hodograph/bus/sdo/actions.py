@@ -27,11 +27,11 @@ from .objects import (
 )
 
 BOOT_S = 10.0
-"""Patience for drives to be found and configured, switched on or off."""
+"""Longest wait until drives are found and configured, switched on or off."""
 
 
 def hold_reached(controller: Controller, wait_s: float = math.inf) -> bool:
-    """Waits for the standstill on the path that HOLD commanded; false when the program had ended before."""
+    """Waits for the standstill that HOLD commanded; False: the program ended before."""
     return controller.wait_for((HELD, READY), wait_s) == HELD
 
 
@@ -40,7 +40,7 @@ def home(
 ) -> list[int]:
     """Homes the axes that the configuration names, switching drives at standstill off first; their nodes.
 
-    Raises RunError when homing was broken off: a fault, or a stop by others.
+    Raises RunError: a fault, or a stop by another client, ended the homing.
     """
     state = controller.state()
     if state == READY:
@@ -59,18 +59,17 @@ def home(
 
 
 def quick_stop_over(controller: Controller, wait_s: float = BOOT_S) -> None:
-    """Waits until the drives, which QUICK_STOP made brake by their own ramps, are off.
-
-    Raises RunError when the controller is in a fault then.
+    """Waits until the drives are off after QUICK_STOP, which makes them brake by their own ramps. Raises RunError: the
+    controller is in a fault then.
     """
     controller.wait_for((OFF, BOOT), wait_s)
 
 
 def configure_anew(controller: Controller, wait_s: float = BOOT_S) -> None:
-    """Finds the drives and writes their whole configuration, without a fault: what another node has written is
-    overwritten.
+    """Finds the drives and writes their whole configuration, also without a fault. This overwrites values of another
+    node.
 
-    Drives at standstill are switched off. Raises RefusedError while axes move, BusError when drives are missing.
+    Drives at standstill are switched off. Raises RefusedError: axes move. Raises BusError: drives are missing.
     """
     controller.require_standing()
     if controller.state() == READY:
@@ -81,10 +80,9 @@ def configure_anew(controller: Controller, wait_s: float = BOOT_S) -> None:
 
 
 def reset(controller: Controller, wait_s: float = BOOT_S) -> bool:
-    """Resets the present fault; false when there is none. Returns when the drives are configured again.
+    """Resets the present fault; False: there is none. Returns when the drives are configured again.
 
-    A fault that still brakes is waited for. Raises RunError when the fault comes back, BusError when drives are
-    missing.
+    Waits while a fault still brakes. Raises RunError: the fault comes back. Raises BusError: drives are missing.
     """
     if controller.state() != FAULT_STATE:
         return False

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Taking turns at the one SDO channel of a controller, among the connections of one computer.
+"""The SDO channel lock: connections of one computer use the one SDO channel of a controller one after the other.
 
-CANopen gives a server one default channel and assumes one client. `hodograph status` beside `hodograph run` is two; a
-lock file per bus and node lets them alternate, transfer by transfer. Whoever gets the lock from
-another is informed, to let pass what was still on its way to the other. Two connections of one process count as
-different clients too.
+CANopen gives a server one default channel and assumes one client. `hodograph status` during `hodograph run` is a second
+client. A lock file per bus and node lets them alternate, transfer by transfer. A client that gets the lock from another
+one is informed, so that it can discard answers to the other. Two connections of one process count as different clients.
 """
 
 from __future__ import annotations
@@ -23,17 +22,17 @@ from ..address import BusAddress
 from ..clock import REAL_CLOCK, Clock
 
 TURN_WAIT_S = 30.0
-"""Patience for a turn where nothing else is given: mid-way in a job, giving up would cost more than waiting."""
+"""Default wait for the lock. It is long, since giving up within a job would cost more than waiting."""
 _LOOK_S = 0.002
 _SIGN_BYTES = 8
 LOCK_FOLDER = Path("/run/lock")
 
 
 class Turns:
-    """The lock of one bus and node. Without writable lock files every turn is granted at once.
+    """The lock of one bus and node. Without writable lock files it is always granted at once.
 
-    A second lock is held while waiting for the first: whoever gave back the turn can't take it again before those
-    who wait, however quickly it asks.
+    A second lock is held while waiting for the first. So a client that released the lock cannot get it again before
+    those that wait.
     """
 
     def __init__(self, address: BusAddress, node: int, clock: Clock = REAL_CLOCK) -> None:
@@ -48,15 +47,14 @@ class Turns:
                 self._files.append(_open(_folder(address) / f"{name}.{ending}"))
 
     def close(self) -> None:
-        """Gives the lock files back."""
+        """Closes the lock files."""
         while self._files:
             os.close(self._files.pop())
 
     @contextmanager
     def turn(self, wait_s: float = TURN_WAIT_S) -> Iterator[bool]:
-        """The channel is ours inside; true when another had it before. Turns may be nested.
-
-        Raises BusyError when others keep the channel for longer than `wait_s`.
+        """Holds the lock inside the context; True: another client had it before. May be nested. Raises BusyError: other
+        clients keep the lock for longer than `wait_s`.
         """
         if len(self._files) < 2 or self._depth:
             yield False
@@ -91,7 +89,9 @@ class Turns:
 
 
 def _folder(address: BusAddress) -> Path:
-    """Where all users of this bus, and no others, find the same files; those of a local bus go with its folder."""
+    """The folder where all users of this bus, and no others, find the same files; that of a local bus is removed with
+    the bus.
+    """
     if address.is_local:
         return Path(address.channel).resolve().parent
     return LOCK_FOLDER if os.access(LOCK_FOLDER, os.W_OK) else Path(tempfile.gettempdir())
@@ -101,13 +101,13 @@ def _open(file: Path) -> int:
     with suppress(FileNotFoundError):
         return os.open(file, os.O_RDWR | os.O_CLOEXEC)
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-    with suppress(PermissionError):  # another user was quicker: then it is theirs to open to all
+    with suppress(PermissionError):  # another user made it first, and sets its permissions
         os.fchmod(descriptor, 0o666)
     return descriptor
 
 
 def _put_down(sign: bytes, file: int) -> bool:
-    """Leaves our sign; true when another's stood there."""
+    """Writes the mark of this client; True: that of another one was there."""
     last = os.pread(file, 2 * _SIGN_BYTES, 0)
     if last != sign:
         os.ftruncate(file, 0)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The object values that configure a controller for a machine file (docs/reference/protocol.md section 3).
 
-`sdo/controller` writes them; `configuration` is pure.
+`sdo/controller` writes them. Pure functions, except those that read the present values.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def configured_nodes(controller: Node) -> tuple[int, ...]:
 
 
 def feedforward_bits(machine: Machine) -> int:
-    """What the setpoints carry beside the position."""
+    """The offsets that setpoints have in addition to the position."""
     torque, velocity = machine.torque_feedforward, machine.velocity_feedforward
     return objects.FEEDFORWARD_TORQUE * torque + objects.FEEDFORWARD_VELOCITY * velocity
 

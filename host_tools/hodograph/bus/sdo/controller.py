@@ -2,7 +2,7 @@
 """The controller node as an object: configuration, programs, commands, state.
 
 Speaks SDO through python `canopen` and the controller's EDS; objects are those of docs/reference/protocol.md section 3.
-Every failure is a BusError (nothing or nonsense comes back) or a RefusedError (it said no, and why).
+Each failure is a BusError (no answer, or a wrong one) or a RefusedError (the controller refuses, with its reason).
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ __all__ = [
 
 POLL_S = 0.02
 ROUNDING_MM = 1e-6
-"""By so little a place may be beyond an end of the path: arc lengths are copied from output with fewer digits."""
+"""A place may be beyond an end of the path by this, since arc lengths are copied from output with fewer digits."""
 
 
 class Controller(Node):
@@ -107,10 +107,10 @@ class Controller(Node):
     # -- configuration ------------------------------------------------------------------------
 
     def configure(self, machine: Machine, kernel: str) -> bool:
-        """Brings the controller's configuration to that of the machine file, and confirms it.
+        """Writes the configuration of the machine file to the controller, and confirms it.
 
-        Writes only what differs; switches the drives off for that when they stand still. Returns whether anything
-        was written. Raises RefusedError while moving.
+        Only objects that differ are written; drives at standstill are switched off for that. Returns whether an object
+        was written. Raises RefusedError: axes move.
         """
         wanted = configuration(machine, kernel)
         crc32 = configuration_crc32(wanted, self.sdo.od)
@@ -148,11 +148,11 @@ class Controller(Node):
         return self.read(CONFIGURATION_STATE, 2) if self.read(CONFIGURATION_STATE, 3) else None
 
     def store(self) -> None:
-        """Stores all parameters, so that they hold after a loss of power too (0x1010)."""
+        """Stores all parameters, so that they stay after a loss of power (0x1010)."""
         self._keep(STORE, SAVE, "stored")
 
     def restore_defaults(self) -> None:
-        """Forgets the stored parameters: from the next power-on on the defaults hold (0x1011)."""
+        """Deletes the stored parameters: from the next power-on on the defaults apply (0x1011)."""
         self._keep(RESTORE_DEFAULTS, LOAD, "forgotten")
 
     def _keep(self, index: int, signature: int, done: str) -> None:
@@ -170,7 +170,7 @@ class Controller(Node):
             ) from error
 
     def set_node_number(self, number: int) -> None:
-        """Node number from the next power-on on, 0: the board's own; holds only when it is stored."""
+        """Sets the node number from the next power-on on; 0: the board's own. It has to be stored."""
         self.write(NODE_NUMBER, None, number)
 
     # -- programs -----------------------------------------------------------------------------
@@ -193,7 +193,9 @@ class Controller(Node):
         return self.read(STATE)
 
     def command(self, command: int) -> None:
-        """Gives a command; raises RefusedError with the controller's reason. Those to stop never wait."""
+        """Sends a command; raises RefusedError with the controller's reason. Commands to stop never wait for the
+        channel.
+        """
         try:
             if command in AT_ONCE:
                 self.write_at_once(COMMAND, command)
@@ -214,9 +216,9 @@ class Controller(Node):
     def wait_for(
         self, states: tuple[int, ...], wait_s: float, tick: Callable[[], None] | None = None
     ) -> int:
-        """Waits until the state is one of `states`; a fault meanwhile is a RunError, no progress a BusError.
+        """Waits until the state is one of `states`. `tick` is called at each poll. `wait_s` infinite: without a limit.
 
-        `tick` is called at every poll. `wait_s` infinite: as long as it takes.
+        Raises RunError: a fault occurred. Raises BusError: the state is not reached in time.
         """
         deadline = self.clock.now_s() + wait_s
         while True:
@@ -244,7 +246,7 @@ class Controller(Node):
         return _GOES_ON.get(state, "see hodograph status")
 
     def boot_trouble(self) -> BootTrouble | None:
-        """What keeps the drives from being found and configured; None: nothing, or nobody knows."""
+        """The reason why the drives are not found and configured; None: there is none, or it is not known."""
         node, place, abort_code, value = (self.read(BOOT_TROUBLE, sub) for sub in (1, 2, 3, 4))
         expected = None
         if place >> 8 == IDENTITY_OBJECT and abort_code == 0:
@@ -267,7 +269,7 @@ class Controller(Node):
         return f"{self.fault_text()}: {remedy}; then hodograph reset"
 
     def require_standing(self) -> None:
-        """Raises RefusedError while axes move: that is somebody's doing, and goes on."""
+        """Raises RefusedError: axes move by another command, which is not interrupted."""
         state = self.state()
         if state in BUSY:
             raise RefusedError(
@@ -286,10 +288,12 @@ class Controller(Node):
     def start(
         self, wait_s: float = 10.0, from_mm: float | None = None, *, unhomed: bool = False
     ) -> None:
-        """Starts the program, waiting as long as the axes are said to be still moving.
+        """Starts the program, after waiting while the controller reports that axes still move.
 
-        `from_mm`: from rest at this arc length of the path, where the axes must stand. `unhomed`: also when axes with a
-        homing method are not homed. Raises InputError for a place that the path does not have.
+        from_mm  start at this arc length of the path, where the axes have to stand
+        unhomed  also if axes with a homing method are not homed
+
+        Raises InputError: the path does not have the place.
         """
         if from_mm is not None:
             self._require_place(from_mm)
@@ -308,9 +312,9 @@ class Controller(Node):
             self.clock.sleep(POLL_S)
 
     def _require_place(self, arc_length_mm: float) -> None:
-        """The controller itself takes a place beyond an end of the path as this end."""
+        """Checks a place on the path; the controller takes one just beyond an end of the path as this end."""
         if self.read(PROGRAM, _STATE) != _READY:
-            return  # it refuses the start and says why
+            return  # it refuses the start with a reason
         length_mm = self.read(PROGRAM, _LENGTH) * MM_PER_Q40
         if not -ROUNDING_MM <= arc_length_mm <= length_mm + ROUNDING_MM:
             raise InputError(
@@ -319,7 +323,7 @@ class Controller(Node):
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
-        self.command(STOP)  # without effect where nothing moves
+        self.command(STOP)  # without effect at standstill
         self.wait_for((BOOT, OFF, READY), wait_s)
 
     def override(self, percent: int) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Waits until a program has ended, and prints what keeps it from moving, once each time. Used by `start --follow`,
+"""Waits until a program has ended, and prints each reason for which it does not move once. Used by `start --follow`,
 `goto` and `run`.
 """
 
@@ -15,7 +15,9 @@ LOOK_S = 0.5
 
 
 class Follower:
-    """To be called repeatedly: reads the state twice a second, and calls `note` with the reason when nothing moves."""
+    """Reads the state twice a second and calls `note` with the reason if the program does not move. Call it
+    repeatedly.
+    """
 
     def __init__(self, controller: Controller, note: Callable[[str], None]) -> None:
         self._controller = controller
@@ -24,7 +26,7 @@ class Follower:
         self._next_s = -math.inf
 
     def __call__(self) -> None:
-        """Looks when it is time to."""
+        """Reads the state if half a second has passed."""
         now_s = self._controller.clock.now_s()
         if now_s < self._next_s:
             return

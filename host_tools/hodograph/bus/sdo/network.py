@@ -32,7 +32,7 @@ for _name in ("canopen", "can"):
 
 
 class _Answers:
-    """What an SDO client or an LSS master takes for its queue of answers; nobody fills one in virtual time."""
+    """Replaces the queue of answers of an SDO client or an LSS master, which in virtual time no thread fills."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -43,7 +43,7 @@ class _Answers:
         self._answers.append(answer)
 
     def empty(self) -> bool:
-        """True, always: what came before a request is no answer to it."""
+        """Always True: answers from before a request do not belong to it."""
         self._network.take_waiting()
         self._answers.clear()
         return True
@@ -56,7 +56,7 @@ class _Answers:
 
 
 class Network(canopen.Network):
-    """canopen's network, patient when the transmit queue of a slow bus is full, and able to run in virtual time.
+    """canopen's network, which waits if the transmit queue of a slow bus is full, and can run in virtual time.
 
     On SocketCAN it writes to the socket itself: on a busy single core python-can's way takes ten times as long, and
     an upload is some thousand frames. In virtual time no thread receives: frames are taken while something is waited
@@ -68,7 +68,8 @@ class Network(canopen.Network):
         self._frames = bus
         self.clock: Clock = bus.clock if isinstance(bus, LocalBus) else REAL_CLOCK
         if not self.clock.is_virtual:
-            # The end of a bus is reported to whoever sends or waits; its thread would print a traceback besides.
+            # Callers that send or wait get the end of a bus as an error; its thread would print a traceback in
+            # addition.
             listeners: list[Any] = self.listeners
             listeners.insert(0, _Ended())
             self.connect()
@@ -84,12 +85,12 @@ class Network(canopen.Network):
         return added
 
     def take_waiting(self) -> None:
-        """Virtual time: hands over the frames that have come."""
+        """Virtual time: passes on the received frames."""
         while (message := self._frames.recv(0)) is not None:
             self.notify(message.arbitration_id, message.data, message.timestamp)
 
     def wait_until(self, happened: Callable[[], bool], timeout_s: float | None) -> bool:
-        """Virtual time: takes frames until it has happened; false when it has not after `timeout_s`."""
+        """Virtual time: takes frames until the event is set; False: it is not after `timeout_s`."""
         limit_s = None if timeout_s is None else self.clock.now_s() + timeout_s
         self.take_waiting()
         while not happened():
@@ -126,7 +127,7 @@ class Network(canopen.Network):
 
 
 class _Ended(can.Listener):
-    """Receives that the bus has ended, and leaves it to those who notice themselves."""
+    """Ignores the report of the receiving thread that the bus has ended: callers get it as an error of their own."""
 
     def on_message_received(self, msg: can.Message) -> None:
         """See can.Listener."""
@@ -183,5 +184,5 @@ def open_network(address: BusAddress, node: int | None, bitrate: int) -> Iterato
     finally:
         with suppress(
             can.CanError
-        ):  # what its thread found: whoever waited for an answer has an error of its own
+        ):  # errors of its thread: callers that waited for an answer have their own
             network.disconnect()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""SDO access to one node: reading and writing objects in turn with other commands, and errors in our words."""
+"""SDO access to one node: reads and writes objects under the channel lock, with errors as diagnostics texts."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ NOWHERE = 0x5000
 """The first of the 4096 indices that no EDS uses."""
 LET_PASS_S = 1.0
 ABORT, ABORT_BUSY = 0x80, 0x08000021
-"""Command byte of an abort; the code by which a server that has a transfer under way refuses another client."""
+"""Command byte of an abort; the code with which a server refuses a second client during a transfer."""
 BUSY_S = 5.0
-"""Patience with that: a client that is gone is forgotten after two seconds."""
+"""Longest wait for that: after two seconds the server drops a client that is gone."""
 _BUSY_LOOK_S = 0.05
 _NOBODY = b"\xff\xff\xff"
-"""No object that anybody asks for."""
+"""An object that no client reads."""
 _NO_OBJECT = bytes(3)
 _SDO_BYTES = 8
 _SCS, _NAMING = 0xE0, (0x40, 0x60)
@@ -45,26 +45,26 @@ _T = TypeVar("_T")
 
 
 class _SilentError(BusError):
-    """No answer to the question that lets other answers pass."""
+    """The probe that separates old answers from new ones got no answer."""
 
 
 class _Answers:
-    """canopen's queue of answers, less what is no SDO, and what is meant for another client of the same server."""
+    """canopen's queue of answers, without other frames and without answers to another client of the same server."""
 
     def __init__(self, queued: Any) -> None:
         self._queued = queued
         self.asked = b""
-        """Index and sub-index, as in a frame, of what we ask; empty: not known."""
+        """Index and sub-index, as in a frame, of the requested object; empty: not known."""
 
     def put(self, answer: bytes) -> None:
         if len(answer) != _SDO_BYTES or (answer == _COMMAND_TAKEN and self.asked != _COMMAND):
-            return  # of no SDO server; or another client's command to stop, which waits for no transfer
+            return  # of no server; or the answer to a stop command of another client
         if not (self.asked and self._is_for_another(answer)):
             self._queued.put(answer)
 
     def _is_for_another(self, answer: bytes) -> bool:
-        """An abort or a first answer that names another object; servers may abort without a name. In the middle of a
-        transfer only the refusal of another client.
+        """Whether it is an abort or a first answer for another object (servers may abort without naming it). Within a
+        transfer: whether it is the refusal of another client.
         """
         named = answer[1:4]
         if named == self.asked:
@@ -79,7 +79,7 @@ class _Answers:
         return self._queued.get(timeout=timeout) if block else self._queued.get(block=False)
 
     def empty(self) -> bool:
-        """True, always: what came before a request is no answer to it, and is thrown away here."""
+        """Always True: answers from before a request do not belong to it and are discarded here."""
         while not self._queued.empty():
             self._queued.get(block=False)
         return True
@@ -101,25 +101,25 @@ class Node:
         self.clock = clock
         self._turns = Turns(address, node_id, clock)
         self.turn_wait_s = TURN_WAIT_S
-        """Patience for a turn at the channel where nothing else is given."""
+        """Default wait for the channel lock."""
         self._under_way = False
         self._left_s: float | None = None
-        """The rest of the time that a question may take, None: no limit of its own."""
+        """The remaining time of a request; None: it has no limit of its own."""
         self._identified = False
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
         self._answers = self.sdo.responses = _Answers(self.sdo.responses)
 
     def close(self) -> None:
-        """Gives back what was opened for taking turns."""
+        """Closes the channel lock."""
         self._turns.close()
 
     @contextmanager
     def turn(self, wait_s: float | None = None, busy_s: float | None = None) -> Iterator[None]:
-        """The node's SDO channel is ours inside; what was sent to others, or came too late to us, is thrown away.
+        """Holds the channel lock inside the context. Answers to other clients, and late ones, are discarded.
 
-        Raises BusyError when there is no turn in `wait_s` (None: turn_wait_s), or the node serves another client for
-        more than `busy_s` (None: BUSY_S); BusError when the node does not answer, or when what is inside can't send.
+        Raises BusyError: the lock is not free within `wait_s` (None: turn_wait_s), or the node serves another client
+        for more than `busy_s` (None: BUSY_S). Raises BusError: the node does not answer, or frames cannot be sent.
         """
         try:
             with self._turns.turn(self.turn_wait_s if wait_s is None else wait_s) as handed_over:
@@ -137,10 +137,11 @@ class Node:
             raise
 
     def _let_pass(self, busy_s: float) -> None:
-        """Throws away answers that nobody waits for: all that come before the answer to a question only we ask.
+        """Discards old answers: all that come before the answer to a probe.
 
-        The question is for an object that does not exist, another one for everybody and each time, so the answer is an
-        abort that names it. Until it has come nothing else may be asked: it would be taken for the answer to that.
+        The probe reads an object that does not exist, a different one for each client and call, so its answer is an
+        abort that names it. No other request may be sent until it has come, since old answers could be taken for its
+        answer.
         """
         nowhere = self._answers.asked = self._nowhere()
         try:
@@ -149,7 +150,7 @@ class Node:
             self._answers.asked = b""
 
     def _wait_for_abort(self, nowhere: bytes, busy_s: float) -> None:
-        """Asks for an object that does not exist, until its abort has come."""
+        """Reads an object that does not exist until its abort has come."""
         request = bytearray(b"\x40" + nowhere + bytes(4))
         self.sdo.send_request(request)
         begun_s = self.clock.now_s()
@@ -179,8 +180,8 @@ class Node:
         )
 
     def patiently(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
-        """What an action on one object gives that takes a turn by itself; while the server has a transfer of another
-        client under way it is tried again for a while, then BusError is raised.
+        """The result of an action on one object that holds the lock by itself. While the server serves another client,
+        it is tried again for a while, then BusError is raised.
         """
         limit_s = self.clock.now_s() + BUSY_S
         while True:
@@ -198,11 +199,11 @@ class Node:
             self.clock.sleep(_BUSY_LOOK_S)
 
     def transfer_begun(self) -> None:
-        """Inside `patiently`: the server has taken our first request, so whom it refuses from now on is another."""
+        """Inside `patiently`: the server has accepted the first request, so later refusals are for another client."""
         self._answers.asked = _NOBODY
 
     def _nowhere(self) -> bytes:
-        """Another one each time, and for everybody; in virtual time the same in each run."""
+        """A different number for each call and client; in virtual time the same in each run."""
         if self.clock.is_virtual:
             return _nowhere(self.clock.stamp_ns() // 1000)
         return _nowhere(int.from_bytes(os.urandom(3), "little"))
@@ -244,12 +245,12 @@ class Node:
             ) from error
 
     def who(self) -> str:
-        """The node and its bus, to begin a message with."""
+        """The node and its bus, for the beginning of a message."""
         return f"node {self.node_id} on {self.address}"
 
     def write_at_once(self, index: int, value: int) -> None:
-        """Writes an object of one byte that the server takes at any time (commands to stop): without a turn, and beside
-        whatever transfer is under way. Raises SdoAbortedError, BusError.
+        """Writes an object of one byte that the server accepts at any time (commands to stop), without the lock, also
+        during a transfer of another client. Raises SdoAbortedError, BusError.
         """
         asked = self._answers.asked = _frame_bytes(index, None)
         request = bytearray(b"\x2f" + asked + bytes((value, 0, 0, 0)))
@@ -259,7 +260,7 @@ class Node:
                 self.sdo.send_request(request)
                 answer = self._answer_to(asked, min(now_s + _AGAIN_S, end_s))
                 code = int.from_bytes(answer[4:8], "little") if answer[:1] == bytes((ABORT,)) else 0
-                if code == ABORT_BUSY:  # a controller that makes stops wait as well
+                if code == ABORT_BUSY:  # a controller that does not accept stops during a transfer
                     self.clock.sleep(_BUSY_LOOK_S)
                 elif code:
                     raise SdoAbortedError(code)
@@ -283,8 +284,7 @@ class Node:
     def answers(self, wait_s: float, turn_wait_s: float = TURN_WAIT_S) -> bool:
         """Whether the node answers an SDO within `wait_s`.
 
-        Raises BusyError when another command, or a client on another computer, keeps it to itself for longer than
-        `turn_wait_s`.
+        Raises BusyError: another command, or a client on another computer, uses it for longer than `turn_wait_s`.
         """
         patience, self.sdo.RESPONSE_TIMEOUT = self.sdo.RESPONSE_TIMEOUT, min(0.25, wait_s)
         begun_s = self.clock.now_s()
@@ -320,7 +320,7 @@ class Node:
             with self.turn():
                 found = int(
                     self._variable(IDENTITY_OBJECT, sub).raw
-                )  # a slow answer is the caller's to judge
+                )  # the caller decides about a slow answer
             if found >> kept != wanted:
                 raise BusError(
                     f"{self.who()} has {name} {found:#x}, the EDS file of these host tools {wanted << kept:#x}: "
@@ -329,8 +329,8 @@ class Node:
         self._identified = True
 
     def require(self, wait_s: float, busy_s: float | None = None) -> None:
-        """Raises BusError unless the node answers within `wait_s`, BusyError when others keep it for more than `busy_s`
-        (None: as long).
+        """Raises BusError: the node does not answer within `wait_s`. Raises BusyError: others use it for more than
+        `busy_s` (None: `wait_s`).
         """
         if not self.answers(wait_s, wait_s if busy_s is None else busy_s):
             raise BusError(
@@ -345,7 +345,7 @@ def _nowhere(number: int) -> bytes:
 
 
 def _frame_bytes(index: int, sub: int | None) -> bytes:
-    """As in a frame."""
+    """Index and sub-index as in a frame."""
     return struct.pack("<HB", index, sub or 0)
 
 

@@ -24,20 +24,20 @@ CONFIGURATION_STATE, EXPECTED_VENDOR, EXPECTED_PRODUCT, EXPECTED_REVISION = rang
 NODE_NUMBER, UNHOMED_START, STREAM = 0x2054, 0x2055, 0x2060
 
 SAVE, LOAD = int.from_bytes(b"save", "little"), int.from_bytes(b"load", "little")
-"""What has to be written to STORE and RESTORE_DEFAULTS (CiA 301)."""
+"""The values to write to STORE and RESTORE_DEFAULTS (CiA 301)."""
 
 FEEDFORWARD_TORQUE, FEEDFORWARD_VELOCITY = 1, 2
 """Bits of CONFIGURATION sub 11."""
 
 ENABLE, START, STOP, DISABLE, RESET, HOLD, RESUME, START_FROM, QUICK_STOP, HOME = range(1, 11)
 AT_ONCE = (STOP, HOLD, QUICK_STOP)
-"""Commands that the controller takes whoever has an SDO transfer under way."""
+"""Commands that the controller accepts during an SDO transfer of any client."""
 BOOT, OFF, ENABLING, READY, RUNNING, STOPPING, FAULT_STATE, HOLDING, HELD = range(9)
 HOMING, QUICK_STOPPING = 9, 10
 ON_PATH = (RUNNING, HOLDING, HELD)
-"""States in which a stop has something to stop."""
+"""States in which a stop has an effect."""
 MOVING = (*ON_PATH, STOPPING)
-"""States in which a program is under way."""
+"""States in which a program runs or is held."""
 BUSY = (*MOVING, HOMING, QUICK_STOPPING)
 """States in which axes move, or may."""
 REFUSED_MOVING = 3

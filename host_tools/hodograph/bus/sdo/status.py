@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The controller's state, gathered over SDO into one typed snapshot.
 
-`Status.json()` has the keys that tools may rely on (docs/reference/cli.md). A snapshot of two axes is some 60 short SDO
-transfers, a few milliseconds on an idle machine; what belongs together is read in one turn.
+`Status.json()` has the keys that tools may rely on (docs/reference/cli.md). A snapshot of two axes needs about 60 short
+SDO transfers, a few milliseconds on an idle machine. Values that belong together are read under one channel lock.
 """
 
 from __future__ import annotations
@@ -108,11 +108,10 @@ class LoadedProgram:
 
 @dataclass(frozen=True)
 class Configured:
-    """What the controller's configuration is and where it is from; CRC-32s as of docs/reference/protocol.md
-    section 3.4.
+    """The controller's configuration and its origin; CRC-32s as in docs/reference/protocol.md section 3.4.
 
-    `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: under which configuration the loaded
-    program was checked last; another one than `crc32`: it is checked again before it starts.
+    `state` and `stored` are words of CONFIGURED and STORED. `program_crc32`: the configuration under which the loaded
+    program was checked last; if it differs from `crc32`, the program is checked again before it starts.
     """
 
     state: str
@@ -124,7 +123,7 @@ class Configured:
 
 @dataclass(frozen=True)
 class PathPosition:
-    """Where on the path the setpoint is."""
+    """Place of the setpoint on the path."""
 
     arc_length_mm: float
     feed_mm_s: float
@@ -144,7 +143,7 @@ class Override:
 class AxisStatus:
     """One drive, as the controller sees it. The following error is the drive's own (0x60F4).
 
-    mm and um are degrees and thousandths of a degree where the axis turns.
+    For a rotary axis mm and um are degrees and thousandths of a degree.
     """
 
     node: int
@@ -165,7 +164,7 @@ class AxisStatus:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Object 0x2008: SYNCs since power-on, the rest of the present or last run."""
+    """Object 0x2008: SYNCs since power-on; the other values are of the present or last run."""
 
     syncs: int
     tick: int
@@ -210,7 +209,7 @@ class Status:
 
 
 def snapshot(controller: Controller) -> Status:
-    """Reads everything. Raises BusError when the controller stops answering."""
+    """Reads everything. Raises BusError: the controller does not answer."""
     with controller.turn():
         state = controller.state()
         motion = [controller.read(MOTION, sub) for sub in (1, 2, 3)]
@@ -277,7 +276,7 @@ def _configured(controller: Controller) -> Configured:
 
 
 def loaded_program(controller: Controller) -> LoadedProgram:
-    """Object 0x2000 but the image. Raises BusError."""
+    """Object 0x2000 without the image. Raises BusError."""
     with controller.turn():
         numbers = controller.program_summary()
         stops = controller.longest_stops()

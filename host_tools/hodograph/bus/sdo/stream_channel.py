@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Object 0x2060 of the controller: chunks of a job, and what has become of them (docs/reference/protocol.md 3.7)."""
+"""Object 0x2060 of the controller: sends chunks of a job, and reads the state of the job (docs/reference/protocol.md
+3.7). Used by stream/sender.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,9 @@ UNKNOWN_MS = 0xFFFFFFFF
 _TRIES = 4
 _PATIENCE_S = 5.0
 _OTHER_FORMAT = -80
-"""Of a chunk whose version the controller does not read, too."""
+"""Also the refusal of a chunk whose version the controller does not read."""
 _CORRUPT = (-4, _OTHER_FORMAT, -81)
-"""Refusals that a transfer with wrong bytes brings too: the chunk is sent again."""
+"""Refusals that may be due to a transfer error: the chunk is sent again."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class StreamStatus:
 
     committed_s    motion from here to the rest at the end of the newest accepted chunk
     line           source line of the executed chunk
-    arc_length_mm  where the motion is, in the job
+    arc_length_mm  arc length of the motion in the job
     remaining_s    from here to the end of the job, by the newest accepted chunk; None: not known
     """
 
@@ -72,16 +74,16 @@ def stream_status(node: Node) -> StreamStatus:
 
 
 def close_stream(node: Node) -> None:
-    """Forgets a job that is over, so that all memory is free. Raises RefusedError: it moves."""
+    """Closes a job that is over, which frees the ring. Raises RefusedError: axes move."""
     if node.read(STREAM, 2) != NONE:
         node.write(STREAM, 15, 1)
 
 
 def send_chunk(node: Node, data: bytes, job: int, sequence: int, place: str) -> bool:
-    """Sends a chunk, again where the transfer broke off or its bytes came wrong. False: there is no room for it now.
+    """Sends a chunk, again if the transfer broke off or had errors. False: the ring has no room for it now.
 
     place  file and line, for messages
-    Raises RefusedError: the controller refuses it; BusError: it does not come through.
+    Raises RefusedError: the controller refuses it. Raises BusError: no transfer succeeds.
     """
     last = ""
     for _ in range(_TRIES):
@@ -118,7 +120,9 @@ def _accepted(node: Node, job: int, sequence: int) -> bool:
 
 
 def _wrong_bytes(node: Node, place: str) -> str:
-    """Why the bytes were refused, where they may have come wrong. Raises RefusedError: they came as they were sent."""
+    """The reason of a refusal that may be due to a transfer error. Raises RefusedError: the bytes came as they were
+    sent.
+    """
     code, index = node.read(STREAM, 5), node.read(STREAM, 6)
     text = program_fault_text(code, index)
     if code not in _CORRUPT:

@@ -19,12 +19,12 @@ ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 _GAP_S = 0.01
 """Pause between two blocks, so that heartbeats are sent in time.
 
-They have a lower priority than SDO. The fullest bus that `require_fit` allows has room for one or two more frames in a
+They have a lower priority than SDO. The fullest bus that `require_fit` allows can carry one or two more frames in a
 period.
 """
 
 _FATE_S = 1.0
-"""How long the state of the program is read after an upload that broke off."""
+"""Time for reading the state of the program after an upload that broke off."""
 
 Progress = Callable[[int], None]
 
@@ -50,7 +50,7 @@ def upload(node: Node, image: bytes, progress: Progress | None = None) -> None:
 
 
 def require_room(node: Node, image: bytes) -> None:
-    """Raises RefusedError when no bank of this controller can hold the program with its records."""
+    """Raises RefusedError: no bank of this controller can hold the program with its coefficient records."""
     from ...program.image import HEADER_SIZE, RecordBytes, memory_bytes
 
     if len(image) < HEADER_SIZE:
@@ -70,7 +70,7 @@ def _active(node: Node) -> tuple[int, int]:
 
 
 def _consequence(node: Node, before: tuple[int, int]) -> str:
-    """What is known of the old program."""
+    """Text about the old program, for messages."""
     node.sdo.RESPONSE_TIMEOUT = _FATE_S
     try:
         now = _active(node)

@@ -3,8 +3,8 @@
 
     (1436509052.249713) vcan0 182#270653C8DD01
 
-Lines of one length look alike, so numpy takes all of those at once: the first is taken apart by a regular
-expression, the others must agree with it wherever it has no digit. A million frames take a second or two.
+numpy reads all lines of one length at once: a regular expression parses the first, and the others have to agree with it
+wherever it has no digit. A million frames take a second or two.
 
 Own code, because it is 4.6 times as fast as python-can's reader (200 000 frames: 0.14 s and 0.62 s of processor time).
 """

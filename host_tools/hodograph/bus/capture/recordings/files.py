@@ -72,7 +72,7 @@ def _begin(file: Path, suffix: str, channel: str) -> _Writer:
 
 
 class RecordingWriter:
-    """Writes a recording bit by bit; a context manager. Every method raises InputError when the disk refuses."""
+    """Writes a recording in parts; a context manager. Each method raises InputError: the file cannot be written."""
 
     def __init__(self, file: Path, channel: str = "vcan0") -> None:
         """Begins the file, in place of one that is there. Only candump keeps the name of the channel."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Vector's ASC and BLF, by python-can's readers and writers, which see one message after the other."""
+"""Vector's ASC and BLF, by python-can's readers and writers, which handle one message at a time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OLDEST_S = 631_152_000
 
 
 class _Lines(io.TextIOWrapper):
-    """A text file that knows in which line it is, and ends well."""
+    """A text file that counts its lines; the end of the file ends the reading without an error."""
 
     line = 0
 
