@@ -27,7 +27,7 @@ NO_FAULT = Fault("none")
 
 
 def read_faults(root: Table, raw: Mapping[str, Any], plants: Sequence[Plant]) -> tuple[Fault, ...]:
-    """In the order of the file; without any: none. Raises InputError, also where a machine cannot have a rule."""
+    """The faults in the order of the file; empty: none. Raises InputError, also if a machine cannot have a rule."""
     if not root.has("faults"):
         return (NO_FAULT,)
     found: list[Fault] = []
@@ -68,11 +68,11 @@ def _try(table: Table, fault: Fault, plants: Sequence[Plant]) -> None:
 _PDFF = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s", "k_pf_rad_mm", "k_vf")
 _FEED = tuple(field.name for field in fields(Feedforward))
 AS_GIVEN = Gains("own")
-"""Without [[gains]]: the machine's own."""
+"""The gains of a file without [[gains]]: the machine's own."""
 
 
 def read_gains(root: Table, count: int) -> tuple[Gains, ...]:
-    """In the order of the file, for machines with so many axes on the path; raises InputError."""
+    """The gains in the order of the file, for machines with so many path axes. Raises InputError."""
     if not root.has("gains"):
         return (AS_GIVEN,)
     tables = root.tables("gains", ("name", "machine", *_PDFF, "feedforward", "interpolation"))
@@ -132,7 +132,7 @@ class Source:
     machine: Machine
 
     def pipeline(self, profile: str | None, feed_mm_s: float | None) -> Pipeline:
-        """The steps to a program, with another profile or feed than the file asks for (None: the file's)."""
+        """The pipeline to a program with another profile or feed than that of the file (None: that of the file)."""
         feed = Pipeline(self.path).feed
         feed = replace(
             feed,
@@ -151,7 +151,7 @@ class Campaign:
     sources: tuple[Source, ...]
     design: Design
     fingerprint: str
-    """Of all that the results depend on: the design, the paths and machines, and Hodograph itself."""
+    """Hash of everything that the results depend on: the design, the paths and machines, and Hodograph itself."""
 
 
 def load_campaign(file: Path) -> Campaign:
@@ -274,7 +274,7 @@ def _list(root: Table, raw: Mapping[str, Any], key: str, example: str) -> list[A
 
 
 def _check_samples(root: Table, design: Design) -> None:
-    """Several samples of which each is the same run are a mistake, and so is one draw of a distribution."""
+    """Raises InputError: several samples would be the same run, or a distribution has one draw."""
     random = [v for v in design.variations if not v.is_grid]
     drawn = any(f.scenario is not None and f.scenario.ranges for f in design.faults)
     if design.samples > 1 and not random and not drawn:

@@ -21,12 +21,12 @@ QUANTITIES = (
     "max_volts",
     "duration_s",
 )
-"""The figures of a run that are kept, by their names in `Motion`; the contour error is the first."""
+"""The stored figures of a run, by their names in `Motion`; the contour error is the first."""
 
 
 @dataclass(frozen=True)
 class Built:
-    """What became of a program: its image and ticks, or why there is none."""
+    """The result of compiling a program: its image and ticks, or the error."""
 
     number: int
     image: bytes = b""
@@ -36,7 +36,7 @@ class Built:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a run: its figures in the order of QUANTITIES and the hash of its encoders, or an error."""
+    """The result of a run: its figures in the order of QUANTITIES and the hash of its encoders, or the error."""
 
     number: int
     values: tuple[float, ...] = ()
@@ -49,7 +49,7 @@ def build(source: Source, profile: str | None, feed_mm_s: float | None, number: 
     try:
         pipeline = source.pipeline(profile, feed_mm_s)
         return Built(number, pipeline.image, pipeline.program.ticks)
-    except Exception as error:  # a program that cannot be is a result, whatever the reason
+    except Exception as error:  # a program that cannot be made is a result too
         return Built(number, error=_error_text(error))
 
 
@@ -83,6 +83,6 @@ def _simulated(run: Run, program: NativeProgram) -> Outcome:
 
 
 def _error_text(error: Exception) -> str:
-    """Errors of ours as they are, others with their kind: those are bugs."""
+    """The message of an error; errors of other types, which are bugs, with the type."""
     text = one_line(error)
     return text if isinstance(error, HodographError) else f"{type(error).__name__}: {text}"

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Faults of a campaign: the rules of docs/reference/protocol.md section 4 that act on one axis alone.
 
-What needs frames, a bus or somebody who supervises is the business of `hodograph faults`.
+Rules that need frames, a bus or a controller that supervises are for `hodograph faults`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Fault:
         return [offline_fault(line, nodes, period_us) for line in self.lines(seed, sample)]
 
     def lines(self, seed: int, sample: int) -> list[str]:
-        """The rules of one sample as text: what `hodograph faults --seed` would draw for seed + sample."""
+        """The rules of one sample as text, as drawn by `hodograph faults --seed` for seed + sample."""
         if self.scenario is None:
             return []
         return [

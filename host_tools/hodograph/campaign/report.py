@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report of a campaign: one HTML file that needs nothing else, and its figures as PNG files."""
+"""The report of a campaign: one self-contained HTML file, and its figures as PNG files."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .summary import HEADER, Group, cells, groups
 
 GROUPS_SHOWN = 40
 POINTS_SHOWN = 3000
-"""Of a group in a scatter plot: every n-th where there are more."""
+"""Most points of a group in a scatter plot; of more, every n-th is drawn."""
 _COLORS = (BLUE, ORANGE, GREEN, RED, GREY, INK)
 _ROW_IN = 0.28
 _COLUMNS = 3
@@ -65,7 +65,7 @@ def dependence_figure(
     groups: Sequence[Group],
     contour_um: Sequence[NDArray[np.float64]],
 ) -> bytes:
-    """Contour error over each figure that varies: `varied[group]` is (runs, names), beside `contour_um[group]`."""
+    """Contour error over each figure that varies: `varied[group]` is (runs, names), `contour_um[group]` (runs,)."""
     rows = -(-len(names) // _COLUMNS)
     figure, grid = pyplot.subplots(
         rows,
@@ -101,7 +101,7 @@ def dependence_figure(
 
 
 GROUPS_COMPARED = 6
-"""Groups in the figure of what the error depends on: more cannot be distinguished."""
+"""Most groups in the scatter plot: more cannot be distinguished."""
 ERRORS_SHOWN = 20
 
 
@@ -125,7 +125,7 @@ def write_report(campaign: Campaign, results: Results, folder: Path) -> Path:
 
 
 def _errors(results: Results) -> list[tuple[str, int, int]]:
-    """Each error, how often it is there and the number of the first run with it; the most frequent first."""
+    """Each error with its frequency and the number of the first run that has it; the most frequent first."""
     first: dict[str, int] = {}
     for number, error in sorted(results.errors.items()):
         first.setdefault(error, number)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Results of runs: in arrays by number (100 bytes a run), as a table (CSV, RFC 4180), and in a journal that lets a
-campaign go on.
+"""Results of runs: in arrays by number (100 bytes for each run), as a table (CSV, RFC 4180), and in a journal from
+which a campaign can continue.
 
 Lines of the journal are only ever added. A line that was cut off (the process was killed in the middle of it) is
 dropped when the file is opened again. The first line names the campaign that it belongs to.
@@ -26,7 +26,7 @@ from .run_settings import Case, Design
 
 
 class Results:
-    """What is known of the runs of a campaign."""
+    """The results of the runs of a campaign."""
 
     def __init__(self, total: int) -> None:
         self.done: NDArray[np.bool_] = np.zeros(total, dtype=np.bool_)
@@ -35,7 +35,7 @@ class Results:
         self.errors: dict[int, str] = {}
 
     def put(self, outcomes: Iterable[Outcome]) -> None:
-        """Takes results up; a run that is there already stays as it is."""
+        """Adds results; a run that has results already keeps them."""
         for outcome in outcomes:
             number = outcome.number
             if self.done[number]:
@@ -76,7 +76,7 @@ def rows(design: Design, results: Results) -> Iterator[list[str]]:
 
 
 def case_texts(design: Design, case: Case) -> list[str]:
-    """What a group's runs have in common; "own" is what the path file asks for."""
+    """The common settings of a group's runs; "own" is the setting of the path file."""
     feed_mm_s = design.feeds_mm_s[case.feed]
     return [
         design.names[case.path],
@@ -122,7 +122,7 @@ NAME = "runs.journal"
 
 
 class Journal:
-    """What is done, on disk and in memory."""
+    """The journal of a campaign: finished programs and runs, on disk and in memory."""
 
     def __init__(self, stream: IO[bytes], results: Results) -> None:
         self._stream = stream
@@ -146,7 +146,7 @@ class Journal:
         self._stream.flush()
 
     def read(self, fingerprint: str, *, fresh: bool) -> None:
-        """Takes up what the file holds. Raises InputError: it is of another campaign and may not be replaced."""
+        """Reads the file. Raises InputError: it is of another campaign and may not be replaced."""
         good = 0
         self._stream.seek(0)
         for number, line in enumerate(self._stream):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""From the number of a run to its settings: all combinations, in the order of the campaign file's sections.
+"""The settings of a run from its number: all combinations, in the order of the campaign file's sections.
 
-Of path, profile, feed, gains, fault, grid and sample the last changes fastest. So the runs of a program follow one
-another, and among them those of a group (all but grid and sample the same).
+Of path, profile, feed, gains, fault, grid and sample the last changes fastest. So the runs of a program are
+consecutive, and among them those of a group, which differ in grid and sample only.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Gains:
 
 @dataclass(frozen=True)
 class Case:
-    """What runs of a group have in common: places in the lists of the design."""
+    """The common settings of a group's runs: indices in the lists of the design."""
 
     path: int
     profile: int
@@ -74,7 +74,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Design:
-    """All that runs can have. None as profile or feed: what the path file asks for.
+    """The design of a campaign: all settings of runs. None as profile or feed: that of the path file.
 
     axes  names of the axes of each path, the same for all
     """
@@ -92,7 +92,7 @@ class Design:
 
     @cached_property
     def grids(self) -> tuple[Variation, ...]:
-        """The variations of which every number is tried."""
+        """The variations whose numbers are all tried."""
         return tuple(variation for variation in self.variations if variation.is_grid)
 
     @property
@@ -116,12 +116,12 @@ class Design:
         return self.program_count * self.program_size
 
     def case(self, group: int) -> Case:
-        """What the runs of a group have in common."""
+        """The common settings of a group's runs."""
         lists = (self.names, self.profiles, self.feeds_mm_s, self.gains, self.faults)
         return Case(*_places(group, [len(each) for each in lists]))
 
     def run(self, number: int) -> Run:
-        """The settings of a run. Raises InputError: a fault that cannot be had."""
+        """The settings of a run. Raises InputError: the machine cannot have a fault."""
         case, grid, sample = self._parts(number)
         plant = _with_gains(self.plants[case.path], self.gains[case.gains])
         plant, varied = self._vary(plant, grid, sample)

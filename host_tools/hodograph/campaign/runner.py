@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A campaign from its file to a complete table, by one of three engines: this process, the cores of this machine, or a
-cluster (the last two by Dask).
+"""Executes a campaign and makes its complete table, with one of three engines: this process, the cores of this
+computer, or a cluster (the last two by Dask).
 
-Dask is loaded only here and only on request: it takes half a second, and is an extra of the package.
+Dask is an optional dependency and takes half a second to load, so it is loaded only here and only if needed.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ T = TypeVar("T")
 Task = tuple[Any, ...]
 
 AHEAD = 4
-"""Tasks given out for each worker, so that none waits for us and few are lost by an interruption."""
+"""Tasks in the queue of each worker: no worker waits for this process, and few tasks are lost by an interruption."""
 ANSWER_S, WORKER_S = 10, 60
 """How long to wait for a scheduler, and for its first worker."""
 
 
 class Engine(Protocol):
-    """Makes calls somewhere."""
+    """An engine: executes tasks in this process or elsewhere."""
 
     def share(self, value: object) -> Any:
-        """What stands for `value` in tasks; it is sent to each worker once."""
+        """A reference to `value` for tasks; the value is sent to each worker once."""
 
     def results(self, function: Callable[..., T], tasks: Iterable[Task]) -> Iterator[T]:
-        """`function` of each task, as they are done, in any order."""
+        """The results of `function` for each task, as they are finished, in any order."""
 
 
 class Here:
@@ -68,7 +68,7 @@ class OnDask:
         return self._client.submit(_same, value, pure=False)
 
     def results(self, function: Callable[..., T], tasks: Iterable[Task]) -> Iterator[T]:
-        """As they are done, with few ahead. Raises RunError when workers are lost again and again."""
+        """The results as they are finished, with few tasks ahead. Raises RunError: workers are lost repeatedly."""
         dask = _dask()
         waiting = iter(tasks)
         ahead = AHEAD * max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
@@ -142,10 +142,10 @@ def _local(workers: int) -> Iterator[Any]:
 
 @contextmanager
 def _interrupts_ignored_by_children() -> Iterator[None]:
-    """Processes begun inside take no notice of Ctrl-C, which terminals send to all: we end them ourselves.
+    """Processes begun inside ignore Ctrl-C, which terminals send to all; this process ends them.
 
-    The signal is blocked for all threads and processes begun meanwhile; the resource tracker has to be there before,
-    because starting it unblocks the signal.
+    The signal is blocked for all threads and processes begun inside. The resource tracker has to run before, because
+    starting it unblocks the signal.
     """
     ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -157,9 +157,8 @@ def _interrupts_ignored_by_children() -> Iterator[None]:
 
 @contextmanager
 def _interruptions() -> Iterator[Callable[[], None]]:
-    """Ctrl-C counts where the result is called: inside Dask it could leave a lock held that closing then waits for.
-
-    A second one counts at once.
+    """Defers Ctrl-C until the result is called: inside Dask it could leave a lock held for which closing then waits. A
+    second Ctrl-C takes effect at once.
     """
     asked = False
 
@@ -173,7 +172,7 @@ def _interruptions() -> Iterator[Callable[[], None]]:
         if asked:
             raise KeyboardInterrupt
 
-    if current_thread() is not main_thread():  # nobody else gets signals
+    if current_thread() is not main_thread():  # only the main thread gets signals
         yield take
         return
     before = signal.signal(signal.SIGINT, ask)
@@ -224,13 +223,15 @@ def version() -> str:
 
 
 BATCH_TICKS = 250_000
-"""Ticks of a batch: a quarter of a second, beside which a task's own costs (a millisecond) do not count."""
+"""Ticks of a batch: about a quarter of a second, compared with which the cost of a task (a millisecond) is small."""
 
 
 def run_campaign(
     campaign: Campaign, journal: Journal, workers: Engine, progress: Callable[[int], None]
 ) -> Results:
-    """Does what the journal does not have yet, and returns all. `progress` is called with the runs done."""
+    """Executes the programs and runs that the journal lacks, and returns all results. `progress` is called with the
+    number of finished runs.
+    """
     results = journal.results
     for built in workers.results(build, _programs(campaign, journal)):
         journal.add_program(built)
@@ -261,7 +262,7 @@ def _span(design: Design, built: Built) -> tuple[int, int]:
 
 
 def _fail_all(design: Design, journal: Journal) -> None:
-    """Runs whose program there is not have all failed."""
+    """Marks all runs of programs that could not be made as failed."""
     for built in journal.programs.values():
         missing = journal.results.missing(*_span(design, built)) if built.error else []
         if missing:

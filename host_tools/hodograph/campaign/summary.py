@@ -18,7 +18,7 @@ SHARES = (50.0, 95.0, 100.0)
 
 @dataclass(frozen=True)
 class Group:
-    """One line: what the runs have in common, how many there are, and their figures (NaN: none succeeded)."""
+    """One line: the common settings of the runs, their number, and their figures (NaN: none succeeded)."""
 
     case: tuple[str, ...]
     runs: int
@@ -31,14 +31,14 @@ class Group:
 
     @property
     def label(self) -> str:
-        """For people: what differs from the files."""
+        """The settings that differ from the files, as text."""
         path, profile, feed_mm_s, gains, fault = self.case
         feed = "own" if feed_mm_s == "own" else f"{float(feed_mm_s):g} mm/s"
         said = (path, profile, feed, gains, fault)
         return ", ".join(text for text in said if text not in ("own", "none"))
 
     def as_dict(self) -> dict[str, object]:
-        """For tools; None where no run succeeded."""
+        """The line for JSON; None: no run succeeded."""
         p50, p95, greatest = (_finite(value) for value in self.contour_um)
         names = ("path", "profile", "feed_mm_s", "gains", "fault")
         return {
@@ -106,7 +106,7 @@ HEADER = (
 
 
 def text(found: list[Group]) -> str:
-    """The lines of a table for people."""
+    """The lines of a table as text."""
     lines = [HEADER, *(cells(group) for group in found)]
     widths = [max(len(line[i]) for line in lines) for i in range(len(HEADER))]
     return "\n".join(

@@ -2,8 +2,8 @@
 """Figures of a drive that differ from run to run (tables [vary.FIGURE]): grids, which are tried in full, and random
 draws.
 
-A draw is a pure function of seed, sample, figure and axis: it does not depend on the other variations, nor on the order
-or the place in which runs are made; sample k is the same machine on every path and with all gains.
+A draw is a pure function of seed, sample, figure and axis. It does not depend on the other variations, nor on the order
+or the worker of runs. Sample k is the same machine on all paths and with all gains.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ FIGURES = (
     "k_vf",
     "friction_volts",
 )
-"""What can vary: figures of the drive file, by the names they have there."""
+"""Figures that can vary, by their names in the drive file."""
 
 KINDS = ("values", "factors", "uniform", "normal", "factor_uniform", "factor_normal")
 GRIDS = ("values", "factors")
@@ -39,7 +39,7 @@ ALL, EACH = "all", "each"
 
 @dataclass(frozen=True)
 class Variation:
-    """One figure and what becomes of it.
+    """A variation of one figure.
 
     kind     values, factors: each of `numbers` in turn; uniform: from numbers[0] to numbers[1]; normal: mean
              numbers[0], standard deviation numbers[1]. "factor": times the drive file's figure, else instead of it
@@ -57,7 +57,7 @@ class Variation:
         return self.kind in GRIDS
 
     def axes(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        """The axes that it is about, of these, which follow the path."""
+        """The path axes that it applies to."""
         return names if self.axis in (ALL, EACH) else (self.axis,)
 
     def number(self, axis: str, seed: int, sample: int, grid_place: int) -> float:
@@ -72,7 +72,7 @@ class Variation:
         return first + second * NormalDist().inv_cdf(share)
 
     def value(self, drive: Drive, number: float) -> float:
-        """The figure that comes of a draw."""
+        """The figure after a draw."""
         return number * figure(drive, self.figure) if self.kind.startswith("factor") else number
 
 

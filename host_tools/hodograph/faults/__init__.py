@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Fault scenarios: faults are injected into simulated machines on two virtual buses, and the reaction is judged.
+"""Fault scenarios: injects faults into simulated machines on two virtual buses, and checks the reaction.
 
 scenario       keys of a scenario file, and the fault rules that a seed makes of it
 bench          controller, injector and drives as processes
 case_runner    runs and judges cases: the first run by disturb (uploads), recovery, the second run
-fault_actions  what the host does in a case: kills processes, cuts uploads
+fault_actions  actions of the host in a case: kills processes, breaks off uploads
 case_run       machine, program and notes of a case: the input of the judge
-case_record    what the recordings of both buses show
+case_record    the evidence in the recordings of both buses
 judge          violations in a case record
-case_table     the result for people and for JSON
+case_table     the result as text and as JSON
 """

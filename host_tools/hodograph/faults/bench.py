@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The machine under test as processes: controller on one bus, drives on another, the injector between them."""
+"""The test bench of fault cases as processes: controller on one bus, drives on another, the injector between them."""
 
 from __future__ import annotations
 

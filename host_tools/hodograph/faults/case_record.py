@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the recordings of the two buses show about one case."""
+"""The case record: evidence about one fault case from the recordings of the two buses. Read by judge.py."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class CaseRecord:
         return int(np.searchsorted(self._sync_us, time_us, side="right")) - 1 - (self._first or 0)
 
     def emergencies(self, frames: Frames, nodes: Sequence[int]) -> list[Emergency]:
-        """EMCY frames of these nodes, without those that say that all is well."""
+        """EMCY frames of these nodes, without those that report the end of an error."""
         found = []
         for node in nodes:
             for at in np.flatnonzero((frames["id"] == _EMCY + node) & (frames["length"] >= 2)):
@@ -70,9 +70,10 @@ class CaseRecord:
         return sorted(found, key=lambda emergency: emergency.time_us)
 
     def last_motions_us(self, tolerance_counts: int) -> dict[int, int | None]:
-        """By node: when its axis was last seen away from where it ended, by the drive's own words; 0: it never was.
+        """By node: the last time at which the drive reported a position away from its last one; 0: never.
 
-        None: it said nothing at all, nothing for a while thereafter, or nothing at the end, so that nobody knows.
+        None: not known, since the drive sent nothing at all, nothing for a while after that time, or nothing at the
+        end.
         """
         return {node: self._last_motion_us(node, tolerance_counts) for node in self.nodes}
 
@@ -91,8 +92,8 @@ class CaseRecord:
         return int(time_us[away[-1]])
 
     def still_moving(self, tolerance_counts: int) -> tuple[int, ...]:
-        """Nodes that went on moving to the end of the recording, by their own reports; those that send nothing are
-        not known.
+        """Nodes that moved until the end of the recording, by their own reports. Nodes that sent nothing are not
+        included.
         """
         if not self.drives.size:
             return ()
@@ -106,9 +107,7 @@ class CaseRecord:
         return tuple(found)
 
     def setpoints(self) -> list[tuple[NDArray[np.int64], NDArray[np.bool_]]]:
-        """By axis: the targets by SYNC from tick 0 on, and where one was sent that the drive was commanded to
-        follow.
-        """
+        """By axis: the targets by SYNC from tick 0 on, and whether the drive was commanded to follow each."""
         count = max(0, self._sync_at.size - (self._first or 0))
         rows = []
         for node in self.nodes:

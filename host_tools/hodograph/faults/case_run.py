@@ -20,15 +20,15 @@ from .case_record import CaseRecord
 from .scenario import Case
 
 REST_TOLERANCE_COUNTS = 2000
-"""An axis that stays within so little is at rest: 2 um, some encoder increments and the last of the settling."""
+"""An axis that stays within this is at rest: 2 um for encoder increments and the end of settling."""
 LIMIT_S = 30.0
-"""Whatever takes longer hangs."""
+"""A process that takes longer counts as hanging."""
 LOOK_S = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class CleanRun:
-    """A program with its machine and what a clean run of it gives."""
+    """A program with its machine, and the result of an undisturbed run."""
 
     machine: Machine
     image: bytes
@@ -42,7 +42,7 @@ class CleanRun:
 
 @dataclass
 class CaseRun:
-    """What happened in a case, for the judge."""
+    """The events of a case, for the judge."""
 
     case: Case
     clean_run: CleanRun
@@ -52,15 +52,15 @@ class CaseRun:
     control: Frames | None = None
     """The controller's bus from the beginning to the end, recovery included."""
     began_us: int = 0
-    """When the first thing was injected or done; 0: nothing was."""
+    """Time of the first injected fault or action; 0: there was none."""
     fault_codes: list[int] = field(default_factory=list)
-    """Codes that object 0x2003 showed."""
+    """Codes read from object 0x2003."""
     rest_us: int | None = None
-    """When the drives were at rest, asked one by one."""
+    """Time at which the drives were at rest, by their own SDO answers."""
     recovery_ms: float | None = None
-    """From the first command to reset until the drives were found and configured; None: they never were."""
+    """Time from the first reset command until the drives were found and configured; None: they never were."""
     troubles: list[str] = field(default_factory=list)
-    """What went wrong on the way, each a violation."""
+    """Errors during the case; each is a violation."""
     again: Motion | None = None
     """The run after the recovery."""
     finished: bool = False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs fault cases: start, program, disturbance, recovery, the program again; and judges them. A case is one scenario
+"""Runs fault cases (start, program, disturbance, recovery, the program again) and judges them. A case is one scenario
 with one seed. Called by `hodograph faults`.
 """
 
@@ -59,7 +59,7 @@ def run_campaign(
 
 
 def run_case(case: Case, buses: Buses | None) -> CaseRun:
-    """Runs a case to its end, whatever happens; troubles are in the record. Raises BusError: no bus to run on.
+    """Runs a case to its end; errors go into the record. Raises BusError: there is no bus.
 
     Without buses it has its own, in virtual time: the same record each time.
     """
@@ -130,7 +130,7 @@ def _recover(record: CaseRun, bench: FaultBench, controller: Controller) -> None
 
 
 def _reset(controller: Controller) -> None:
-    """Resets until the fault is gone and the drives are found: braking comes first, drives take their time."""
+    """Resets until the fault is gone and the drives are found, which may take a while after braking."""
     deadline = controller.clock.now_s() + LIMIT_S
     while (state := controller.state()) not in (OFF, READY):
         if controller.clock.now_s() > deadline:

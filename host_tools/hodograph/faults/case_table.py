@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Verdicts as a table: one row a scenario, the worst of its seeds."""
+"""Verdicts as a table: one row for each scenario, with the worst of its seeds."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _worst(values: Sequence[float | None]) -> str:
 
 
 def text(verdicts: Sequence[Verdict]) -> str:
-    """The table with its header, columns aligned; then every violation in a line."""
+    """The table with its header, columns aligned; then one line for each violation."""
     table = [HEADER, *rows(verdicts)]
     widths = [max(len(row[i]) for row in table) for i in range(len(HEADER))]
     lines = [

@@ -18,15 +18,15 @@ from .fault_actions import await_rest, drives_at, spawn_command
 from .uploads import disturb_upload
 
 QUIET_S = 0.25
-"""Recorded after everything has come to an end, so that what still moves is seen."""
+"""Time recorded after the end of the case, so that later motion is recorded too."""
 _SYNCS, _TICK = 1, 2
 _STILL_LOOKS = 5
 _START_S = 120.0
-"""For a command of its own to come up: on a busy machine it loads for longer than any case lasts."""
+"""Time for the start of a command process: on a busy computer it loads for longer than a case lasts."""
 
 
 def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder) -> None:
-    """Runs the case's program, or its upload, with what its scenario does to it. Raises what the bus tools raise."""
+    """Runs the case's program, or its upload, with the disturbance of its scenario. Raises errors of the bus tools."""
     clean_run, case = record.clean_run, record.case
     controller.require(5.0)
     controller.configure(clean_run.machine, "fixed")
@@ -47,7 +47,7 @@ def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control:
         if process is not None:
             process.kill()
             process.end()
-    if state is None:  # a fresh controller: nothing to ask it
+    if state is None:  # a new controller, which need not be asked
         return
     record.finished = (
         state == READY and controller.read(STATISTICS, _TICK) == clean_run.motion.ticks - 1
@@ -62,7 +62,9 @@ def disturb(record: CaseRun, bench: FaultBench, controller: Controller, control:
 def _follow(
     record: CaseRun, bench: FaultBench, controller: Controller, process: Process | None
 ) -> int | None:
-    """Until the controller is at rest again, acting on the way; its state, None when it was killed."""
+    """Waits until the controller is at rest again, with the host's action in between; returns its state, None: it was
+    killed.
+    """
     action, started, acted = record.case.scenario.action, False, False
     deadline = controller.clock.now_s() + (LIMIT_S if process is None else _START_S)
     while True:
@@ -83,7 +85,7 @@ def _follow(
 
 
 def _act(record: CaseRun, bench: FaultBench, clock: Clock, process: Process | None) -> bool:
-    """Does what the scenario asks of the host; whether there still is a controller."""
+    """Executes the host's action; returns whether a controller still runs."""
     action = record.case.scenario.action
     if action == "watch-drives":
         _watch_drives(record, bench, clock)
@@ -111,7 +113,7 @@ def _watch_drives(record: CaseRun, bench: FaultBench, clock: Clock) -> None:
 
 
 def _await_end_of_rules(record: CaseRun, controller: Controller) -> None:
-    """Until no rule acts any more, and a little longer; ticks go on as long as there is a controller."""
+    """Waits until shortly after the end of all rules; ticks continue while a controller runs."""
     case = record.case
     base = controller.read(STATISTICS, _SYNCS) - controller.read(STATISTICS, _TICK)
     deadline = controller.clock.now_s() + LIMIT_S
@@ -125,8 +127,8 @@ def _await_end_of_rules(record: CaseRun, controller: Controller) -> None:
 
 
 def _await_rest(controller: Controller, axes: int) -> None:
-    """Until the axes stand, by what the controller receives: one that is off rolls on. If they do not, the judge
-    sees.
+    """Waits until the axes stand, by the positions that the controller receives; an axis that is off may coast. If they
+    do not stand, the judge reports it.
     """
     deadline = controller.clock.now_s() + LIMIT_S
     place, looks = [0] * axes, 0

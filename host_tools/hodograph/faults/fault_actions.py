@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Actions of the host in a fault case: kills processes, cuts uploads, watches drives without a controller."""
+"""Actions of the host in a fault case: kills processes, breaks off uploads, reads drives without a controller."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STILL_LOOKS = 5
 def cut_upload(controller: Controller, image: bytes, at: int, *, polite: bool) -> None:
     """Sends the first bytes of an image (a multiple of seven, or all but the end), then nothing more.
 
-    `polite` sends the SDO abort that a program in trouble sends; a killed one does not.
+    `polite` sends an SDO abort at the end, as a process does on an error; a killed process does not.
     """
     with controller.turn():
         stream = controller.sdo.open(
@@ -42,13 +42,13 @@ def cut_upload(controller: Controller, image: bytes, at: int, *, polite: bool) -
 
 
 def spawn_command(clock: VirtualClock | None, *words: str) -> Process:
-    """A hodograph command of its own, to be killed."""
+    """A hodograph command as a process, which is killed later."""
     return Process("command", [sys.executable, "-m", "hodograph", *words], clock)
 
 
 @contextmanager
 def drives_at(bus: BusAddress, nodes: Sequence[int], bitrate: int) -> Iterator[list[Any]]:
-    """SDO clients of the drives themselves, for when there is no controller."""
+    """SDO clients of the drives, for times without a controller."""
     with ExitStack() as stack:
         clients = []
         for node in nodes:
@@ -60,11 +60,11 @@ def drives_at(bus: BusAddress, nodes: Sequence[int], bitrate: int) -> Iterator[l
 
 
 def await_rest(clients: Sequence[Any], clock: Clock, tolerance_counts: int, wait_s: float) -> float:
-    """When the drives, asked by SDO, had come to rest, not enabled: seconds as `Clock.now_s`. Raises RunError: they
-    do not.
+    """Waits until the drives, by SDO, are at rest and not enabled; returns the time as `Clock.now_s`. Raises RunError:
+    they never are.
     """
     deadline = clock.now_s() + wait_s
-    rests = {id(client): (0, 0.0, 0) for client in clients}  # place, since when, looks
+    rests = {id(client): (0, 0.0, 0) for client in clients}  # place, time since when, checks
     while True:
         for client in clients:
             place, since_s, looks = rests[id(client)]

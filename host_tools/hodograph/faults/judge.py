@@ -22,7 +22,7 @@ _PATH_TOLERANCE_MM = 3e-6
 """Rounding to counts of 1 nm, and the kernel's own error."""
 
 _FOLLOWS_TICKS = 100
-"""So long at least a drive has to follow its setpoint at the place of rest: it settles there."""
+"""Least time for which a drive has to follow its setpoint at the place of rest, where it settles."""
 
 _PROVISIONAL = {0x1000, 0xFF02}
 """Codes of the controller for a drive until the drive's own emergency code has come (docs/guides/faults.md, policy)."""
@@ -78,7 +78,7 @@ class Verdict:
 
 
 def judge(record: CaseRun) -> Verdict:
-    """Checks everything that a case has recorded."""
+    """Checks a case record against the expectation of its scenario."""
     evidence = record.evidence
     violations = list(record.troubles)
     codes: list[int] = []
@@ -132,7 +132,7 @@ def _reaction(record: CaseRun, evidence: CaseRecord) -> tuple[list[int], Times, 
 
 
 def _reported_faults(record: CaseRun, evidence: CaseRecord) -> list[Emergency]:
-    """Faults since the injection: the controller's words, or, when it was killed, the drives'."""
+    """Faults since the injection: those that the controller reported, or the drives if it was killed."""
     if record.case.scenario.action == CONTROLLER_KILLED:
         found = evidence.emergencies(evidence.drives, evidence.nodes)
     else:
@@ -146,7 +146,7 @@ def _between(evidence: CaseRecord, from_us: int, to_us: int) -> tuple[int, float
 
 
 def _bad_setpoints(record: CaseRun, evidence: CaseRecord) -> list[str]:
-    """Jumps, and setpoints away from the curve."""
+    """Violations: setpoint jumps, and setpoints away from the curve."""
     machine = record.clean_run.machine
     limits = step_limits(machine, record.clean_run.setpoints)
     frames = evidence.control if record.control is None else record.control
@@ -177,7 +177,7 @@ def _distance_mm(record: CaseRun, points: np.ndarray[tuple[int, int], np.dtype[n
 
 
 def _not_seen_at_rest(record: CaseRun, evidence: CaseRecord, codes: list[int]) -> list[str]:
-    """A rest that nobody measured is none that was in time."""
+    """Violations of the time of rest; a rest that was not measured is not in time."""
     expect = record.case.scenario.expect
     if not codes or not expect.limits_rest or record.rest_us is not None:
         return []
@@ -189,7 +189,7 @@ def _not_seen_at_rest(record: CaseRun, evidence: CaseRecord, codes: list[int]) -
 
 
 def _not_on_path(record: CaseRun, evidence: CaseRecord) -> list[str]:
-    """Where the stop has to be on the path: what was late, or was broken off by a quick stop."""
+    """Violations of a stop that has to be on the path: it was late, or a quick stop ended it."""
     found = _reported_faults(record, evidence)
     if not record.case.scenario.expect.on_path or not found or not evidence.moved:
         return []

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenario files: a fault with random places and strengths, and what must come of it.
+"""Scenario files: a fault with random places and strengths, and the expected reaction.
 
 text = "what happens"
 path = "path.toml"                  # the program, and by it the machine; relative to the file
@@ -47,7 +47,7 @@ ACTIONS = (
 )
 NO_LIMIT = 10**9
 RECOVER_MS, NOTHING_TO_RESET_MS = 3000, 1000
-"""How long the recovery of a fault may last; of scenarios that give no code, whose machine goes on by itself."""
+"""Longest recovery of a fault; and of scenarios without codes, whose machine continues by itself."""
 _EXPECT = (
     *("codes", "may", "within_ticks", "within_ms", "rest_ticks", "rest_ms", "same_encoders"),
     *("unseen", "recover_ms", "on_path"),
@@ -61,7 +61,7 @@ Drawn = int | str
 
 @dataclass(frozen=True)
 class Expectation:
-    """What must come of a fault. Times that are not given do not bind."""
+    """The expected reaction to a fault. Times that are not given are not checked."""
 
     codes: tuple[int, ...]
     may: bool
@@ -76,7 +76,7 @@ class Expectation:
 
     @property
     def limits_rest(self) -> bool:
-        """Whether the axes must be seen to come to rest in time."""
+        """Whether the recording has to show that the axes come to rest in time."""
         return min(self.rest_ticks, self.rest_ms) < NO_LIMIT
 
 
@@ -188,7 +188,7 @@ def _try(scenario: Scenario, root: Table) -> None:
 
 
 def _require_names(rule: str, root: Table) -> None:
-    """In braces nothing but names: no attributes, indices or formats of Python's."""
+    """Raises InputError: braces contain more than a name, such as attributes, indices or formats of Python."""
     try:
         fields = [field[1:] for field in Formatter().parse(rule) if field[1] is not None]
     except ValueError as error:

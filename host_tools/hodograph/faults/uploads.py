@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Cases in which an upload breaks off: the program before it must stay active."""
+"""Cases in which an upload breaks off: the old program has to stay active."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SDO_ASK = 0x600
 def disturb_upload(
     record: CaseRun, bench: FaultBench, controller: Controller, control: Recorder
 ) -> None:
-    """Breaks an upload of another program off; what was there must stay."""
+    """Breaks off an upload of another program; the old one has to stay."""
     other = load_clean_run(record.clean_run.other).image
     record.began_us = controller.clock.stamp_ns() // 1000
     if record.case.scenario.action == "kill-upload":
@@ -56,7 +56,7 @@ def disturb_upload(
 def _await_frames(
     clock: Clock, control: Recorder, identifier: int, more: int, process: Process
 ) -> None:
-    """Until so many frames have come since now, or the process has ended."""
+    """Waits until so many frames have come, or the process has ended."""
 
     def count() -> int:
         return int(np.count_nonzero(control.so_far()["id"] == identifier))
@@ -68,19 +68,19 @@ def _await_frames(
 
 
 def _crc_after_cut(controller: Controller) -> int | None:
-    """The program's CRC when the server has done with the broken transfer (a read ends it)."""
+    """The program's CRC after the server has ended the broken transfer (a read ends it)."""
     deadline = controller.clock.now_s() + 5.0
     while True:
         try:
             return controller.program_crc()
-        except (BusError, RefusedError):  # the rest of the old transfer
+        except (BusError, RefusedError):  # remaining frames of the old transfer
             if controller.clock.now_s() > deadline:
                 raise
             controller.clock.sleep(0.05)
 
 
 def _run_old(record: CaseRun, controller: Controller) -> None:
-    """The program that was there before runs as if nothing had been."""
+    """Runs the old program, which has to give the same setpoints."""
     controller.start()
     deadline = controller.clock.now_s() + LIMIT_S
     while controller.state() != READY:

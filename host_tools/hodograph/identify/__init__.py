@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The plant of each axis from a recorded run, with confidence intervals: docs/guides/tuning.md, numerics.md
-section 18."""
+"""Identifies the plant of each axis from a recorded run, with confidence intervals; `hodograph identify`,
+docs/guides/tuning.md, numerics.md section 18.
+"""
 
 from .plant_fit import Estimate, Plant, identify_axis, plant_json, plant_text
 from .stretches import Stretch, stretches

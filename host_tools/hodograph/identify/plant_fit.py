@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Least squares for the plant of one axis: docs/theory/numerics.md section 18.
 
-The drive's own loop, whose gains the drive file gives, is simulated with the recorded setpoints and offsets; gain, time
-constant and Coulomb friction are those with which positions and volts come out as reported.
+The drive's loop, with the gains of the drive file, is simulated with the recorded setpoints and offsets. Gain, time
+constant and Coulomb friction are fitted so that positions and volts are those reported.
 """
 
 from __future__ import annotations
@@ -25,16 +25,18 @@ Float = NDArray[np.float64]
 CONFIDENCE = 1.96
 """Standard errors to either side: 95 %."""
 MEMORY_PERIODS = 50
-"""Over which errors may hang together (Newey and West)."""
+"""Periods over which errors may be correlated (Newey and West)."""
 _SMOOTH = 2**26
-"""Increments a turn of the model's encoder: so fine that small changes of the plant make small differences."""
+"""Increments per turn of the model's encoder: so many that small changes of the plant make small differences."""
 _ROUNDS = 3
 _LEAST_MM, _LEAST_VOLTS = 1e-6, 1e-3 / np.sqrt(12.0)
 _STEPS = np.array([3e-3, 3e-3, 5e-3])
-"""Of central differences: gain and time constant over the guess, friction in V; wide, since friction is not smooth."""
+"""Steps of central differences: gain and time constant over the guess, friction in V; wide, since friction is not
+smooth.
+"""
 _LEAST_TRAVEL_MM = 0.1
 _FRICTION_GAIN = 20.0
-"""By which friction has to lessen the sum of squares, in variances, to be believed."""
+"""Least decrease of the sum of squares by friction, in variances, to accept friction."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Plant:
-    """What was found for an axis; `friction_volts` None: none to be seen. rms: what the model leaves over."""
+    """The fitted plant of an axis; `friction_volts` None: no friction was found. rms: of the residuals."""
 
     gain_rad_s_v: Estimate
     time_constant_s: Estimate
@@ -104,12 +106,12 @@ class _Model:
         )
 
     def residuals(self, figures: Float) -> Float:
-        """All of them, positions first."""
+        """All residuals, positions first."""
         mm, volts = self.errors(figures)
         return np.concatenate([mm / self.scale_mm, volts / self.scale_volts])
 
     def slopes(self, figures: Float) -> Float:
-        """Of the residuals, by figure."""
+        """Derivatives of the residuals, by figure."""
         columns = []
         for i, step in enumerate(_STEPS[: figures.size]):
             away = np.zeros_like(figures)
@@ -159,7 +161,9 @@ def identify_axis(
 def _first_guess(
     motions: Sequence[Stretch], drive: Drive, counts_per_mm: int, period_us: int
 ) -> Drive:
-    """Volts against speed, acceleration and the sign of speed: rough, since volts between two SYNCs are not known."""
+    """A first guess from volts over speed, acceleration and the sign of speed; rough, since volts between two SYNCs are
+    not known.
+    """
     period_s = period_us * 1e-6
     rows, volts = [], []
     for motion in motions:
@@ -182,7 +186,9 @@ def _first_guess(
 
 
 def _fit(model: _Model, start: Float, rounds: int = _ROUNDS) -> Float:
-    """Figures; in between the scales of both kinds of residuals become those that remain."""
+    """The fitted figures; between the rounds the scales of both kinds of residuals are set to those of the remaining
+    residuals.
+    """
     low, figures = _LOW[: start.size], start
     for again in range(rounds):
         found = least_squares(
@@ -203,7 +209,9 @@ def _fit(model: _Model, start: Float, rounds: int = _ROUNDS) -> Float:
 
 
 def _standard_errors(model: _Model, figures: Float) -> Float:
-    """The greater of two: of independent errors, and of some that hang together for MEMORY_PERIODS (Newey, West)."""
+    """The greater of two covariances: of independent errors, and of errors correlated over MEMORY_PERIODS (Newey,
+    West).
+    """
     residuals, jacobian = model.residuals(figures), model.slopes(figures)
     bread = np.linalg.inv(jacobian.T @ jacobian)
     scores = (jacobian * residuals[:, np.newaxis]).reshape(2, model.periods, -1).sum(axis=0)

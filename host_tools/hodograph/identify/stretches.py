@@ -26,7 +26,7 @@ from ..errors import RunError
 from ..native import AxisInputs
 
 LATE_SYNCS = 100
-"""Answers that are late are made up for within so many SYNCs; else a frame was lost."""
+"""SYNCs within which late answers have to arrive; otherwise a frame was lost."""
 
 Flags = NDArray[np.bool_]
 
@@ -42,8 +42,8 @@ def without_gaps(frames: Frames) -> list[Frames]:
 def answered(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> Flags:
     """For each SYNC but the last: whether one frame with this identifier belongs to it.
 
-    Frames keep their order, so an interval without one is made up for by a later one with two. Where two come and none
-    is due, what came since the last loss belongs to SYNCs before, and is not taken.
+    Frames keep their order, so a later interval with two frames compensates for an interval without one. If two come
+    and none is due, frames since the last loss belong to earlier SYNCs and are not used.
     """
     at = np.flatnonzero(frames["id"] == identifier)
     interval = np.searchsorted(sync_at, at) - 1
@@ -67,13 +67,14 @@ def answered(frames: Frames, sync_at: NDArray[np.intp], identifier: int) -> Flag
 
 
 PARK_PERIODS = 250
-"""After so many periods with one target a simulated drive stands exactly there (docs/reference/protocol.md
-section 3)."""
+"""Periods with one target after which a simulated drive is in standstill lock (docs/reference/protocol.md section
+3).
+"""
 
 _FOLLOWS = 0x1027
 _FOLLOWS_MASK = 0x106F
 _STILL = 3
-"""SYNCs with one target before a motion that begins at rest: a run's recording begins a few before its start."""
+"""Least SYNCs with one target before a motion that begins at rest; a run's recording begins a few before its start."""
 _REST = PARK_PERIODS + REACHED_AFTER
 
 Float = NDArray[np.float64]
@@ -109,7 +110,7 @@ def stretches(frames: Frames, node: int) -> list[Stretch]:
 
 
 def _in_part(frames: Frames, node: int) -> list[Stretch]:
-    """Those of a part without a missing SYNC."""
+    """The motions of a part without a missing SYNC."""
     sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
     whole = complete_ticks(frames, sync_at, RPDO1 + node)
     for function in (TPDO1, TPDO2):
@@ -124,7 +125,9 @@ def _in_part(frames: Frames, node: int) -> list[Stretch]:
 
 
 def _motions(ticks: Ticks, speeds: NDArray[np.int32], torques: NDArray[np.int16]) -> list[Stretch]:
-    """Period i goes to the target sent after SYNC i, from SYNC i+1 to SYNC i+2."""
+    """The motion of one change of targets. Period i, from SYNC i+1 to SYNC i+2, leads to the target sent after SYNC
+    i.
+    """
     assert ticks.volts_mv is not None
     follows = (ticks.statuswords[:, 0] & _FOLLOWS_MASK) == _FOLLOWS
     targets = ticks.targets[:, 0]
@@ -142,7 +145,7 @@ def _motions(ticks: Ticks, speeds: NDArray[np.int32], torques: NDArray[np.int16]
 
 
 def _groups(changes: NDArray[np.intp]) -> list[tuple[int, int]]:
-    """Changes of the target that belong together, without a rest between: first and last of each group."""
+    """Groups of target changes without a rest between them: first and last of each group."""
     if not changes.size:
         return []
     cuts = np.flatnonzero(np.diff(changes) > _REST)

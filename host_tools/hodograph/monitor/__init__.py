@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: MIT
 """The live page: `hodograph monitor`, on a running bus or from a recording (docs/guides/monitor.md).
 
-source       where frames come from: a bus, or a recording
-decoder      frames to samples, one a SYNC
-derived      samples and the program's curve to what the plots show: feed, jerk, following and contour error
+source       source of frames: a bus, or a recording
+decoder      frames to samples, one for each SYNC
+derived      samples and the program's curve to the figures of the plots: feed, jerk, following and contour error
 job_path     the contour error of a streamed job, from the chunks on the bus
 messages     groups of rows that keep their peaks, as JSON
 pump         all of these, some 25 times a second, in a thread of its own
 link         the controller's state and commands, by SDO, in another
-emergencies  EMCY frames as events, some of a storm
+emergencies  EMCY frames as events, a bounded number of equal ones
 clients      client slots, and bounded queues of messages to the browsers
 security     who may see, who may command
 server       HTTP and WebSocket
 session      a monitor from start to end
-page         what the browser gets
+page         the files for the browser
 """

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""From a stream of frames to samples, one a SYNC: what was set, what was answered.
+"""From a stream of frames to samples, one for each SYNC: setpoints and answers.
 
-Unlike `bus.capture.decode`, which proves that a recording is whole, this one goes on whatever is missing: a value
-that did not come is NaN. An answer may come after the next SYNC (docs/reference/protocol.md section 2), so
-the last SYNCs are
-held back for a few ticks, and two answers between two SYNCs are the late one and the present one.
+`bus.capture.decode` requires a complete recording. This decoder continues if frames are missing: the value is NaN then.
+An answer may come after the next SYNC (docs/reference/protocol.md section 2), so the last SYNCs are kept for a few
+ticks, and of two answers between two SYNCs the first is the late one.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from ..bus.capture.frames import Frames
 HELD_BACK = 3
 """SYNCs that wait for late answers."""
 _MOST_TAIL = 4096
-"""Setpoints and answers kept while no SYNC comes: with more of them something else is wrong, and they are forgotten."""
+"""Most setpoints and answers kept without a SYNC; if there are more, they are dropped."""
 
 Floats = NDArray[np.float64]
 
@@ -30,8 +29,8 @@ Floats = NDArray[np.float64]
 class Samples:
     """Rows by SYNC, columns by axis: targets sent after it and positions answered to it, in counts.
 
-    `sync` counts SYNCs from the first one received, lost ones too. NaN in targets and actual, -1 in statuswords: did
-    not come.
+    `sync` counts SYNCs from the first one received, including lost ones. NaN in targets and actual, -1 in statuswords:
+    no frame came.
     """
 
     sync: NDArray[np.int64]
@@ -52,7 +51,7 @@ def nodes_in(frames: Frames) -> tuple[int, ...]:
 
 
 class Decoder:
-    """Keeps what is not yet complete between two calls of `feed`."""
+    """Decodes frames; keeps incomplete ticks between two calls of `feed`."""
 
     def __init__(self, nodes: Sequence[int]) -> None:
         self._nodes = tuple(nodes)
@@ -82,14 +81,14 @@ class Decoder:
         return samples
 
     def _keep(self, frames: Frames) -> None:
-        """Until more SYNCs come; they may never, so this is bounded."""
+        """The frames to keep until more SYNCs come, bounded since they may never come."""
         if frames.size > _MOST_TAIL:
             frames = frames[:0]
             self._used = dict.fromkeys(self._used, 0)
         self._tail = frames
 
     def _count(self, frames: Frames, sync_at: NDArray[np.intp]) -> NDArray[np.int64]:
-        """Running numbers of these SYNCs; the counter shows lost ones."""
+        """Running numbers of these SYNCs; their counter reveals lost ones."""
         counters = frames["data"][sync_at, 0].astype(np.int64)
         before = counters[0] - 1 if self._counter is None else self._counter
         steps = (np.diff(counters, prepend=before) - 1) % SYNC_OVERFLOW + 1
@@ -117,7 +116,7 @@ class Decoder:
     def _stream(
         self, frames: Frames, sync_at: NDArray[np.intp], done: int, identifier: int
     ) -> tuple[NDArray[np.intp], NDArray[np.uint8]]:
-        """Row and data of the frames with this identifier, as far as their SYNCs are done."""
+        """Row and data of the frames with this identifier, for complete SYNCs."""
         at = np.flatnonzero((frames["id"] == identifier) & (frames["length"] >= 6))
         interval = np.searchsorted(sync_at, at) - 1
         data = frames["data"][at]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""What the plots show, from samples and the curve of the program (sim/offline/contour, docs/theory/numerics.md).
+"""The figures of the plots, from samples and the curve of the program (sim/offline/contour, docs/theory/numerics.md).
 
 Feed, tangential acceleration and jerk are those of the setpoints: derivatives of the distance along them, by a
-polynomial fitted to a window of some 21 ms around each tick (Savitzky and Golay), since third differences of counts
-of 1 nm would be noise of 4000 mm/s^3; the fit leaves some 2 mm/s^3 of it. A setpoint k is compared with what the drives
-report for SYNC k+2 (docs/reference/protocol.md section 2).
+polynomial fitted to a window of some 21 ms around each tick (Savitzky and Golay), since third differences of counts of
+1 nm would have noise of 4000 mm/s^3; after the fit it is about 2 mm/s^3. A setpoint k is compared with the reports of
+the drives for SYNC k+2 (docs/reference/protocol.md section 2).
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ from .decoder import Floats, Samples
 DRAWN_POINTS = 3000
 _TABLE_POINTS = 20000
 _ON_PATH_UM = 1.0
-"""Setpoints of the program are rounded to counts; what is farther from the curve than this is another motion."""
+"""Greatest distance of setpoints from the curve, which are rounded to counts; beyond it they belong to another
+motion.
+"""
 
 
 class ProgramPath:
-    """Follows setpoints along the curve, so that it knows the arc length of each.
+    """Computes the arc length of each setpoint along the curve.
 
-    The arc length is not on the bus: it is the distance along the setpoints, corrected by the projection on the curve.
-    Where the setpoints are not on the curve, for example in a move to the start, the place is searched again.
-    Raises InputError for an image that is not a program.
+    The arc length is not on the bus. It is the distance along the setpoints, corrected by the projection on the curve.
+    After setpoints that are not on the curve, for example in a move to the start, the place is searched again. Raises
+    InputError for an image that is not a program.
     """
 
     def __init__(self, image: bytes, counts_per_mm: int) -> None:
@@ -55,7 +57,7 @@ class ProgramPath:
         self._points_mm, self._extra = places[:, :SPACE_AXES], places[:, SPACE_AXES:]
         self._tangents = _tangents(self._arc_mm, self._points_mm)
         self.axes = self._points_mm.shape[1]
-        """That draw the curve: 2 in the plane, 3 in space."""
+        """Number of axes that draw the curve: 2 in the plane, 3 in space."""
         self._last_mm: float | None = None
         self._last_counts: Floats | None = None
 
@@ -75,10 +77,10 @@ class ProgramPath:
         return arcs, extra
 
     def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
-        """Distance of the positions (n, A) from the curve, in um, beside the setpoints (n, A), all in counts; A is
-        `axes`, or more: what is after them counts for nothing. And the arc lengths of the setpoints, in mm.
+        """Distances of positions (n, A) from the curve, in um, near their setpoints (n, A), all in counts; and the arc
+        lengths of the setpoints, in mm. A is at least `axes`; later axes are not used.
 
-        NaN where the setpoint is not on the curve, or something did not come.
+        NaN: the setpoint is not on the curve, or a frame is missing.
         """
         errors, places = (np.full(targets.shape[0], np.nan) for _ in range(2))
         if targets.shape[1] < self.axes:
@@ -98,7 +100,7 @@ class ProgramPath:
 
     @property
     def arc_length_mm(self) -> float | None:
-        """Where on the path the last setpoint was; None when it was not on it."""
+        """Arc length of the last setpoint; None: it was not on the path."""
         return self._last_mm
 
     def _follow(self, counts: Floats) -> tuple[Floats, NDArray[np.bool_]]:
@@ -147,7 +149,7 @@ class ProgramPath:
 
 
 def _table(program: NativeProgram) -> tuple[Floats, Floats]:
-    """Arc lengths, ascending, and all path axes of a program, at even times."""
+    """Rising arc lengths, and all path axes of a program, at equal steps of time."""
     count = min(program.ticks, _TABLE_POINTS)
     end_q42 = program.duration_q32_s << 10
     times = np.array([end_q42 * i // (count - 1) for i in range(count)], dtype=np.uint64)
@@ -164,7 +166,7 @@ def _tangents(arcs: Floats, points: Floats) -> Floats:
 
 
 class FollowedPath(Protocol):
-    """A path along which setpoints are followed."""
+    """A path on which setpoints are located."""
 
     def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
         """See ProgramPath."""
@@ -176,14 +178,14 @@ _HALF_WINDOW_S = 0.010
 _LEAST_HALF = 3
 _ORDER = 4
 _LONGEST_GAP = 1000
-"""Lost SYNCs that are filled with NaN; after more the filters restart."""
+"""Most lost SYNCs that are filled with NaN; after more the filters restart."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """One row a tick: time since the first SYNC, positions in mm, and figures in the units of their names.
+    """One row for each tick: time since the first SYNC, positions in mm, and figures in the units of their names.
 
-    An rotary axis has degrees for mm, and thousandths of a degree for um.
+    A rotary axis has degrees for mm, and thousandths of a degree for um.
     """
 
     t_s: Floats
@@ -203,14 +205,14 @@ class Rows:
 
 
 def derivative_weights(half: int, order: int, derivative: int) -> Floats:
-    """Weights of 2 half + 1 equidistant values for the derivative in the middle, per step."""
+    """Weights of 2 half + 1 equidistant values for the derivative at the middle one, per step."""
     steps = np.arange(-half, half + 1)
     fit = np.linalg.pinv(np.vander(steps, order + 1, increasing=True).astype(float))
     return np.asarray(math.factorial(derivative) * fit[derivative])
 
 
 class Derivation:
-    """Keeps the rows that later ticks are still needed for between two calls of `feed`."""
+    """Derives rows from samples; between two calls of `feed` it keeps rows that still need later ticks."""
 
     def __init__(self, counts_per_unit: Sequence[int], drawn: int, period_us: int) -> None:
         """`counts_per_unit`: of a mm or a degree, by axis; `drawn`: how many of the axes draw the path."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Emergency frames as messages to the browsers: a few of many equal ones, with the number of those left out."""
+"""Emergency frames as messages to the browsers: of many equal ones a few, with the number of the others."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from ..bus.diagnostics.texts import fault_words
 
 WINDOW_S = 1.0
 MOST_REPORTED = 10
-"""Events in a window; of the same node and code one."""
+"""Most events in a window; of the same node and code one."""
 _EMCY, _NODES = 0x080, 0x7F
 _WINDOW_US = round(1e6 * WINDOW_S)
 
 
 class Emergencies:
-    """Reported as they come, within the bounds of each window; what was left out is counted at its end.
+    """Reports emergencies as they come, within the bounds of each window; at its end it reports the number of the
+    others.
 
-    A window begins with an emergency frame, and ends by the time stamps of the bus: what is reported of a recording
-    does not depend on how it is cut into pieces.
+    A window begins with an emergency frame and ends by the time stamps of the bus. So the messages for a recording do
+    not depend on the parts in which it is read.
     """
 
     def __init__(self) -> None:
@@ -30,8 +31,8 @@ class Emergencies:
         self._left_out = 0
 
     def feed(self, frames: Frames, now_us: int | None = None) -> list[dict[str, Any]]:
-        """Messages for these frames (`RECORD_DTYPE`). `now_us`: the present, where it is known; without frames it ends
-        a window, too.
+        """Messages for these frames (`RECORD_DTYPE`). `now_us`: the present time, None: not known; it also ends a
+        window without frames.
         """
         identifiers = frames["id"]
         found = frames[(identifiers > _EMCY) & (identifiers <= _EMCY + _NODES)]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The contour error of a streamed job: its path is known from the chunks that have passed on the bus.
 
-The path of a chunk is the beginning of that of the next one, so each chunk counts up to where its successor begins.
+The next chunk repeats the last part of a chunk's path, so each chunk is used up to the start of its successor.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from ..stream.geometry import Curve
 from .decoder import Floats
 
 _ON_PATH_UM = 1.0
-"""Setpoints are rounded to counts; what is farther from the path than this is another motion."""
+"""Greatest distance of setpoints from the path, which are rounded to counts; beyond it they belong to another
+motion.
+"""
 _STEP_MM, _MOST_SAMPLES = 0.1, 20_000
-"""Of the search for a setpoint whose place is not known."""
+"""Step in mm of the search for a setpoint whose place is not known."""
 _BESIDE_MM = 1e-3
 _KEPT_MM = 50.0
-"""Kept before the last setpoint, for frames that come late."""
+"""Length in mm of the path kept before the last setpoint, for late frames."""
 _MOST_PARTS = 500
 _PROJECTIONS = 4
 
@@ -37,7 +39,7 @@ class _Part:
 
 
 class JobPath:
-    """Follows the setpoints of a job along the chunks that have come, as ProgramPath does along a program."""
+    """Locates the setpoints of a job on the received chunks, as ProgramPath does on a program."""
 
     def __init__(self, counts_per_mm: int) -> None:
         self._counts_per_mm = counts_per_mm
@@ -48,7 +50,7 @@ class JobPath:
         self._last_point: Floats | None = None
 
     def add(self, chunk: Chunk) -> None:
-        """Adds the next chunk of the job. A chunk of another job begins a new path; turning alone draws nothing."""
+        """Adds the next chunk of the job. A chunk of another job begins a new path; rotary axes alone are not drawn."""
         program = chunk.program
         if chunk.header.first or chunk.header.job != self._job:
             self._job = chunk.header.job
@@ -65,10 +67,10 @@ class JobPath:
         self._samples = None
 
     def contour_errors_um(self, targets: Floats, actual: Floats) -> tuple[Floats, Floats]:
-        """Distance of the positions (n, A) from the path, in um, beside the setpoints (n, A), all in counts; and the
-        arc lengths of the setpoints in the job, in mm.
+        """Distances of positions (n, A) from the path, in um, near their setpoints (n, A), all in counts; and the arc
+        lengths of the setpoints in the job, in mm.
 
-        NaN where the setpoint is not on the path, or something did not come.
+        NaN: the setpoint is not on the path, or a frame is missing.
         """
         errors, places = (np.full(targets.shape[0], np.nan) for _ in range(2))
         there = np.flatnonzero(np.isfinite(targets).all(axis=1) & np.isfinite(actual).all(axis=1))
@@ -114,7 +116,9 @@ class JobPath:
         return arcs, off_um < _ON_PATH_UM
 
     def _projected(self, arcs: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Arc lengths near `arcs` where the path is nearest to points, and how far they are from it, in um."""
+        """Arc lengths near `arcs` at which the path is nearest to points, and the distances of the points from it, in
+        um.
+        """
         low, high = self._parts[0].begin_mm, self._parts[-1].begin_mm + self._parts[-1].length_mm
         for _ in range(_PROJECTIONS):
             arcs = np.clip(arcs, low, high)

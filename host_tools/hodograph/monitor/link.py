@@ -2,8 +2,8 @@
 """The controller by SDO, in a thread of its own: its state a few times a second, and the commands of browsers in
 between.
 
-A command does not wait until a state has been read: it goes between two objects of it; a program that is just being
-fetched is given up for it. In virtual time the thread takes part, and what it waits for is counted in that time.
+A command does not wait until a state has been read: it is sent between two objects of it, and it breaks off the
+transfer of a program. In virtual time the thread is a participant, and its waits are counted in that time.
 """
 
 from __future__ import annotations
@@ -46,17 +46,17 @@ from .pump import Publish
 
 PAUSE_S = 0.2
 WHOLE_S = 1.5
-"""Between two readings of the state and what moves; between two of everything."""
+"""Period of reading the state and moving values, and period of reading all values."""
 _ANSWER_S = 3.0
 _RETRY_S = 1.0
 LONGEST_UPLOAD = 256 * 1024
-"""A program up to this size is fetched from the controller to be drawn; larger ones would take the bus too long."""
+"""A program up to this size is read from the controller and drawn; larger ones would occupy the bus for too long."""
 
 Command = Callable[[Controller], None]
 
 
 class _Prompt(Controller):
-    """A controller that lets something be done before each object is read."""
+    """A controller that calls a function before each object is read."""
 
     before_read: Callable[[], None]
 
@@ -66,9 +66,8 @@ class _Prompt(Controller):
 
 
 class Link:
-    """`show_program` is called with the image of the controller's program, or None and why there is none.
-
-    `given` is the image that is shown already.
+    """`show_program` is called with the image of the controller's program, or None and the reason. `given` is the image
+    that is shown already.
     """
 
     def __init__(
@@ -90,11 +89,11 @@ class Link:
         self._ending = threading.Event()
         self._in_command = False
         self._clock: VirtualClock | None = None
-        """Of the present connection, where time is virtual."""
+        """Clock of the present connection in virtual time."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
 
     def start(self) -> None:
-        """Begins to look for the controller."""
+        """Starts the thread, which waits for the controller."""
         self._thread.start()
 
     def close(self) -> None:
@@ -111,14 +110,14 @@ class Link:
         return self._thread.is_alive()
 
     def submit(self, command: Command) -> Future[None]:
-        """Gives a command; the future has a HodographError when it was not taken."""
+        """Queues a command; the future gets a HodographError if the controller does not accept it."""
         done: Future[None] = Future()
         self._commands.put((command, done))
         self._wake_up()
         return done
 
     def _wake_up(self) -> None:
-        """There is something to do for the thread."""
+        """Wakes the thread."""
         self._wake.set()
         clock = self._clock
         if clock is not None:
@@ -179,11 +178,11 @@ class Link:
             failures = 0
             self._publish({"type": "status", "connected": True, "note": "", "status": status})
             self._execute(controller)
-            # However slow the bus or this computer is, others find the controller's channel free most of the time.
+            # On a slow bus or computer, too, the controller's channel is free for other clients most of the time.
             self._pause(clock, max(PAUSE_S, 2 * (clock.now_s() - begun_s)))
 
     def _pause(self, clock: Clock, seconds: float) -> None:
-        """Until somebody stirs us."""
+        """Waits until the thread is woken."""
         if isinstance(clock, VirtualClock):
             until_s = clock.now_s() + seconds
             while not self._wake.is_set() and clock.now_s() < until_s:
@@ -202,7 +201,7 @@ class Link:
                 self._commands.get_nowait()[1].set_exception(error)
 
     def _execute(self, controller: Controller) -> None:
-        """Carries out the commands that wait."""
+        """Executes the queued commands."""
         if self._in_command:
             return
         self._in_command = True
@@ -218,7 +217,7 @@ class Link:
             self._in_command = False
 
     def _look_at_program(self, controller: Controller, program: dict[str, Any]) -> None:
-        """Fetches the program to draw when it is another one than before."""
+        """Reads the program to draw if it is not the one before."""
         crc32 = program["crc32"] if program["state"] == "ready" else None
         if crc32 == self._crc32 or (crc32 is None and self._given_crc32 is not None):
             return
@@ -245,7 +244,7 @@ def _changed(controller: Controller, status: dict[str, Any]) -> bool:
 
 
 def _moving_part(controller: Controller) -> dict[str, Any]:
-    """What changes from reading to reading: some objects instead of all, the same keys as in `read_status`."""
+    """The values that change often: some objects instead of all, with the keys of `read_status`."""
     return {
         "stream": stream_dict(controller),
         "motion": {
@@ -262,7 +261,7 @@ def _moving_part(controller: Controller) -> dict[str, Any]:
 
 
 def _fetch(controller: Controller, give_up: Callable[[], bool]) -> bytes | None:
-    """The image of the active program; None when it was given up, since a large one takes seconds."""
+    """The image of the active program; None: a command broke off the transfer, which takes seconds for a large one."""
     try:
         with controller.turn():
             stream = controller.sdo.open(PROGRAM, 1, "rb", buffering=0)
@@ -296,7 +295,7 @@ _BUTTONS = {
 
 
 def read_command(request: dict[str, Any]) -> Command:
-    """The command that a request of a browser stands for. Raises InputError for anything else."""
+    """The command of a browser's request. Raises InputError: there is no such command."""
     name = request.get("name")
     if name == "override":
         percent = request.get("percent")

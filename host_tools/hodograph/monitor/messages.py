@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Messages to the browsers, as JSON: rows in groups that keep every peak, few digits, null where there is no value."""
+"""Messages to the browsers, as JSON: rows in groups that keep each peak, with few digits, null for missing values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .derived import ProgramPath, Rows
 
 
 def group_starts(count: int, size: int, most: int) -> NDArray[np.intp]:
-    """First rows of groups over `count` rows: `size` rows each, more when that would make over `most` groups."""
+    """First rows of groups over `count` rows: `size` rows each, more if there would be over `most` groups."""
     if count == 0:
         return np.empty(0, dtype=np.intp)
     size = max(1, size, -(-count // most))
@@ -24,7 +24,7 @@ def group_starts(count: int, size: int, most: int) -> NDArray[np.intp]:
 
 
 def extremes(values: Floats, starts: NDArray[np.intp]) -> tuple[Floats, Floats]:
-    """Least and greatest value of each group, by column where there are several; NaN where there is no value."""
+    """Least and greatest value of each group, by column; NaN: there is no value."""
     if starts.size == 0:
         empty = np.empty((0, *values.shape[1:]))
         return empty, empty
@@ -37,7 +37,7 @@ def extremes(values: Floats, starts: NDArray[np.intp]) -> tuple[Floats, Floats]:
 GROUP_S = 0.010
 """Time that one group of the plots covers at the machine's own pace."""
 MOST_GROUPS = 100
-"""Groups in a message at most: at full pace, and after a stall of more than a second, they become longer."""
+"""Most groups in a message; at full pace, and after a stall of more than a second, they are longer."""
 POINT_S = 0.004
 MOST_POINTS = 250
 """The same for the points of the path."""
@@ -57,8 +57,10 @@ def numbers(values: Floats, digits: int) -> list[float | None]:
 def path_message(
     path: ProgramPath | None, note: str = "", marks: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
-    """The program's curve to draw, in space with z; axes after z over arc length; `note`: why there is none, or
-    what is odd about it. `marks`: places where outputs switch.
+    """The program's curve, in space with z; axes after z over arc length.
+
+    note   why there is no curve, or a remark on it
+    marks  places where outputs switch
     """
     message: dict[str, Any] = {"type": "path", "note": note, "x": [], "y": []}
     if path is not None:
@@ -84,8 +86,8 @@ def path_message(
 def job_message(
     job: int, points_mm: Floats, marks: Sequence[dict[str, Any]] = ()
 ) -> dict[str, Any]:
-    """The path of a streamed job as far as it is known, points (n, 2) or (n, 3), in place of that of a program.
-    `marks`: places where outputs switch.
+    """The known path of a streamed job, points (n, 2) or (n, 3), in place of that of a program. `marks`: places where
+    outputs switch.
     """
     message: dict[str, Any] = {"type": "path", "note": "", "name": f"job {job}"}
     if marks:
@@ -104,8 +106,10 @@ def rows_message(
     marks: Sequence[tuple[float, str]] = (),
     program: int | None = None,
 ) -> dict[str, Any]:
-    """The rows of one poll, decimated. `age_ms`: how old the newest frame in it is. `drawn`: how many axes draw the
-    path, whose positions the points have; further axes of the `path_axes` have theirs with the arc length.
+    """The rows of one poll, decimated.
+
+    age_ms   age of the newest frame in it
+    drawn    number of axes that draw the path; the others of the `path_axes` are given over arc length
 
     marks    outputs whose places were passed, with the times
     program  CRC-32 of the program along which the arc lengths are; None: of a job

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of the program, or of a streamed job, on the live page: where they switch on its path, and when its setpoints
-passed these places.
+"""Outputs of the program, or of a streamed job, on the live page: the places where they switch, and the times at which
+setpoints passed these places.
 
-The times are those of the setpoints on the bus, not of the frames of the I/O module: a feed override or a hold moves
-them, a stop before a place leaves it out.
+The times are those of the setpoints on the bus, not of the frames of the I/O module. A feed override or a hold shifts
+them; after a stop before a place it has no time.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from .decoder import Floats
 from .derived import ProgramPath
 
 _BESIDE_MM = 1e-5
-"""The arc length of a setpoint on the bus is known so well: setpoints are rounded to counts."""
+"""Accuracy of the arc length of a setpoint on the bus: setpoints are rounded to counts."""
 
 _MOST = 200
-"""Marks of a streamed job that are kept."""
+"""Most marks of a streamed job that are kept."""
 
 
 @dataclass(frozen=True)
 class OutputMark:
-    """What switches at a place of the path: `text` has a line for each output."""
+    """The outputs that switch at a place of the path: `text` has a line for each."""
 
     place_mm: float
     text: str
 
 
 def output_marks(outputs: Outputs | None, events: Events) -> tuple[OutputMark, ...]:
-    """The marks of a program, by place; none where the outputs of the machine are not known."""
+    """The marks of a program, by place; empty if the outputs of the machine are not known."""
     placed = placed_outputs(outputs, events)
     return tuple(
         OutputMark(place, words_of([one for one in placed if one.place_mm == place]))
@@ -60,24 +60,24 @@ def _with_points(marks: tuple[OutputMark, ...], points: Floats) -> list[dict[str
 
 
 class PassedMarks:
-    """Follows the arc lengths of setpoints, poll by poll."""
+    """Finds the marks that setpoints pass, poll by poll."""
 
     def __init__(self, marks: tuple[OutputMark, ...] = ()) -> None:
         self._marks = marks
         self._last_mm = np.nan
 
     def anew(self) -> PassedMarks:
-        """The same marks for another source, whose setpoints do not follow those of this one."""
+        """Restarts with the same marks, for another source of setpoints."""
         return PassedMarks(self._marks)
 
     def with_marks(self, marks: tuple[OutputMark, ...]) -> PassedMarks:
-        """Other marks for setpoints that go on."""
+        """Replaces the marks for continuing setpoints."""
         made = PassedMarks(marks)
         made._last_mm = self._last_mm
         return made
 
     def feed(self, t_s: Floats, arc_mm: Floats) -> list[tuple[float, str]]:
-        """Time and text of each mark that these setpoints (n,) came to or passed; NaN: a setpoint off the path."""
+        """Time and text of each mark that these setpoints (n,) reached or passed; NaN: a setpoint off the path."""
         if not self._marks or not t_s.size:
             return []
         before = np.concatenate(([self._last_mm], arc_mm[:-1]))
@@ -92,7 +92,7 @@ class PassedMarks:
 
 
 class JobMarks:
-    """The marks of a streamed job, as far as its chunks have come: of a long job the last ones."""
+    """The marks of a streamed job from its received chunks; of a long job the last ones."""
 
     def __init__(self, outputs: Outputs | None) -> None:
         self._outputs = outputs
@@ -100,10 +100,12 @@ class JobMarks:
         self.marks: tuple[OutputMark, ...] = ()
         """By arc length of the job."""
         self.drawn: list[dict[str, Any]] = []
-        """The same with their points, for a message."""
+        """The marks with their points, for a message."""
 
     def add(self, chunk: Chunk) -> None:
-        """Those of another chunk, but for the part that it repeats; the first of another job begins anew."""
+        """Adds the marks of another chunk, without its shared part. The first chunk of another job replaces all
+        marks.
+        """
         header, program = chunk.header, chunk.program
         begin_q40 = header.job_start_q40
         new = program.events

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The thread that turns frames into messages: some 25 times a second, whatever the bus brings.
+"""The thread that makes messages of frames, about 25 times a second at any bus load.
 
-What the messages say counts in the time stamps of the frames; the time of this computer only paces them.
+The content of messages depends on the time stamps of the frames only; the clock of this computer only paces them.
 """
 
 from __future__ import annotations
@@ -39,25 +39,25 @@ Publish = Callable[[dict[str, Any]], None]
 
 @dataclass(frozen=True)
 class Layout:
-    """What the frames of a machine mean."""
+    """The machine data that are needed to decode its frames."""
 
     names: tuple[str, ...]
     nodes: tuple[int, ...]
     counts_per_unit: tuple[int, ...]
-    """Of a mm, or of a degree where the axis turns."""
+    """Counts of a mm, or of a degree of a rotary axis."""
     units: tuple[str, ...]
     drawn: int
-    """How many of the axes draw a path: 2 in the plane, 3 in space."""
+    """Number of axes that draw a path: 2 in the plane, 3 in space."""
     period_us: int
     bitrate: int
     limits: StepLimits | None = None
     """Limits of setpoint steps; None: not known."""
     path_axes: int = 2
-    """How many of the axes follow a path."""
+    """Number of axes that follow a path."""
     controller: int = 1
-    """Its node."""
+    """Node of the controller."""
     outputs: Outputs | None = None
-    """Of the machine, which name what a program switches; None: they are not known."""
+    """Outputs of the machine, for the names in marks; None: not known."""
 
 
 @dataclass
@@ -71,7 +71,7 @@ class PumpLoad:
 
 
 class Pump:
-    """Owns the source; `open_source` is called again whenever the bus went away."""
+    """Owns the source; `open_source` is called again after each end of the bus."""
 
     def __init__(self, open_source: Callable[[], Source], layout: Layout, publish: Publish) -> None:
         self._open_source = open_source
@@ -99,7 +99,7 @@ class Pump:
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread and gives the bus back."""
+        """Ends the thread and closes the bus."""
         self._ending.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -114,7 +114,7 @@ class Pump:
         self._again.set()
 
     def show(self, image: bytes | None, note: str = "") -> None:
-        """The program whose curve counts from now on; None: there is none."""
+        """Sets the program whose curve is used from now on; None: there is none."""
         path = None
         if image is not None:
             try:
@@ -199,7 +199,7 @@ class Pump:
             self._publish(self._drives(samples))
 
     def _draw_chunks(self, taken: Taken) -> None:
-        """The path of a streamed job grows with the chunks that pass on the bus."""
+        """Extends the path of a streamed job with the chunks that pass on the bus."""
         chunks = self._chunks.feed(taken.frames)
         for chunk in chunks:
             self._job.add(chunk)
@@ -216,7 +216,7 @@ class Pump:
         return self._job_path if self._streams else self._path
 
     def _check_setpoints(self, taken: Taken) -> None:
-        """Once in half a thousand SYNCs the worst step by each rule, if it breaks its limit."""
+        """Publishes the worst setpoint step by each rule every 500 SYNCs, if it breaks its limit."""
         if self._layout.limits is None:
             return
         steps = self._watch.feed(taken.frames)
@@ -226,7 +226,7 @@ class Pump:
             self._publish({"type": "event", "text": str(jump), "fault": True})
 
     def _drives(self, samples: Samples) -> dict[str, Any]:
-        """Positions and states of the drives from their frames, and the bus load."""
+        """Publishes positions and states of the drives, and the bus load."""
         layout = self._layout
         drives = []
         for axis, (name, node) in enumerate(zip(layout.names, layout.nodes, strict=True)):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Who may see the page and who may command (docs/guides/monitor.md, "Who may do what").
+"""Permissions of the live page: who may see it, and who may command (docs/guides/monitor.md, "Who may do what").
 
 Three checks. The token, compared in constant time, makes a connection one that may command. The Host header must be a
-name of this machine, so that a foreign site cannot have its own name point here (DNS rebinding). The Origin header
-must be our own page, so that a foreign site cannot speak to us through the browser (cross-site WebSockets).
+name of this computer, so that the name of a foreign site cannot point here (DNS rebinding). The Origin header must be
+this page, so that a foreign site cannot use the server through the browser (cross-site WebSockets).
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer: nothing foreign in the page, the page in nothing foreign."""
+"""Headers of each answer: the page loads no foreign content, and foreign pages cannot embed it."""
 
 
 def make_token(given: str | None) -> str:
-    """The token given, or a new one of 192 random bits. Raises InputError for one that is easily guessed."""
+    """The given token, or a new one of 192 random bits. Raises InputError: it is easily guessed."""
     if given is None:
         return secrets.token_urlsafe(24)
     if len(given) < LEAST_TOKEN or not _TOKEN.fullmatch(given):
@@ -47,7 +47,7 @@ def make_token(given: str | None) -> str:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach what is bound to `host`."""
+    """Whether only this computer can reach a socket that is bound to `host`."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -67,13 +67,13 @@ class Guard:
         return is_loopback(self.host)
 
     def knows_token(self, given: object) -> bool:
-        """Compares without telling, by the time it takes, how much was right."""
+        """Compares the token in constant time."""
         if not isinstance(given, str):
             return False
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     def knows_host(self, header: str | None) -> bool:
-        """Whether a Host header names this machine. A foreign page's name never is an address."""
+        """Whether a Host header names this computer. The name of a foreign page is never an address."""
         name = _host_name(header)
         if name is None:
             return False
@@ -84,7 +84,7 @@ class Guard:
         return name in {"localhost", self.host.lower(), *_own_names()}
 
     def knows_origin(self, origin: str | None, host_header: str | None) -> bool:
-        """Whether a request comes from our own page. Browsers always say where a WebSocket comes from."""
+        """Whether a request comes from this page. Browsers always send the origin of a WebSocket."""
         if origin is None or host_header is None:
             return False
         try:
@@ -95,7 +95,7 @@ class Guard:
 
 
 def _host_name(header: str | None) -> str | None:
-    """The name of a Host header without the port: with forwarding that need not be ours."""
+    """The name of a Host header without the port, which may differ with port forwarding."""
     if not header or "@" in header or "/" in header:  # no browser sends user information, or a path
         return None
     try:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The HTTP and WebSocket server of the live page: serves the page, sends it messages, takes its commands.
 
-Runs in the asyncio loop of session.py and does not touch the bus: commands go to the function that it is given.
+Runs in the asyncio loop of session.py and does not access the bus: commands go to a function of the caller.
 """
 
 from __future__ import annotations
@@ -23,11 +23,13 @@ from .security import HEADERS, Guard
 _MOST_REQUEST = 4096
 _HELLO_S = 10.0
 REQUEST_S = 10.0
-"""For a whole request to come, of a new connection and between two: aiohttp counts its keep-alive time from there."""
+"""Longest time for a whole request to come, on a new connection and between two requests; aiohttp counts its keep-alive
+time from there.
+"""
 _WRONG_TOKEN_S = 0.5
 _BEAT_S = 10.0
 _POLICY, _TOKEN_NEEDED = 1008, 4401
-"""Close codes: not from our page or full; the token is missing or wrong."""
+"""Close codes: not from this page, or no slot is free; the token is missing or wrong."""
 
 _TYPES = {
     ".html": "text/html",
@@ -37,7 +39,7 @@ _TYPES = {
 }
 
 Execute = Callable[[dict[str, Any]], Awaitable[str]]
-"""Carries out the request of a browser that may command; returns words. Raises HodographError."""
+"""Executes the request of a browser that may command; returns a text. Raises HodographError."""
 
 
 class Server:
@@ -61,7 +63,7 @@ class Server:
         self.app.on_shutdown.append(self._shut_down)
 
     def runner(self) -> web.AppRunner:
-        """What serves the application, and closes a connection whose request does not come in REQUEST_S."""
+        """The runner of the application, which closes a connection whose request does not come within REQUEST_S."""
         return web.AppRunner(
             self.app, access_log=None, shutdown_timeout=2.0, keepalive_timeout=REQUEST_S
         )
@@ -130,7 +132,7 @@ class Server:
                 await sender
 
     def _send_away(self, socket: web.WebSocketResponse | None) -> None:
-        """Without waiting for it: it may not answer."""
+        """Closes a socket without waiting for it, since it may not answer."""
         if socket is not None:
             closing = asyncio.create_task(_close_full(socket))
             self._closing.add(closing)
@@ -185,7 +187,7 @@ async def _close_full(socket: web.WebSocketResponse) -> None:
 
 
 async def _send(socket: web.WebSocketResponse, client: Client) -> None:
-    """Passes on what waits for a browser, at its own pace."""
+    """Sends the queued messages to a browser, at its pace."""
     with suppress(ConnectionError):
         while True:
             await socket.send_str(await client.get())

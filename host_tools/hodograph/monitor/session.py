@@ -73,7 +73,7 @@ class PageAddress:
 
     @property
     def url(self) -> str:
-        """Of the page that may command: the token is behind the #, which browsers keep to themselves."""
+        """Address of the page that may command: the token follows the #, and browsers do not send that part."""
         host = "127.0.0.1" if self.host in ("0.0.0.0", "::") else self.host
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/#token={self.token}"
@@ -84,7 +84,7 @@ class LivePage:
 
     image     the program on the command line; None: none was given
     note      prints a line on the terminal
-    toolpath  what is drawn of a toolpath (job_view.curve_view); None: none was given
+    toolpath  the view of a toolpath (job_view.curve_view); None: none was given
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class LivePage:
         self._image, self._note, self._toolpath = image, note, toolpath
 
     async def serve(self) -> None:
-        """Raises InputError when the address is in use, HodographError when a thread has broken down."""
+        """Raises InputError: the address is in use. Raises HodographError: a thread has failed."""
         loop = asyncio.get_running_loop()
         ending = asyncio.Event()
         for number in (signal.SIGINT, signal.SIGTERM):
@@ -200,7 +200,7 @@ def _execute(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
 
 
 def _require_alive(pump: Pump, link: Link | None) -> None:
-    """A page that shows the past and takes no commands looks sound: rather none. Raises HodographError."""
+    """Raises HodographError: a thread has failed. The page ends then, since it would show old data without a sign."""
     if not (pump.alive and (link is None or link.alive)):
         raise HodographError(
             "monitor: a part of it has broken down, see above: start it again, and report this bug"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Where the frames come from: a live bus, or a recording at the rate of the machine or a multiple of it."""
+"""Sources of frames: a live bus, or a recording at the rate of the machine or a multiple of it."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from ..bus.clock import has_virtual_time
 from ..errors import BusError, InputError, one_line
 
 MOST_FRAMES = 65536
-"""Frames taken at once, and frames that may wait on interfaces without a queue in the kernel."""
+"""Most frames taken at once, and most frames queued on interfaces without a queue in the Linux kernel."""
 
 
 @dataclass(frozen=True, eq=False)
 class Taken:
-    """What has come since the last poll."""
+    """The frames since the last poll."""
 
     frames: Frames
-    """`RECORD_DTYPE`, stamped by the clock of the bus: of a recording that of the machine."""
+    """`RECORD_DTYPE`, with the time stamps of the bus; in a recording those of the machine."""
     now_us: int | None = None
-    """The present by that clock; None: nobody knows it, as virtual time goes on by itself."""
+    """The present by that clock; None: not known, since this process is no participant in virtual time."""
     dropped: int = 0
-    """Frames lost since the start, for want of somebody to take them."""
+    """Frames lost since the start, because they were not taken in time."""
     ended: bool = False
     """A recording is at its end."""
 
@@ -47,16 +47,16 @@ class Source(Protocol):
     """Frames in the order of the bus."""
 
     def take(self) -> Taken:
-        """Everything that has come; never waits. Raises BusError when the bus is gone."""
+        """The frames since the last call; never waits. Raises BusError: the bus has ended."""
         ...
 
     def close(self) -> None:
-        """Gives the bus back."""
+        """Closes the bus."""
         ...
 
 
 def open_source(address: BusAddress, bitrate: int) -> Source:
-    """Listens on a bus. Raises BusError with the remedy."""
+    """Receives from a bus. Raises BusError with the remedy."""
     if address.is_raw:
         check_raw(address)
         return SocketSource(address)
@@ -64,9 +64,9 @@ def open_source(address: BusAddress, bitrate: int) -> Source:
 
 
 class SocketSource:
-    """SocketCAN, whose kernel keeps what waits, and counts what it has no room for; or a local bus.
+    """SocketCAN, where the Linux kernel queues frames and counts dropped ones; or a local bus.
 
-    It takes no part in virtual time: nothing waits for a process that only receives.
+    It is no participant in virtual time: time does not wait for a process that only receives.
     """
 
     def __init__(self, address: BusAddress) -> None:
@@ -175,7 +175,7 @@ def load_recording(file: Path) -> Frames:
 
 
 class ReplaySource:
-    """A recording by its SYNCs: one a period, `speed` times as fast; frames are stamped so, too, not as in the file."""
+    """A recording by its SYNCs: one each period, `speed` times as fast. Time stamps follow the SYNCs, not the file."""
 
     def __init__(self, frames: Frames, period_us: int, speed: float) -> None:
         self._frames = frames.copy()

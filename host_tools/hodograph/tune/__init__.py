@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Servo loops by design: PDFF gains and feedforward from the plant model, margins, and what a wrong model costs.
+"""Design of servo loops: PDFF gains and feedforward from the plant model, margins, and the effect of model errors.
 
 The method is docs/theory/numerics.md section 17, the use docs/guides/tuning.md.
 """

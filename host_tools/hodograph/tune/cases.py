@@ -19,9 +19,9 @@ Pair = tuple[float, float]
 _MV = 1e-3
 
 COULOMB, LOAD = 0.05, 0.10
-"""Of the voltage limit: friction that a motion has to overcome, and a load that comes on at the start."""
+"""Shares of the voltage limit: Coulomb friction, and a load from the start on."""
 VISCOUS = 0.2
-"""Viscous friction besides, as part of the motor's own damping: it lowers gain and time constant alike."""
+"""Additional viscous friction, as a share of the motor's damping: it lowers gain and time constant alike."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,9 @@ CASES = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one run: the greatest contour error, the greatest voltage seen at a SYNC, and whether it met the limit."""
+    """The result of one run: the greatest contour error, the greatest voltage at a SYNC, and whether it reached the
+    limit.
+    """
 
     contour_error_um: float
     volts: float
@@ -120,5 +122,5 @@ def outcomes(
     forward: Forward,
     cases: Sequence[Case] = CASES,
 ) -> list[Outcome]:
-    """Of all cases."""
+    """The results of all cases."""
     return [outcome(image, counts_per_mm, drives, forward, case) for case in cases]

@@ -17,9 +17,9 @@ from ..errors import PlanError
 from .loop import loop_of
 
 VELOCITIES = ("drive", "bus")
-"""Where the velocity feedforward comes from: k_pf in the drive, or 0x60B1 over the bus."""
+"""Source of the velocity feedforward: k_pf in the drive, or 0x60B1 over the bus."""
 _SLOWEST = 1e-3
-"""Of the real pole that is looked for, as part of the fastest."""
+"""Range of the real pole in the search, as a part of the fastest."""
 _OFFSET_MAX = 32767.0
 
 
@@ -33,7 +33,7 @@ class Poles:
 
 
 def fastest_real_pole(drive: Drive, natural_rad_s: float, damping: float) -> float:
-    """The fastest real pole that a PDFF loop with k_vf = 1 can have beside a pair."""
+    """The fastest real pole that a PDFF loop with k_vf = 1 can have together with a pair."""
     m = damping * natural_rad_s - 1 / drive.time_constant_s
     square = m * m - (damping * damping - 1) * natural_rad_s**2
     if m <= 0 or square < 0:
@@ -42,7 +42,9 @@ def fastest_real_pole(drive: Drive, natural_rad_s: float, damping: float) -> flo
 
 
 def with_poles(drive: Drive, poles: Poles) -> Drive:
-    """The drive with the feedback gains that place its poles, k_vf = 1. Raises PlanError: the plant is quicker."""
+    """The drive with the feedback gains that place its poles, k_vf = 1. Raises PlanError: the plant itself is
+    faster.
+    """
     w, z, p = poles.natural_rad_s, poles.damping, poles.real_rad_s
     t = drive.time_constant_s
     stiff = t * (p + 2 * z * w) - 1
@@ -72,9 +74,10 @@ def stiffness_n_um(drive: Drive) -> float:
 def pole_for_stiffness(
     drives: tuple[Drive, ...], natural_rad_s: float, damping: float, wanted_n_um: float | None
 ) -> float:
-    """The real pole, common to all axes, that gives the least stiff of them a stiffness; None: the greatest.
+    """The real pole, common to all axes, with which the least stiff axis has a given stiffness; None: the greatest
+    possible.
 
-    Raises PlanError: no real pole gives so much.
+    Raises PlanError: no real pole gives this stiffness.
     """
     fastest = min(fastest_real_pole(drive, natural_rad_s, damping) for drive in drives)
 
@@ -99,13 +102,13 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def feedforward_of(drive: Drive, velocity: str = "drive") -> tuple[Drive, Feedforward]:
-    """The inverse of the plant: the drive with its k_pf, and what the controller sends.
+    """The inverse of the plant: the drive with its k_pf, and the feedforward of the controller.
 
     Raises PlanError: a torque offset does not fit its object.
     """
     k, g = drive.gain_rad_s_v, drive.screw_mm_rad
     permille = 1e6 / (drive.rated_torque_nm * drive.torque_to_volts * g)
-    # Speed by differences is that of half a sample ago: what the loop makes of that is taken back.
+    # Speed by differences is that of half a sample ago; the effect of this in the loop is compensated.
     late_s = 0.0 if drive.speed == "exact" else 0.5 / drive.loop_rate_hz
     by_lag = drive.torque_to_volts * drive.k_pv_nm_s_rad * late_s
     found = Feedforward(

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The servo loop of one axis as a linear sampled system, and its margins; docs/theory/numerics.md section 17.
 
-Exact for the simulated drive (sim/plant) but for nonlinear parts: encoder increments, voltage limit, friction.
+Exact for the simulated drive (sim/plant), except for its nonlinear parts: encoder increments, voltage limit, friction.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Loop:
         return np.geomspace(top * 1e-6, top, GRID_POINTS)
 
     def _plant(self, z: Complex) -> tuple[Complex, Complex]:
-        """Speed, as the loop sees it, and position for a volt."""
+        """Speed, as in the loop, and position for a volt."""
         speed = self.speed_from_volts / (z - self.speed_from_speed)
         position = (self.position_from_speed * speed + self.position_from_volts) / (z - 1)
         if self.speed_per_distance:
@@ -65,7 +65,7 @@ class Loop:
         return self.volts_per_ref + self.volts_per_integral * self.step_s / (z - 1)
 
     def open(self, rad_s: Float, delay_s: float = 0.0) -> Complex:
-        """The loop opened at the volts, at these frequencies: what comes back for a volt, sign turned.
+        """The loop opened at the volts, at these frequencies: the negated response to a volt.
 
         `delay_s` is a dead time that the model does not have.
         """
@@ -79,7 +79,7 @@ class Loop:
     def closed(self, rad_s: Float, volts_s_mm: float = 0.0, volts_s2_mm: float = 0.0) -> Complex:
         """Position for a command; the last two are the torque offset, as volts, for speed and acceleration.
 
-        Speed and acceleration of the command are taken as the drive would have them without setpoints' periods.
+        Speed and acceleration of the command are those of continuous setpoints.
         """
         z = np.exp(1j * rad_s * self.step_s)
         s = 1j * rad_s
@@ -96,14 +96,16 @@ class Loop:
         return np.asarray(1000.0 * mm_per_volt / self.newton_per_volt)
 
     def poles(self) -> Complex:
-        """The closed loop's, as continuous ones, rad/s, slowest first; without those that end within a sample."""
+        """Poles of the closed loop, as continuous ones, rad/s, slowest first; without those that decay within a
+        sample.
+        """
         values = np.linalg.eigvals(self._transition()[0]).astype(np.complex128)
         found = np.log(values[np.abs(values) > _GONE]) / self.step_s
         return np.asarray(found[np.argsort(np.abs(found))])
 
     @property
     def stable(self) -> bool:
-        """Whether all poles die away."""
+        """Whether all poles decay."""
         return bool(np.max(self.poles().real) < 0)
 
     def _transition(self) -> tuple[Float, Float, Float]:
@@ -173,17 +175,17 @@ def loop_of(drive: Drive) -> Loop:
 
 
 def offset_volts(drive: Drive, feedforward: Feedforward) -> tuple[float, float]:
-    """What the torque offset comes to, V for a mm/s and V for a mm/s^2."""
+    """The volts of the torque offset, V for a mm/s and V for a mm/s^2."""
     volts = drive.rated_torque_nm * drive.torque_to_volts * 1e-6
     return feedforward.torque_permille_s_m * volts, feedforward.torque_permille_s2_m * volts
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Of the loop opened at the volts.
+    """Margins of the loop opened at the volts.
 
-    The loop's gain may rise by `gain_up` or fall to `gain_down` of what it is, its phase may lag by `phase_deg` more, a
-    dead time of `delay_s` more may come in. `modulus` is the least distance from -1 (1 / peak of the sensitivity).
+    The loop's gain may rise by the factor `gain_up` or fall to `gain_down`, its phase may lag by `phase_deg` more, and
+    its dead time may grow by `delay_s`. `modulus` is the least distance from -1 (1 / peak of the sensitivity).
     `crossover_hz` is the highest frequency where the gain is 1.
     """
 
@@ -196,7 +198,7 @@ class Margins:
 
 
 def margins(loop: Loop, delay_s: float = 0.0) -> Margins:
-    """The margins that are left when the loop has this dead time besides. Those of a stable loop only."""
+    """The margins with an additional dead time, for a stable loop only."""
     rad_s = loop.grid()
     response = loop.open(rad_s, delay_s)
     size, phase = np.log(np.abs(response)), np.unwrap(np.angle(response))
@@ -221,7 +223,7 @@ def margins(loop: Loop, delay_s: float = 0.0) -> Margins:
 
 
 def _crossings(values: Float) -> list[tuple[int, float]]:
-    """Where values change sign: before which gap, and at which part of it."""
+    """Sign changes of values: index of the value before, and share of the step."""
     at = np.flatnonzero((values[:-1] < 0) != (values[1:] < 0))
     return [(int(i), float(values[i] / (values[i] - values[i + 1]))) for i in at]
 

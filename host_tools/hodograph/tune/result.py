@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a tuning found, by axis and by path and case; as text and as JSON."""
+"""The results of a tuning, by axis and by path and case; as text and as JSON."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .loop import Margins
 
 @dataclass(frozen=True)
 class Side:
-    """One axis with one set of gains. Margins are those with no more dead time than the model has."""
+    """One axis with one set of gains. Margins are those with the dead time of the model only."""
 
     drive: Drive
     feedforward: Feedforward
@@ -37,7 +37,7 @@ class AxisResult:
 
 @dataclass(frozen=True)
 class CaseResult:
-    """One plant: contour errors as given, with the tuned gains without torque offsets, and with all."""
+    """One plant: contour errors with the given gains, with the tuned gains without torque offsets, and with both."""
 
     case: Case
     given: Outcome
@@ -56,7 +56,7 @@ class PathResult:
 
 @dataclass(frozen=True, eq=False)
 class Tuning:
-    """All of it; `tried` is how many loops the search for the least contour error tried, 0 when none was made."""
+    """The whole result; `tried`: number of loops that the search for the least contour error tried, 0: no search."""
 
     machine: Machine
     poles: Poles
@@ -71,12 +71,12 @@ class Tuning:
 
     @property
     def feedforward(self) -> tuple[Feedforward, Feedforward]:
-        """What the controller is to send."""
+        """The feedforward of the controller."""
         return self.axes[0].tuned.feedforward, self.axes[1].tuned.feedforward
 
 
 COLUMNS = ("as given", "no offsets", "tuned")
-"""Of the table of contour errors."""
+"""The columns of the table of contour errors."""
 
 _ROWS: tuple[tuple[str, str, Callable[[Side], float]], ...] = (
     ("k_pp", "rad/(s mm)", lambda s: s.drive.k_pp_rad_s_mm),
@@ -134,7 +134,7 @@ def poles_text(tuning: Tuning) -> str:
 
 
 def tuning_text(tuning: Tuning) -> str:
-    """All of it, for people."""
+    """The whole result as text."""
     lines = [poles_text(tuning), "", *_aligned(*axis_table(tuning))]
     head, rows = case_table(tuning)
     if rows:

@@ -18,9 +18,9 @@ from .loop import Margins, loop_of, margins
 
 DAMPINGS = (0.6, 0.7, 0.85, 1.0, 1.2)
 BANDWIDTHS = 7
-"""Tried for each damping, in equal ratios up to the greatest that keeps the margins."""
+"""Number of bandwidths tried for each damping, in equal ratios up to the greatest that keeps the margins."""
 SPAN = 8.0
-"""From the least to the greatest of them."""
+"""Ratio of the least to the greatest bandwidth."""
 ENOUGH = 1.02
 """Errors within this factor of the least count as equal: the slowest loop among them is taken."""
 _HALVINGS = 30
@@ -28,7 +28,7 @@ _HALVINGS = 30
 
 @dataclass(frozen=True)
 class Wanted:
-    """Margins that must be left with a dead time which the model doesn't have."""
+    """Required margins with a dead time that the model does not have."""
 
     modulus: float = 0.5
     phase_deg: float = 45.0
@@ -36,7 +36,7 @@ class Wanted:
     delay_s: float = 125e-6
 
     def met(self, found: Margins) -> bool:
-        """Whether these are enough."""
+        """Whether margins are enough."""
         return (
             found.modulus >= self.modulus
             and found.phase_deg >= self.phase_deg
@@ -66,8 +66,8 @@ def best_poles(
 ) -> tuple[Poles, list[Tried]]:
     """The poles with the least contour error in the worst case, and all that were tried.
 
-    Cases that the voltage limit spoils whatever the gains are left out. Raises PlanError: no loop keeps the margins, or
-    the limit spoils even the nominal run.
+    Cases that reach the voltage limit with any gains are left out. Raises PlanError: no loop keeps the margins, or even
+    the nominal run reaches the limit.
     """
     tried: list[Tried] = []
     cases: list[list[Case]] | None = None
@@ -115,7 +115,7 @@ def greatest_bandwidth(drives: Drives, damping: float, wanted: Wanted) -> float 
     good = [kept(w) for w in grid]
     if True not in good:
         return None
-    # Beyond the first that fails margins mean nothing: the loop may be unstable there.
+    # After the first failure margins have no meaning: the loop may be unstable there.
     first = good.index(True)
     last = [*good, False].index(False, first) - 1
     low, high = grid[last], grid[min(last + 1, len(grid) - 1)]
@@ -128,7 +128,7 @@ def greatest_bandwidth(drives: Drives, damping: float, wanted: Wanted) -> float 
 def _possible(
     drives: Drives, programs: Sequence[Program], poles: Poles, velocity: str
 ) -> list[list[Case]]:
-    """Of each program the cases in which the stiffest loop doesn't meet the voltage limit."""
+    """For each program, the cases in which the stiffest loop does not reach the voltage limit."""
     tuned, forward = _tuned(drives, poles, velocity)
     found = []
     for image, counts_per_mm in programs:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a machine and the requested properties to gains, feedforward and what they do."""
+"""Tunes a machine: from the requested properties to gains, feedforward and their results. Used by `hodograph tune`."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .result import AxisResult, CaseResult, PathResult, Side, Tuning
 from .search import Wanted, best_poles
 
 DIGITS = 6
-"""Significant ones of the gains: what is judged is what is written."""
+"""Significant digits of the gains; the rounded gains are evaluated and written."""
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What the loops are to be. Without `bandwidth_hz` the least contour error on the paths is the goal.
+    """The requested properties of the loops. Without `bandwidth_hz` the goal is the least contour error on the paths.
 
     `interpolation` None keeps that of the drive files.
     """
@@ -43,9 +43,9 @@ def tune(
     asked: Asked,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Tuning:
-    """Gains for both axes of the plane, the same poles for both, so that they lag alike.
+    """Gains for both axes of the plane, with the same poles, so that both lag alike.
 
-    Raises PlanError: not possible; InputError: no model, or a path that is wrong.
+    Raises PlanError: not possible. Raises InputError: there is no model, or a path is wrong.
     """
     x, y = machine.models(machine.require_plane("tune"))
     given: Drives = (x, y)
