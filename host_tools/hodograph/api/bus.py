@@ -32,10 +32,9 @@ def _silent(text: str) -> None:
 
 @contextmanager
 def local_bus(speed: float | None = None) -> Iterator[str]:
-    """A CAN bus within this computer, for simulated machines; needs neither root nor CAN in the kernel.
+    """A CAN bus within this computer, for simulated machines; needs neither root nor CAN in the Linux kernel.
 
-    Gives its name, for `connect`. Its time is virtual: `speed` times as fast as real time at most (None: as fast as it
-    can).
+    Gives its name, for `connect`. Its time is virtual: at most `speed` times as fast as real time (None: not limited).
 
     >>> with local_bus() as bus:
     ...     bus.startswith("local:")
@@ -48,8 +47,8 @@ def local_bus(speed: float | None = None) -> Iterator[str]:
 class Controller:
     """The controller of a machine, on a bus; made by `connect`.
 
-    Every method raises BusError when the controller does not answer, RefusedError when it refuses, RunError for a
-    fault in motion.
+    Each method raises BusError if the controller does not answer, RefusedError if it refuses, RunError for a fault in
+    motion.
     """
 
     def __init__(self, session: RunSession, machine: Machine) -> None:
@@ -62,12 +61,12 @@ class Controller:
         return self._session.rig is not None
 
     def configure(self) -> bool:
-        """Brings its configuration to that of the machine; returns whether anything was written."""
+        """Writes the machine's configuration to the controller; returns whether an object was written."""
         machine = self._machine._file
         return self._node.configure(machine, machine.kernel)
 
     def home(self, wait_s: float = math.inf) -> None:
-        """Finds the zero of every axis that has a homing method; drives are off before and after."""
+        """Finds the zero of each axis that has a homing method; drives are off before and after."""
         actions.home(self._node, wait_s)
 
     def enable(self) -> None:
@@ -80,15 +79,16 @@ class Controller:
         self._node.wait_for((OFF, BOOT), actions.BOOT_S)
 
     def upload(self, program: Program) -> None:
-        """Sends a program, which then is the loaded one. On a refusal the one before stays."""
+        """Sends a program, which then is the loaded one. After a refusal the old program stays."""
         self._node.upload(program.image)
 
     def goto_start(self, program: Program, *, unhomed: bool = False) -> float:
         """Moves straight to the start of a program, with the drives on, then loads it; returns the distance in mm.
 
-        unhomed   also where axes with a homing method are not homed
+        unhomed   also if axes with a homing method are not homed
 
-        Raises InputError for a loaded image that moves rotary axes alone: it does not hold where the others stand.
+        Raises InputError for a loaded image that moves rotary axes alone: it does not contain the positions of the
+        others.
         """
         start = program._start_counts()
         distance_mm = goto(self._node, self._machine._file, start, unhomed=unhomed)
@@ -98,7 +98,7 @@ class Controller:
     def start(self, *, from_mm: float | None = None, unhomed: bool = False) -> None:
         """Starts the loaded program; returns at once.
 
-        from_mm   from rest at this arc length, where the axes have to stand
+        from_mm   start at this arc length, where the axes have to stand
 
         Raises InputError for an arc length that the path does not have.
         """
@@ -109,16 +109,16 @@ class Controller:
         self._node.wait_for((READY,), wait_s)
 
     def hold(self, wait_s: float = math.inf) -> bool:
-        """Comes to standstill on the path, and waits for it; false: the program had ended before."""
+        """Feed hold: waits for the standstill on the path; False: the program had ended before."""
         self._node.command(HOLD)
         return actions.hold_reached(self._node, wait_s)
 
     def resume(self) -> None:
-        """Goes on after `hold`."""
+        """Continues after `hold`."""
         self._node.command(RESUME)
 
     def stop(self) -> None:
-        """Comes to standstill on the path for good, and waits for it. Without effect where nothing moves."""
+        """Controlled stop: waits for the standstill on the path; the program ends. Without effect at standstill."""
         self._node.stop_and_wait()
 
     def reset(self) -> bool:
@@ -130,7 +130,7 @@ class Controller:
         self._node.override(percent)
 
     def status(self) -> dict[str, Any]:
-        """State of controller, drives and program, with the keys of `hodograph status --json` but `bus_load`."""
+        """State of controller, drives and program, with the keys of `hodograph status --json` except `bus_load`."""
         return read_status(self._node)
 
     def sleep(self, seconds: float) -> None:
@@ -140,7 +140,7 @@ class Controller:
     def run(self, program: Program, *, unhomed: bool = False) -> Run:
         """Configures, switches the drives on, moves to the start, uploads, runs, records and analyses.
 
-        Raises RunError, beside the faults of a motion, where the recorded setpoints are not those of the program.
+        Raises RunError for a fault in motion, and if the recorded setpoints are not those of the program.
         """
         moved = program._moved
         found = run_program(
@@ -159,11 +159,11 @@ class Controller:
     ) -> JobRun:
         """Runs all sections of a job: each as `run` does, with the dwells between them.
 
-        operator   is called where the job waits for the operator (M0, M1, tool change), with the place and the code,
-                   and returns when the job may go on. None: such a job is refused, before anything moves
+        operator   is called with the place and the code where the job waits for the operator (M0, M1, tool change), and
+                   returns when the job may continue. None: such a job is refused before anything moves
 
-        Every section is planned before the first one moves. A fault, a stop or a hold ends the job. Raises InputError
-        and PlanError, beside the errors of `run`.
+        All sections are planned before the first one moves. A fault, a stop or a hold ends the job. Raises InputError,
+        PlanError, and the errors of `run`.
         """
         made = prepared(job._job, job.machine._file.kernel)
         stops = list(operator_stops(job._job))
@@ -197,13 +197,13 @@ def connect(
 ) -> Iterator[Controller]:
     """The machine's controller on a bus. A virtual bus without one gets a simulated machine until the context ends.
 
-    bus      "socketcan:can0", a name from `local_bus`, or another that `hodograph --bus` takes; None: the one that
-             commands without --bus take
+    bus      "socketcan:can0", a name from `local_bus`, or another name for `hodograph --bus`; None: the bus of commands
+             without --bus
     pace     of a controller started here: "fast" ticks as soon as the drives have answered
     wait_s   how long to wait for the controller
-    note     takes lines for the user; None: nobody does
+    note     takes lines for the user; None: they are dropped
 
-    On an error the axes are stopped. Raises BusError, RefusedError while the axes already move, and InputError for a
+    On an error the axes are stopped. Raises BusError, RefusedError if the axes already move, and InputError for a
     machine whose frames do not fit its period.
 
     >>> from hodograph import load_plan, example_file

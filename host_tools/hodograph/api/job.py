@@ -53,7 +53,7 @@ class Section:
 
     @cached_property
     def path(self) -> Path:
-        """Its curve. `plan` of it takes other limits, and needs the machine."""
+        """Its curve. `Path.plan` of it may use other limits, and needs the machine."""
         return path_of_section(self._section)
 
     @cached_property
@@ -128,17 +128,17 @@ class Job:
 
     @cached_property
     def sections(self) -> tuple[Section, ...]:
-        """In the order in which they run."""
+        """The sections in the order in which they run."""
         return tuple(Section(section, self.machine) for section in self._job.sections)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, one line each: what was left out, which words the machine does not execute."""
+        """Notes, one line each: elements that were left out, words that the machine does not execute."""
         return self._job.notes
 
     @property
     def length_mm(self) -> float:
-        """Of all curves."""
+        """Length of all curves."""
         return self._job.length_mm
 
     @property
@@ -148,7 +148,7 @@ class Job:
 
     @property
     def dwell_s(self) -> float:
-        """Standstill that the toolpath asks for."""
+        """Total time of the programmed dwells."""
         return self._job.dwell_s
 
     @cached_property
@@ -184,15 +184,15 @@ def load_job(
     block_delete: bool = False,
     skip_optional_stops: bool = False,
 ) -> Job:
-    """The job of a toolpath file: G-code, DXF, SVG or points; the end of its name shows which.
+    """The job of a toolpath file: G-code, DXF, SVG or points, by the ending of its name.
 
     tolerance_mm   greatest distance between programmed path and curves; 0: stop at the end of each move
     feed_mm_s      in place of the feeds of the file; drawings need it
     layers, ids    drawings: only these layers, in this order; only elements with these identities
     gap_mm         drawings: ends of contours that are this near are joined
-    lift_mm        drawings: how far above the drawing rapid moves are
+    lift_mm        drawings: height of rapid moves above the drawing
     scale, unit_mm drawings and points: factor of lengths; length of a unit
-    closed         points: back to the first point
+    closed         points: the path returns to the first point
     block_delete   G-code: lines that begin with "/" are left out
     skip_optional_stops  G-code: M1 is left out
 

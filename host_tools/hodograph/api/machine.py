@@ -21,7 +21,7 @@ Real = NDArray[np.float64]
 
 
 def example_file(name: str) -> FilePath:
-    """A path file that the package brings, such as "alpha" or "star". Raises InputError for an unknown name."""
+    """A path file of the package, such as "alpha" or "star". Raises InputError for an unknown name."""
     return _example(EXAMPLES, name)
 
 
@@ -57,10 +57,10 @@ class Machine:
         name: str = "machine",
         folder: str | PathLike[str] = ".",
     ) -> Machine:
-        """The machine of a mapping with the keys of a machine file; nothing is read but drive files that it names.
+        """The machine of a mapping with the keys of a machine file; only drive files that it names are read.
 
-        contents  as `tomllib.load` gives it: tables are mappings, [[axis]] is a sequence of them. Numbers and arrays
-                  may be NumPy's. `drive` of an axis is the name of a drive file, or a mapping with its contents
+        contents  as from `tomllib.load`: tables are mappings, [[axis]] is a sequence of them. Numbers and arrays may be
+                  NumPy's. `drive` of an axis is the name of a drive file, or a mapping with its contents
         name      for messages
         folder    that drive files are relative to
 
@@ -82,7 +82,7 @@ class Machine:
 
     @classmethod
     def example(cls, name: str = "paper_alpha") -> Machine:
-        """A machine that the package brings, with simulated drives. Raises InputError for an unknown name."""
+        """A machine of the package, with simulated drives. Raises InputError for an unknown name."""
         return cls.load(_example(EXAMPLES / "machines", name))
 
     @property
@@ -130,7 +130,7 @@ class Machine:
 
 
 def _plain(value: Any, name: str) -> Any:
-    """A value as TOML would give it. Raises InputError for one that TOML cannot express."""
+    """A value in a type of TOML. Raises InputError: TOML cannot express it."""
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):

@@ -49,7 +49,7 @@ class FeedZone:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a plan keeps, beside the limits of the machine; None: no limit.
+    """The limits of a plan in addition to those of the machine; None: no limit.
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3    of the motion along the path
     centripetal_mm_s2                            feed^2 times curvature
@@ -77,7 +77,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class LimitUsage:
-    """Where a limited quantity comes nearest to its limit: its value there, the limit, the arc length."""
+    """The peak of a limited quantity: value, limit, arc length of the place."""
 
     value: float
     limit: float
@@ -124,7 +124,7 @@ class Path:
     _file: PathFile
     _curve: PHSpline | SpatialPHSpline = field(repr=False)
     notes: tuple[str, ...] = ()
-    """What the user should know about how the spline was made, one line each."""
+    """Notes on how the spline was made, one line each."""
     _fitted: FittedPath | None = field(default=None, repr=False)
     """Of a toolpath."""
 
@@ -140,14 +140,14 @@ class Path:
         knots: Literal["chord", "centripetal", "uniform"] = "chord",
         name: str = "path",
     ) -> Path:
-        """The path through points (n, A): x, y, or x, y, z, or these and up to three extra axes, in degrees where they
-        turn. Where x, y and z are the same at all points, the other rotary axes move alone: they draw the path, and its
-        lengths and feeds are in degrees.
+        """The path through points (n, A): x, y, or x, y, z, or these and up to three extra axes; rotary axes in
+        degrees. If x, y and z are the same at all points, rotary axes move alone: they draw the path, and its lengths
+        and feeds are in degrees.
 
         closed         the end is the start; each point is given once, 3 or more
         ends           of an open path: "cubic", or "natural" (no curvature)
         start_tangent, end_tangent   direction (2,), in space (3,), there, instead of `ends`
-        knots          how the spline's parameter follows the distances of the points
+        knots          parameter lengths of the spans: from the distances of the points, or uniform
         name           for messages and for the program
 
         Raises InputError, and PlanError where there is no such path.
@@ -201,7 +201,7 @@ class Path:
 
     @property
     def greatest_curvature_per_mm(self) -> float:
-        """At its true extremum."""
+        """Greatest curvature, at its true extremum."""
         return self._curve.max_curvature_per_mm()
 
     def point_mm(self, arc_length_mm: ArrayLike) -> Real:
@@ -229,7 +229,7 @@ class Path:
     ) -> Plan:
         """The feed along this path, from rest to rest.
 
-        limits         beside those of the machine, which always bind
+        limits         in addition to those of the machine, which always apply
         machine        needed for a program, and for limits in volts
         profile        "optimal": least time inside all limits. The others accelerate for `ramp_time_s`, run at
                        `nominal_mm_s` and decelerate; the feed is lowered until all limits are kept
@@ -237,7 +237,7 @@ class Path:
         n_c            slope coefficient of "exponential"; "optimise": by pattern search
         degree         of "minimax"
 
-        Raises InputError, and PlanError where the feed is not possible.
+        Raises InputError, and PlanError if the feed is not possible.
 
         >>> path = Path.through([[0, 0], [20, 0], [35, 10], [35, 30]])
         >>> plan = path.plan(Limits(feed_mm_s=100, acceleration_mm_s2=2000, jerk_mm_s3=50_000))
@@ -272,9 +272,9 @@ class Path:
 class Plan:
     """The feed along a path, from rest to rest; made by `Path.plan` or `load_plan`.
 
-    With a machine it is the feed of the program. Where a fault stop would take longer than `stop_time_ms` of the
-    machine, the path is planned again with more room for stops, and `notes` say so. The program is made at the first
-    use of a property or method, which raises PlanError where none is possible.
+    With a machine it is the feed of the program. If a fault stop would take longer than `stop_time_ms` of the machine,
+    the path is planned again with a reserve for stops, and `notes` has a line about it. The program is made at the
+    first use of a property or method, which raises PlanError if none is possible.
 
     >>> from hodograph import example_file, load_plan
     >>> plan = load_plan(example_file("alpha"))
@@ -324,11 +324,11 @@ class Plan:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, one line each: what lowered the feed, which limit does nothing."""
+        """Notes, one line each: limits that lowered the feed, ineffective limits."""
         return self._pipeline.notes(self._feed)
 
     def usage(self) -> dict[str, LimitUsage]:
-        """Every limited quantity where it comes nearest to its limit, by name ("feed_mm_s", "axis.jerk_mm_s3.x")."""
+        """The peak of each limited quantity by its name ("feed_mm_s", "axis.jerk_mm_s3.x")."""
         return {
             name: LimitUsage(peak.value, peak.limit.given, peak.s_mm)
             for name, peak in self._pipeline.peaks_of(self._feed).items()
@@ -349,7 +349,7 @@ class Plan:
     def program(self) -> Program:
         """The program for the plan's machine, as its controller accepts it.
 
-        Raises InputError without a machine, PlanError where a limit of the controller is not kept.
+        Raises InputError without a machine, PlanError if a limit of the controller is not kept.
         """
         if self.machine is None:
             raise InputError(f"{self.path.name}: a program needs a machine: give machine= to plan")
@@ -433,7 +433,7 @@ def _plane(direction: Real | None) -> complex | None:
 
 
 def load_plan(file: str | PathLike[str], machine: Machine | None = None) -> Plan:
-    """The plan that a path file (TOML) asks for, by its [path], [feed] and [limits].
+    """The plan of a path file (TOML), from its [path], [feed] and [limits].
 
     machine   instead of the one that the file names
 

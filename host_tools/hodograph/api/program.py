@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Programs: what a controller runs, and their runs with simulated drives or on a bus."""
+"""Programs of a controller, and their runs with simulated drives or on a bus."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ Kernel = Literal["fixed", "float", "double"]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A run of a program: row k belongs to setpoint k, n rows in all, for A path axes. Maxima count 0.2 s of settling
-    after the last setpoint too.
+    """A run of a program: row k belongs to setpoint k, n rows in all, for A path axes. Maxima include 0.2 s of settling
+    after the last setpoint.
 
     bus               where it ran; None: offline
     deadline_misses   ticks that the controller missed; None offline
@@ -56,7 +56,7 @@ class Run:
 
     @property
     def commanded_mm(self) -> Real:
-        """Point of the number kernel, before it is rounded to counts (n, A)."""
+        """Point of the kernel, before it is rounded to counts (n, A)."""
         return self._motion.cmd_mm[: self._motion.ticks]
 
     @property
@@ -66,7 +66,7 @@ class Run:
 
     @property
     def actual_mm(self) -> Real:
-        """Encoder position when setpoint k should be reached (n, A)."""
+        """Encoder position at the time when setpoint k should be reached (n, A)."""
         return self._motion.act_mm[: self._motion.ticks]
 
     @property
@@ -81,28 +81,29 @@ class Run:
 
     @property
     def orientation_error(self) -> Real:
-        """Of the axes after x, y, z (n, A - 3): how far they are from where the exact path has them beside the point
-        nearest to the tool; degrees, or mm of axes that do not turn."""
+        """Error of the axes after x, y, z (n, A - 3) against the exact path at its point nearest to the tool; degrees
+        for rotary axes, else mm.
+        """
         return self._motion.orientation_error[: self._motion.ticks]
 
     @property
     def greatest_contour_error_um(self) -> float:
-        """Of the whole run, settling included."""
+        """Greatest contour error of the whole run, including settling."""
         return self._motion.max_contour_error_um
 
     @property
     def greatest_following_error_um(self) -> float:
-        """Of one axis in mm, settling included."""
+        """Greatest following error of an axis in mm, including settling."""
         return self._motion.max_following_error_um
 
     @property
     def setpoints_sha256(self) -> str:
-        """Of all setpoints; equal offline and on every bus."""
+        """SHA-256 of all setpoints; equal offline and on each bus."""
         return self._motion.setpoints_sha256
 
     @property
     def encoders_sha256(self) -> str:
-        """Of all encoder positions; with simulated drives equal offline and on every bus."""
+        """SHA-256 of all encoder positions; with simulated drives equal offline and on each bus."""
         return self._motion.encoders_sha256
 
     def __repr__(self) -> str:
@@ -131,7 +132,7 @@ class Program:
     image: bytes = field(repr=False)
     machine: Machine
     _standing_mm: tuple[float, ...] = field(default=(), repr=False)
-    """Where axes of the machine's path before those of the program stand, where the program moves rotary axes alone."""
+    """Positions of the path's axes before those of the program, if the program moves rotary axes alone."""
 
     def __post_init__(self) -> None:
         fault = controller_verdict(self._native, self._moved)
@@ -147,7 +148,7 @@ class Program:
 
     @property
     def _moved(self) -> MachineFile:
-        """The machine, with the axes that the program moves. Raises InputError: it has none to turn alone."""
+        """The machine, with the axes that the program moves. Raises InputError: it cannot move rotary axes alone."""
         whole = self.machine._file
         if not self._native.first_axis:
             return whole
@@ -169,11 +170,11 @@ class Program:
 
     @property
     def duration_s(self) -> float:
-        """Time of the motion; the last setpoint is at its end or less than a period behind."""
+        """Time of the motion; the last setpoint is at its end, or less than a period later."""
         return self._native.duration_q32_s * 2.0**-32
 
     def _start_counts(self) -> list[int]:
-        """Where all axes of the machine's path stand at its start. Raises InputError: that is not known."""
+        """Positions of all axes of the machine's path at its start. Raises InputError: they are not known."""
         machine = self.machine._file
         return program_start_counts(self._native, machine, machine.kernel, self._standing_mm)
 
@@ -184,9 +185,9 @@ class Program:
         return counts
 
     def simulate(self, kernel: Kernel | None = None) -> Run:
-        """Runs it with simulated drives, without a bus, as fast as it goes. `kernel` None: the machine's.
+        """Runs it with simulated drives, without a bus or waiting. `kernel` None: the machine's.
 
-        Raises InputError when an axis of the machine has no drive file.
+        Raises InputError if an axis of the machine has no drive file.
         """
         return Run(simulate_on(self._moved, self._native, kernel))
 

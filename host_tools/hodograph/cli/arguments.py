@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The arguments of every command, in five families: to begin with, without a bus, moving, operating, watching."""
+"""The arguments of all commands, in five groups: first steps, without a bus, moving, operating, watching. Read by
+parser.py.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that only speak to a controller: start, stop, hold, resume, override; light on imports, so quick."""
+"""Commands that only need a controller: start, stop, hold, resume, override. Few imports, so that they are quick."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from .output import note
 from .targets import target
 
 _BUSY_S = 0.1
-"""How long a command to stop waits for others, to see first that it speaks to a controller."""
+"""How long a stop command waits for the channel lock to check first that the node is a controller."""
 _TURN_S = 3.0
-"""How long it then waits for each turn at the controller, to see that the axes stand."""
+"""How long it then waits for the lock at each check that the axes stand."""
 
 
 @contextmanager
@@ -45,10 +45,11 @@ def reached(address: BusAddress, node: int, bitrate: int, wait_s: float) -> Iter
 def commanded(
     address: BusAddress, node: int, bitrate: int, wait_s: float, command: int
 ) -> Iterator[Controller]:
-    """A controller that has been commanded to stop or to hold, whoever else talks to it.
+    """A controller after a command to stop or to hold, which is sent whatever other clients do.
 
-    Raises BusError when it does not answer within `wait_s`. What is inside looks how it ends: raises BusyError when
-    another command of this computer keeps the controller to itself, as one does that was stopped by Ctrl-Z or SIGSTOP.
+    Raises BusError: the controller does not answer within `wait_s`. Inside, the end of the stop can be read. That
+    raises BusyError if another command of this computer keeps the channel lock, such as one suspended by Ctrl-Z or
+    SIGSTOP.
     """
     with connect(address, node, bitrate) as controller:
         with suppress(BusyError):
@@ -65,7 +66,7 @@ def commanded(
 
 @contextmanager
 def stopping(controller: Controller) -> Iterator[None]:
-    """Stops the axes when what is inside is interrupted or fails."""
+    """Stops the axes if the context is interrupted or fails."""
     try:
         yield
     except BaseException:

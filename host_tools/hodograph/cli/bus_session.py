@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `run` and `stream` share: opens the controller of a machine on a bus, and waits for the operator at program
-stops.
-"""
+"""Opens the controller of a machine on a bus, and waits for the operator at program stops. For `run` and `stream`."""
 
 from __future__ import annotations
 

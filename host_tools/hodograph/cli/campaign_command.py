@@ -16,7 +16,7 @@ from .output import note, print_json, progress, write_file
 
 
 def campaign(options: Namespace) -> None:
-    """Makes the runs that are missing, writes table and report; raises RunError when none succeeds."""
+    """Makes the missing runs, writes table and report. Raises RunError: no run succeeds."""
     workers = options.workers or available_cores()
     if options.scheduler is not None and options.workers is not None:
         raise InputError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that ask drives without a controller: scan, check."""
+"""Commands that read drives without a controller: scan, check."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class _Scanned:
         return {"nodes": [properties.json() for properties in self.nodes], "unconfigured": without}
 
     def lines(self) -> Iterator[str]:
-        """For people."""
+        """The result as text."""
         for identity in self.unconfigured.identities:
             node = self.assigned.get(identity)
             became = "no node number" if node is None else f"is node {node} now"
@@ -91,7 +91,7 @@ class _Scanned:
 
 
 def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
-    """Asks the bus, and gives node numbers where the options say so."""
+    """Searches the bus, and assigns node numbers as the options require."""
     wanted = [Assignment(*one) for one in options.assign]
     unconfigured, assigned = Unconfigured(()), dict[Identity, int]()
     with opened_bus(address, options.bitrate) as network:
@@ -112,7 +112,7 @@ def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
 
 
 def _identity(properties: DriveProperties) -> Identity:
-    """As LSS compares it: what a node does not report is 0."""
+    """The identity as LSS compares it: a value that a node does not report is 0."""
     numbers = (properties.vendor, properties.product, properties.revision, properties.serial)
     return Identity(*(number or 0 for number in numbers))
 

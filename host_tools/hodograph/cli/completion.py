@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph completion: what a shell needs to complete commands, options and files."""
+"""hodograph completion: the script with which a shell completes commands, options and files."""
 
 from __future__ import annotations
 

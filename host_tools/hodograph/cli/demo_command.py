@@ -56,7 +56,7 @@ def demo(options: Namespace) -> None:
 
 @contextmanager
 def _live_page(address: BusAddress) -> Iterator[str]:
-    """`hodograph monitor` on this bus as a process of its own; its address. Raises BusError when it does not start."""
+    """Starts `hodograph monitor` on this bus as a process; returns its address. Raises BusError: it does not start."""
     command = [sys.executable, "-m", "hodograph", "monitor", "--bus", str(address)]
     command += ["--program", str(_PROGRAM), "--port", str(_free_port())]
     page = Process("live page", command)

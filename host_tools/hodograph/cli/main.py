@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Entry point: from the command line to an exit status, a traceback only on request."""
+"""Entry point: from the command line to an exit status; a traceback is printed only on request."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _MODULES = {
     "monitor": "monitor_command",
     **dict.fromkeys(("report", "paper"), "report_commands"),
 }
-"""Where each command is; only its module is imported, since some take a second to load."""
+"""The module of each command; only that one is imported, since some take a second to load."""
 
 
 _AWAITED = frozenset(
@@ -72,15 +72,15 @@ _AWAITED = frozenset(
         *("demo", "latency", "scan", "check", "configure", "home", "start", "hold", "stop"),
     )
 )
-"""Commands that a terminal shows the time of, until they end; the others end at once, or at Ctrl-C."""
+"""Commands whose running time a terminal shows; the others end at once, or at Ctrl-C."""
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM: everything that Ctrl-C tidies up is tidied up."""
+    """SIGTERM: the same cleanup as after Ctrl-C."""
 
 
 class HungUp(KeyboardInterrupt):
-    """SIGHUP: the terminal was closed. Everything that Ctrl-C tidies up is tidied up."""
+    """SIGHUP: the terminal was closed; the same cleanup as after Ctrl-C."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -128,7 +128,7 @@ def _internal_error(error: Exception, debug: bool) -> int:
 
 
 def _open_closed_streams() -> None:
-    """The shell's >&- closes them. What goes to a closed one is lost."""
+    """Replaces streams that the shell's >&- has closed; their output is lost."""
     if sys.stdout is None:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (as long as the process)
     if sys.stderr is None:
@@ -136,7 +136,9 @@ def _open_closed_streams() -> None:
 
 
 def _drop_output() -> None:
-    """What waits in stdout cannot be written; without this Python tries again at its end, with a message of its own."""
+    """Discards buffered output that cannot be written; otherwise Python tries again at its end, with its own
+    message.
+    """
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -144,7 +146,7 @@ def _run(options: argparse.Namespace) -> None:
     command = options.command
     WANTED.notes = not options.quiet
     WANTED.progress = not (options.quiet or options.no_progress)
-    # Matplotlib warns where a user has no folder for its cache, which is no concern of who wants a report.
+    # Matplotlib warns if a user has no folder for its cache, which does not matter for a report.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     shown = WANTED.progress and command in _AWAITED
     with waiting(command) if shown else nullcontext():
@@ -171,7 +173,7 @@ def _on_signals() -> None:
         signal.signal(signal.SIGTERM, terminate)
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup
             signal.signal(signal.SIGHUP, hang_up)
-    except ValueError:  # not the main thread: whoever called us decides
+    except ValueError:  # not the main thread: the caller decides
         return
 
 

@@ -69,7 +69,7 @@ def _replay(
 
 
 def _recorded_layout(frames: Frames, image: bytes | None) -> Layout:
-    """Without a machine file: the drives that speak, the period of the program, and what is usual."""
+    """Machine data without a machine file: the drives that send frames, the period of the program, and defaults."""
     nodes = nodes_in(frames)
     names = tuple("xyzabc"[i] if i < 6 else str(node) for i, node in enumerate(nodes))
     period_us = NativeProgram(image).period_us if image is not None else _USUAL_PERIOD_US
@@ -85,7 +85,7 @@ def _recorded_layout(frames: Frames, image: bytes | None) -> Layout:
 
 
 def machine_layout(machine: Machine) -> Layout:
-    """What the frames of this machine mean."""
+    """The data of this machine that are needed to decode its frames."""
     return Layout(
         names=tuple(axis.name for axis in machine.axes),
         nodes=tuple(axis.node for axis in machine.axes),

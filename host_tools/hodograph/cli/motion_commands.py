@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that plan and then speak to a controller: upload, goto, rig; and the text for the result of a run."""
+"""Commands that plan and then use a controller: upload, goto, rig; and the text for the result of a run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .targets import DEFAULT_BITRATE
 
 
 def _image_and_machine(options: Namespace) -> tuple[bytes, Machine | None, list[int] | None]:
-    """The program image of FILE, its machine, and where all axes of the path stand at its start, in counts.
+    """The program image of FILE, its machine, and the position of all axes of the path at its start, in counts.
 
     The last two are None for an image without --machine.
     """
@@ -103,7 +103,7 @@ def goto(options: Namespace) -> None:
 
 
 def _given_point(options: Namespace, machine: Machine) -> list[int]:
-    """The point of --to and --z in counts. Raises InputError: the machine cannot have it."""
+    """The point of --to and --z in counts. Raises InputError: the machine cannot reach it."""
     to = [*options.to, *([] if options.z is None else [options.z])]
     if options.z is not None and len(machine.path_axes) < SPACE_AXES:
         raise InputError(f"--z: the path of {machine.file} has two axes: leave it out")
@@ -123,7 +123,7 @@ def machine_of(file: Path, given: Path | None) -> Machine:
 
 
 def print_run(title: str, result: BusRun) -> None:
-    """A run's results for people."""
+    """A run's results as text."""
     motion = result.motion
     nominal_s = motion.ticks * motion.period_us / 1e6
     misses = (

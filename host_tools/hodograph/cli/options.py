@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options that several commands have, and values on the command line: from their text, with a message that names what
-is wrong."""
+"""Options of several commands, and converters of values on the command line, whose messages name the error."""
 
 from __future__ import annotations
 
@@ -69,14 +68,14 @@ def percentage(text: str) -> int:
 
 
 def count(text: str) -> int:
-    """A number of things."""
+    """A count, 0 or more."""
     if not text.isdigit() or int(text) > 100_000:
         raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 0 to 100000')
     return int(text)
 
 
 def at_least_one(text: str) -> int:
-    """A number of things of which there must be one."""
+    """A count, 1 or more."""
     if not text.isdigit() or not 1 <= int(text) <= 1000:
         raise argparse.ArgumentTypeError(f'"{text}" is not a whole number from 1 to 1000')
     return int(text)
@@ -90,7 +89,7 @@ def bit_rate(text: str) -> int:
 
 
 def assignment(text: str) -> tuple[int | None, int]:
-    """Serial number, or None, and node number that is to be given."""
+    """Serial number, or None, and the node number to assign."""
     match = re.fullmatch(r"(?:(0[xX][0-9a-fA-F]{1,8}|\d{1,10})=)?(\d{1,3})", text)
     serial = (
         None
@@ -127,11 +126,11 @@ def port_number(text: str) -> int:
 
 
 Command = Callable[[str, str], argparse.ArgumentParser]
-"""Makes the parser of a command: its name, what it does."""
+"""Makes the parser of a command from its name and its help text."""
 
 
 def bus_name(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
-    """--bus. `can_serve`: the command serves a local bus where there is none."""
+    """--bus. `can_serve`: the command serves a local bus if there is none."""
     where = "a local bus of its own" if can_serve else "the local bus of hodograph run or rig"
     parser.add_argument(
         "--bus",
@@ -200,7 +199,7 @@ def unhomed(parser: argparse.ArgumentParser) -> None:
 
 
 TOOLPATH = "toolpath: G-code (.ngc .nc .gcode .tap, or - for standard input), .dxf, .svg, points (.csv .txt)"
-"""What FILE is, for help."""
+"""Help text for a toolpath FILE."""
 
 
 def file(
@@ -229,7 +228,7 @@ def machine(parser: argparse.ArgumentParser) -> None:
 
 
 def toolpath(parser: argparse.ArgumentParser) -> None:
-    """--tolerance, --feed, and what drawings and points do not say themselves."""
+    """--tolerance, --feed, and options for drawings and points."""
     parser.add_argument(
         "--tolerance",
         type=finite,

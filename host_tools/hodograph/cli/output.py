@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands write: results on stdout, notes and progress on stderr."""
+"""Output of commands: results on stdout, notes and progress on stderr."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from ..errors import InputError
 from .waiting import held, is_terminal, remove_line
 
 LINE_AFTER_S, LINE_EVERY_S = 5.0, 10.0
-"""Of progress where there is no terminal."""
+"""Intervals of progress lines without a terminal."""
 
 
 @dataclass
 class Wanted:
-    """What stderr shows beside errors: --quiet and --no-progress."""
+    """What stderr shows in addition to errors: --quiet and --no-progress."""
 
     notes: bool = True
     progress: bool = True
 
 
 WANTED = Wanted()
-"""Of the command that runs in this process."""
+"""Settings of the command that runs in this process."""
 
 
 def note(text: str) -> None:
@@ -40,7 +40,7 @@ def note(text: str) -> None:
 
 
 def complain(text: str) -> None:
-    """One line for the user, on stderr, whatever is wanted: why a command fails."""
+    """One line for the user on stderr, also with --quiet: why a command fails."""
     remove_line()
     print(f"hodograph: {text}", file=sys.stderr)
 
@@ -61,13 +61,13 @@ def print_rows(rows: Sequence[tuple[str, str]]) -> None:
 
 
 def aligned(rows: Sequence[tuple[str, str]], least: int = 0) -> list[str]:
-    """The lines of names and values in two columns, the first at least so wide."""
+    """The lines of names and values in two columns; `width`: least width of the first."""
     width = max(least, *(len(name) for name, _ in rows))
     return [f"{name:<{width}}  {value}" for name, value in rows]
 
 
 def duration_text(seconds: float) -> str:
-    """A time for people: "12.3 ms", "4.56789 s", "2 min 5.3 s", "1 h 2 min 5 s"."""
+    """A time as text: "12.3 ms", "4.56789 s", "2 min 5.3 s", "1 h 2 min 5 s"."""
     if 0.0 < seconds < 0.1:
         return f"{seconds * 1e3:.3g} ms"
     if seconds < 60.0:
@@ -80,7 +80,7 @@ def duration_text(seconds: float) -> str:
 
 
 def size_text(size: int) -> str:
-    """A number of bytes for people: "7672 bytes", "129008 bytes (126 KiB)"."""
+    """A number of bytes as text: "7672 bytes", "129008 bytes (126 KiB)"."""
     for unit, power in (("GiB", 30), ("MiB", 20), ("KiB", 10)):
         if size >= 10 * 2**power:
             return f"{size} bytes ({size / 2**power:.3g} {unit})"
@@ -88,7 +88,7 @@ def size_text(size: int) -> str:
 
 
 def number(value: float) -> str:
-    """A number for people: six digits, no exponent where it can be avoided."""
+    """A number as text: six digits, without an exponent if possible."""
     if value and (abs(value) >= 1e6 or abs(value) < 1e-4) and math.isfinite(value):
         return f"{value:.4e}"
     return f"{value:.6g}"
@@ -96,9 +96,9 @@ def number(value: float) -> str:
 
 @contextmanager
 def progress(title: str, unit: str, total: int | None = None) -> Iterator[Callable[[int], None]]:
-    """Progress on stderr: a bar while it is a terminal, else a line now and then.
+    """Progress on stderr: a bar on a terminal, else a line from time to time.
 
-    Call the result with what is done so far.
+    Call the result with the finished part.
     """
     if not WANTED.progress:
         yield _nothing
@@ -137,9 +137,9 @@ class _Lines:
 
 
 def require_places(*files: Path | None, folders: Sequence[Path | None] = ()) -> None:
-    """Raises InputError: a file or folder that a command writes at its end cannot be made; None: none is wanted.
+    """Raises InputError: a file or folder that a command writes at its end cannot be made (None is ignored).
 
-    To be called first: a run takes long, and a motion of the machine cannot be had again. It writes nothing.
+    Call it first: a run takes long, and a motion of the machine cannot be repeated exactly. It writes nothing.
     """
     for file in filter(None, files):
         if _is_device(file):
@@ -164,7 +164,7 @@ def _require_place(path: Path, code: int | None) -> None:
 
 
 def _refusal(folder: Path) -> int | None:
-    """Why nothing can be written into a folder, as errno; None where it can."""
+    """Why a folder cannot be written, as errno; None: it can."""
     if not folder.exists():
         return errno.ENOENT
     if not folder.is_dir():
@@ -186,7 +186,7 @@ def write_file(file: Path, data: bytes) -> None:
 
 
 def _replace(file: Path, data: bytes) -> None:
-    """Writes a file under another name, then renames it. Raises OSError, and leaves nothing then."""
+    """Writes a file under another name, then renames it. Raises OSError, and leaves no file then."""
     fresh = file.with_name(file.name + ".part")
     try:
         fresh.write_bytes(data)
@@ -197,7 +197,7 @@ def _replace(file: Path, data: bytes) -> None:
 
 
 def write_files(files: Mapping[Path, str], *, force: bool) -> None:
-    """Writes texts by path; none when one is there already and may not be replaced. Raises InputError."""
+    """Writes texts by path. Raises InputError, before writing any: a file exists and may not be replaced."""
     there = [str(file) for file in files if file.exists()]
     if there and not force:
         raise InputError(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The command line: one sub-command per job, usage errors as InputError."""
+"""The parser of the command line: one sub-command for each task, usage errors as InputError."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class _Parser(argparse.ArgumentParser):
         raise InputError(f"{message} (see {self.prog} --help)")
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As argparse; an option that a command does not know is refused here, where its own options are known."""
+        """As argparse, but unknown options of a command are refused here, where its options are known."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unknown: {' '.join(unknown)}{self._advice(unknown)}")
         return found, unknown
 
     def _advice(self, unknown: Sequence[str]) -> str:
-        """Names the option that is most like the first unknown one."""
+        """The error for unknown options, with the option most similar to the first."""
         option = next((word for word in unknown if word.startswith("-")), "").partition("=")[0]
         near = difflib.get_close_matches(option, list(self._option_string_actions), n=1)
         return f'; did you mean "{near[0]}"?' if near else ""

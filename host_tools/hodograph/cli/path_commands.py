@@ -181,7 +181,7 @@ def _print_feed(
 
 
 def _program_of(pipeline: Pipeline) -> Program | None:
-    """The program, for the stops that `feed` prints; None without a machine, or where `compile` would refuse it."""
+    """The program, for the stops that `feed` prints; None: there is no machine, or `compile` would refuse it."""
     if pipeline.machine_or_none is None:
         return None
     try:
@@ -219,7 +219,7 @@ def compile_(options: Namespace) -> None:
 
 
 def _warn_of_size(image: bytes, machine: Machine) -> None:
-    """Where `upload` would refuse the program for its size."""
+    """Warns if `upload` would refuse the program for its size."""
     needed = memory_bytes(image, RECORD_BYTES[machine.kernel])
     room, whose = machine.program_bytes, f"[controller] program_bytes of {machine.file.name}"
     if room is None:
@@ -258,7 +258,7 @@ def inspect(options: Namespace) -> None:
 
 
 def _unsound(program: Program) -> str:
-    """Why nothing can be computed from an image."""
+    """The error for commands that cannot use an image."""
     try:
         fault = check(program)
     except (ArithmeticError, ValueError):
@@ -269,7 +269,7 @@ def _unsound(program: Program) -> str:
 
 
 def simulate_pipeline(pipeline: Pipeline, kernel: str | None, *, keep_rows: bool = True) -> Motion:
-    """A run of a path without a bus. Without its rows (one a tick) its memory does not grow with time."""
+    """A run of a path without a bus. Without rows (one for each tick) its memory does not grow with time."""
     image = pipeline.image
     with progress("simulate", "tick", pipeline.program.ticks) as bar:
         return simulate_on(
@@ -313,7 +313,7 @@ def simulate_(options: Namespace) -> None:
 
 
 def _shortest(value: float) -> str:
-    """A number as a part of a name: different ones never look alike."""
+    """A number as a part of a file name; different numbers give different names."""
     short = f"{value:g}"
     return short if float(short) == value else repr(value)
 
@@ -352,12 +352,12 @@ def _print_stops(stops: list[StoppedRun], unit: str) -> None:
 
 
 def volts_words(motion: Motion) -> str:
-    """The greatest voltage of a run, for people."""
+    """The greatest voltage of a run, as text."""
     return "not reported by the drives" if motion.max_volts is None else f"{motion.max_volts:.3f} V"
 
 
 def motion_rows(motion: Motion) -> list[tuple[str, str]]:
-    """A run's results for people."""
+    """A run's results as text."""
     mdeg = motion.max_following_error_mdeg
     turning = "" if mdeg is None else f", {mdeg:.1f} mdeg"
     off = "mdeg" if motion.turns_alone else "um"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph record: the bus into a file, and the setpoint step check of all that is written."""
+"""hodograph record: records the bus into a file, with the setpoint step check."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _ANSWER_S = 1.0
 
 
 def record(options: Namespace) -> None:
-    """Records; raises RunError when frames are missing or a setpoint jumps."""
+    """Records the bus. Raises RunError: frames are missing, or a setpoint jumps."""
     check_suffix(options.file)
     address = bus_address(options.bus)
     if not address.is_raw:
@@ -92,7 +92,7 @@ class _Recording:
             self._virtual = None
 
     def go_on(self) -> None:
-        """Until the time is over or Ctrl-C, which is how it is meant to end."""
+        """Waits until the time is over, or until Ctrl-C, which is a normal end."""
         clock, seconds = self._clock, self._options.seconds
         begun = clock.now_s()
         try:

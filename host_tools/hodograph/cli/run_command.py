@@ -27,7 +27,7 @@ from .stream_command import has_paths, stream_on
 from .toolpath_commands import job_rows, refuse_toolpath_options, toolpath_job
 
 Task = Pipeline | PreparedJob
-"""What is made of a FILE: a path file's program, or the programs of a toolpath."""
+"""The prepared run of a FILE: a path file's program, or the programs of a toolpath."""
 
 
 def run(options: Namespace) -> None:
@@ -68,7 +68,7 @@ def _run_all(options: Namespace, address: BusAddress) -> None:
 
 
 def _print_runs(options: Namespace, runs: list[BusRun | JobRun]) -> None:
-    """Before files are written, which can fail: the machine has moved, and this cannot be had again."""
+    """Prints the results before files are written, which may fail: the motion cannot be repeated exactly."""
     if options.json:
         _print_json(options.files, runs)
         return
@@ -80,7 +80,7 @@ def _print_runs(options: Namespace, runs: list[BusRun | JobRun]) -> None:
 
 
 def _check_outputs(options: Namespace) -> None:
-    """Raises InputError: what is to be written cannot be."""
+    """Raises InputError: an output file cannot be written."""
     if options.trace is not None and len(options.files) > 1:
         raise InputError("--trace: takes one FILE; run the others by themselves")
     if options.record is not None:
@@ -94,7 +94,7 @@ def _check_outputs(options: Namespace) -> None:
 
 
 def _task(options: Namespace, file: Path) -> Task:
-    """Everything that can be wrong with the input shows here, before anything moves."""
+    """Prepares all files, so that each error of the input is found before anything moves."""
     if not is_toolpath(file):
         refuse_toolpath_options(options, file)
         if options.no_stops:
@@ -164,7 +164,7 @@ def _print_json(files: list[Path], runs: list[BusRun | JobRun]) -> None:
 
 
 def _print_job_run(title: str, found: JobRun) -> None:
-    """A job's results for people."""
+    """A job's results as text."""
     motion = found.motion
     wall_s = sum(one.wall_s for one in found.runs)
     frames = sum(one.frames for one in found.runs)

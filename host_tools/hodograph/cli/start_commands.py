@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph init and schema: files to begin with, and the schemas of all input files."""
+"""hodograph init and schema: initial files, and the schemas of all input files."""
 
 from __future__ import annotations
 

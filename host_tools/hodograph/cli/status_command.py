@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph status: once, or again and again."""
+"""hodograph status: once, or repeatedly with --watch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .output import aligned, print_json
 from .targets import Target, target
 
 _NAME_WIDTH = 12
-"""Of the longest name, so that lines stand where they stood."""
+"""Width of the longest name, so that columns do not move."""
 _HOME, _CLEAR_LINE, _CLEAR_BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 
@@ -43,7 +43,7 @@ def status(options: Namespace) -> None:
 
 
 def _meter(address: BusAddress, to: Target, clock: Clock, stack: ExitStack) -> LoadMeter | None:
-    """Only SocketCAN lets us listen beside what we ask."""
+    """The load meter; None: the interface is not SocketCAN and has no second receiver."""
     if not address.is_raw:
         return None
     return stack.enter_context(LoadMeter(address, to.bitrate, clock))
@@ -64,7 +64,7 @@ def _document(found: Status, load: BusLoad | None) -> dict[str, Any]:
 
 @dataclass
 class _Screen:
-    """A terminal shows the newest view in place; anything else gets a line each time."""
+    """The output: a terminal shows the newest view in place, other outputs get one line each time."""
 
     names: tuple[str, ...]
     as_json: bool
@@ -93,14 +93,14 @@ class _Screen:
         sys.stdout.write(_HOME + "".join(f"{line}{_CLEAR_LINE}\n" for line in lines) + _CLEAR_BELOW)
 
     def _now(self) -> str:
-        """By the clock of the bus."""
+        """Waits by the clock of the bus."""
         now = datetime.fromtimestamp(self.clock.stamp_ns() / 1e9)
         return now.astimezone().isoformat(timespec="milliseconds")
 
 
 @contextmanager
 def _own_screen() -> Iterator[None]:
-    """On a terminal the view has a screen of its own, so that what was there comes back."""
+    """On a terminal the view uses the alternate screen, so that the previous content comes back."""
     if not sys.stdout.isatty():
         yield
         return
@@ -116,7 +116,7 @@ def _watch(controller: Controller, meter: LoadMeter | None, to: Target, options:
     screen = _Screen(to.axis_names, options.json, controller.clock)
     try:
         with _own_screen():
-            if meter is not None:  # so that no later reading has to wait for its load
+            if meter is not None:  # so that later readings need not wait for the load
                 controller.clock.sleep(LEAST_LISTEN_S)
             while True:
                 begun = controller.clock.now_s()
@@ -139,8 +139,8 @@ def _show(controller: Controller, meter: LoadMeter | None, screen: _Screen) -> N
 
 
 def _forget(meter: LoadMeter | None) -> None:
-    """What was received meanwhile: other nodes may talk on for hours."""
-    with suppress(BusError):  # the bus is down as well, which the next reading shows
+    """Discards frames received in the meantime: other nodes may send for hours."""
+    with suppress(BusError):  # the bus is down too, which the next reading reports
         if meter is not None:
             meter.measure(0.0)
 

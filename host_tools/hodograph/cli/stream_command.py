@@ -59,8 +59,9 @@ from .toolpath_commands import reading_of, refuse_toolpath_options, require_tool
 
 _EVERY_S = 5.0
 _FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
-"""Of a frame of a block download, with all stuff bits; share of the free bus that is reached beside answers and
-pauses."""
+"""Bits, with all stuff bits, and bytes of a frame of a block download; share of the free bus that it can use besides
+answers and pauses.
+"""
 
 
 def stream(options: Namespace) -> None:
@@ -73,7 +74,7 @@ def stream(options: Namespace) -> None:
     require_places(options.record)
     for file in options.files:
         _require_job_file(options, file)
-    gc.freeze()  # modules stay: the collector would search them again and again
+    gc.freeze()  # modules stay: the garbage collector need not search them again
     if options.simulate:
         if options.record is not None:
             raise InputError("--record: --simulate has no bus to record")
@@ -84,7 +85,7 @@ def stream(options: Namespace) -> None:
 
 
 def stream_on(options: Namespace, address: BusAddress) -> None:
-    """Streams the files of `stream`, or of `run` where they do not fit the memory of the controller."""
+    """Streams the files of `stream`, or of `run` if they do not fit the memory of the controller."""
     job = _job(options)
     require_fit(job.machine)
     number = random.SystemRandom().randrange(1, 2**31)
@@ -162,7 +163,7 @@ def _entry(job: JobFiles, number: int) -> Entry | None:
 
 
 def _continue(options: Namespace) -> None:
-    """Goes on with the job of the journal."""
+    """Continues the job of the journal."""
     if options.files:
         raise InputError("stream --continue: goes on with the files of the last job: give none")
     file = journal_file(options)
@@ -190,7 +191,7 @@ def _run(
     begin: Place | None,
     entry: Entry | None,
 ) -> None:
-    """Streams a job from a place; None: from the one where the job of `entry`, its journal, rests."""
+    """Streams a job from a place; None: from the place where the job of `entry`, its journal, is at rest."""
     kernel = options.kernel or job.machine.kernel
     continued = begin is None
     if begin is None:
@@ -275,12 +276,12 @@ def recorded(
 
 
 def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float) -> Place | None:
-    """Where the machine rests, after a stop, as the controller has it; None: the controller does not know the job."""
+    """The place of rest after a stop, from the controller; None: the controller does not have the job."""
     with connect(address, machine.node, machine.bitrate) as controller:
         if not controller.answers(wait_s):
             return None
         if stream_status(controller).job != entry.job:
-            return None  # what moves there is none of ours
+            return None  # another job moves there
         if controller.state() in ON_PATH:
             controller.stop_and_wait()
         status = stream_status(controller)
@@ -324,7 +325,7 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
 
 
 def _free_rate(machine: Machine, address: BusAddress) -> float | None:
-    """Bytes a second that a bus has for chunks; None: it is no bus of that bit rate."""
+    """Bytes per second that a bus has for chunks; None: it has no bit rate."""
     if not address.is_socketcan or address.channel.startswith("vcan"):
         return None
     free = 1.0 - 0.01 * machine_bus_time(machine).load_percent
@@ -332,7 +333,7 @@ def _free_rate(machine: Machine, address: BusAddress) -> float | None:
 
 
 class _Progress:
-    """Prints now and then where the job is."""
+    """Prints the progress of the job from time to time."""
 
     def __init__(self, every_s: float) -> None:
         self._every_s, self._due_s = every_s, time.monotonic() + every_s
@@ -364,7 +365,7 @@ def _print(done: StreamedJob, options: Namespace) -> None:
 
 
 def _processes(options: Namespace) -> int:
-    """That plan the job; `run`, which streams by itself, has no option for it."""
+    """Number of processes that plan the job; `run`, which may stream too, has no option for it."""
     return int(getattr(options, "jobs", PROCESSES))
 
 

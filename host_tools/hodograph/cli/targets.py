@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The controller that a command speaks to: node, bit rate and names of axes, from `--machine`, `--node` or defaults."""
+"""The controller of a command: node, bit rate and names of axes, from `--machine`, `--node` or defaults."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def toolpath_job(options: Namespace, file: Path) -> Job:
 
 
 def reading_of(options: Namespace) -> ReadOptions:
-    """How options say that a toolpath is read."""
+    """The reading options of a toolpath from the command line."""
     return ReadOptions(
         feed_mm_s=options.feed,
         layers=tuple(options.layer),
@@ -140,7 +140,7 @@ def import_(options: Namespace) -> None:
 
 
 def job_rows(job: Job) -> list[tuple[str, str]]:
-    """What became of a toolpath, for people."""
+    """The figures of a toolpath as text."""
     return [
         (
             "toolpath",
@@ -157,7 +157,7 @@ def _duration_s(section: JobSection) -> float:
 
 
 def imported(job: Job) -> dict[str, object]:
-    """A job as JSON and TOML have it: its figures, its sections, and what happens at which place."""
+    """A job for JSON and TOML: its figures, its sections, and its commands with their places."""
     sections = [
         {
             "first_line": one.first_line,

@@ -59,7 +59,7 @@ def tune(options: Namespace) -> None:
 
 
 def _with_feedforward(machine: Machine, forward: tuple[Feedforward, Feedforward]) -> Machine:
-    """The machine as it is to be: offsets take room on the bus."""
+    """The tuned machine; checks that it fits the bus, since offsets need bytes of frames."""
     plane = zip(machine.require_plane("tune"), forward, strict=True)
     with_feedforward = tuple(replace(axis, feedforward=own) for axis, own in plane)
     return replace(machine, axes=(*with_feedforward, *machine.axes[len(with_feedforward) :]))

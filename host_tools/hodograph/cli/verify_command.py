@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph verify: a program beside the limits of its path file."""
+"""hodograph verify: compares a program with the limits of its path file."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _MOST_LINES = 20
 
 
 def verify(options: Namespace) -> None:
-    """Prints peaks beside limits; raises LimitError when one is passed by more than TOLERANCE."""
+    """Prints peaks and limits. Raises LimitError: a limit is exceeded by more than TOLERANCE."""
     if is_toolpath(options.file):
         _verify_toolpath(options)
         return
@@ -58,7 +58,7 @@ def verify(options: Namespace) -> None:
 
 @dataclass(frozen=True)
 class _Checked:
-    """A program beside its limits: the verdict of the controller, what is proved of stops, peaks, setpoints."""
+    """A program compared with its limits: the verdict of the controller, proved stops, peaks, setpoints."""
 
     machine: Machine | None
     fault: NativeFault | None
@@ -75,7 +75,7 @@ class _Checked:
         return verdict | stops | _document(self.found, self.drives_see, self.noise)
 
     def text(self) -> str:
-        """For people."""
+        """The result as text."""
         lines = [_verdict(self.machine, self.fault)]
         lines += [_stops_line(one) for one in self.stops or ()]
         return "\n".join([*lines, _text(self.found, self.drives_see, self.noise, self.axes)])
@@ -106,7 +106,7 @@ def _axes(pipeline: Pipeline, count: int) -> list[tuple[str, str]]:
 
 
 def _require_kept(place: str, found: list[Verification]) -> None:
-    """Raises LimitError: a limit is passed by more than TOLERANCE."""
+    """Raises LimitError: a limit is exceeded by more than TOLERANCE."""
     beyond = {peak.quantity: None for one in found if not one.kept for peak in one.exceeded}
     if beyond:
         raise LimitError(
@@ -137,7 +137,7 @@ def _verify_toolpath(options: Namespace) -> None:
 
 
 def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
-    """What the controller itself would say of the limits of the machine."""
+    """The verdict of the controller's own check on the limits of the machine."""
     if machine is None:
         return "controller's check: no machine, so no limits of its axes are proved (use --machine FILE)"
     if fault is not None:
@@ -146,9 +146,7 @@ def _verdict(machine: Machine | None, fault: NativeFault | None) -> str:
 
 
 def _stops_line(stops: ProvedStops) -> str:
-    """In how many of the pieces from which a stop may begin, and in which share of their time, it is proved to keep the
-    machine's limits.
-    """
+    """Number of pieces from which all stops are proved to keep the machine's limits, and their share of the time."""
     tested = (
         ""
         if stops.proved == stops.pieces
@@ -201,7 +199,7 @@ def _given(file: Path) -> NativeProgram:
 
 
 def _drives(machine: Machine | None) -> tuple[Drive, ...]:
-    """Those of the axes that follow the path, none when one of them is not known."""
+    """The drives of the path's axes; empty: one of them is not known."""
     if machine is None or len(machine.axes) < PLANE_AXES:
         return ()
     known = [axis.drive for axis in machine.path_axes if axis.drive is not None]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What a terminal shows while a command computes: its name and the time that it has taken, from AFTER_S on.
+"""Shows on a terminal while a command computes: its name and its running time, from AFTER_S on.
 
-The line disappears before anything else is written. Files and pipes never see it.
+The line disappears before other output is written. It is never written to files and pipes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ AFTER_S, EVERY_S = 2.0, 0.5
 
 
 def is_terminal(stream: TextIO) -> bool:
-    """Whether lines on it can be rewritten."""
+    """Whether a stream is a terminal on which lines can be rewritten."""
     return stream.isatty() and os.environ.get("TERM") != "dumb"
 
 
@@ -56,7 +56,7 @@ class _Line:
         self.remove()
 
     def remove(self) -> None:
-        """Removes the line; it comes again when nothing else has been written for AFTER_S."""
+        """Removes the line; it appears again if nothing else is written for AFTER_S."""
         with self._lock:
             if self._shown:
                 self._stream.write("\r\x1b[K")
@@ -65,7 +65,7 @@ class _Line:
             self._due_s = time.monotonic() + AFTER_S
 
     def hold(self, by: int) -> None:
-        """Counts those who write lines of their own meanwhile."""
+        """Counts other writers of lines, during which the line stays hidden."""
         with self._lock:
             self._held += by
             self.remove()
@@ -75,13 +75,13 @@ _line: _Line | None = None
 
 
 class _Before:
-    """A stream before whose writes the line is removed."""
+    """A stream that removes the line before each write."""
 
     def __init__(self, stream: TextIO, line: _Line) -> None:
         self._stream, self._line = stream, line
 
     def write(self, text: str) -> int:
-        """As of the stream."""
+        """See the wrapped stream."""
         self._line.remove()
         return self._stream.write(text)
 
@@ -91,7 +91,7 @@ class _Before:
 
 @contextmanager
 def waiting(title: str) -> Iterator[None]:
-    """Shows the line while the context is open, where stderr is a terminal."""
+    """Shows the line while the context is open, if stderr is a terminal."""
     global _line
     if not is_terminal(sys.stderr):
         yield
@@ -108,14 +108,14 @@ def waiting(title: str) -> Iterator[None]:
 
 
 def remove_line() -> None:
-    """Before a note is written."""
+    """Removes the line before a note is written."""
     if _line is not None:
         _line.remove()
 
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Without the line, while there is a progress bar."""
+    """Hides the line while there is a progress bar."""
     if _line is None:
         yield
         return

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Commissioning: which drives are on a bus, what they are, and whether they can do what a machine needs.
+"""Commissioning: finds the drives on a bus, reads their properties, and checks whether they can do what a machine
+needs.
 
-Nothing here writes to a drive, but `assign`, which gives a drive its node number.
+Only `assign` writes to a drive: it gives a drive its node number.
 """
 
 from .check import Finding, check_axis

@@ -2,8 +2,8 @@
 """Whether a drive can do what an axis of a machine needs, object by object.
 
 The objects are those that the controller reads and writes before it switches a drive on (firmware/app/drives), in the
-same order. What the controller writes itself need not be set. An object that the controller writes only where the drive
-has it is a note, with what is lost without it. Reads the drive only.
+same order. Objects that the controller writes need not be set. If the controller writes an object only to drives that
+have it, its absence is a note with the lost function. The check only reads the drive.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .drive_properties import CSP, HOMING, MODES, PROFILE, supported_modes
 from .nodes import NodeReader
 
 _SCREW_SHARE = 1e-3
-"""By how much the scaling of drive and drive file may differ, by rounding."""
+"""Greatest difference between the scaling of drive and drive file, for rounding."""
 OK, NOTE, FAULT = "ok", "note", "fault"
 
 
@@ -52,7 +52,7 @@ class Finding:
 
 
 def check_axis(reader: NodeReader, axis: Axis, machine: Machine) -> list[Finding]:
-    """Every object that matters for an axis. Raises BusError when the drive stops answering."""
+    """All objects that an axis needs. Raises BusError: the drive does not answer."""
     found = list(_is_drive(reader))
     if found[0].verdict == FAULT:
         return found
@@ -228,7 +228,7 @@ def _limits(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
 def _at_least(
     reader: NodeReader, index: int, what: str, needed: float, axis: Axis
 ) -> Iterator[Finding]:
-    """A limit of the drive's own, which the controller does not write."""
+    """Checks a limit of the drive that the controller does not write."""
     value = reader.number(index)
     if value is None or value == 0:
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The properties that a node reports: identity, modes, scaling, limits. Read by `hodograph scan` and `check`."""
+"""Drive properties, as a node reports them: identity, modes, scaling, limits. For `hodograph scan` and `check`."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class DriveProperties:
 
     @property
     def is_drive(self) -> bool:
-        """Whether it names the profile of drives."""
+        """Whether its device type is that of drives."""
         return self.device_type & 0xFFFF == PROFILE
 
     @property
@@ -85,7 +85,7 @@ class DriveProperties:
 
 
 def read_properties(reader: NodeReader) -> DriveProperties:
-    """Asks a node. Raises BusError when it does not answer, or has no device type."""
+    """Reads the properties of a node. Raises BusError: it does not answer, or has no device type."""
     device_type = reader.number(0x1000) or 0
     properties: dict[str, Any] = {
         "name": reader.text(0x1008),

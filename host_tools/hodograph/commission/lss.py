@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Layer setting services (CiA 305): drives that have no node number yet, found by Fastscan and given one.
+"""Layer setting services (CiA 305): finds drives without a node number by Fastscan, and gives them one.
 
-Fastscan asks all unconfigured nodes for their identity, bit by bit. A node that is found is in the configuration state
-then and takes part no more; some devices do all the same, so that an identity comes twice and hides those behind it.
+Fastscan reads the identities of all unconfigured nodes, bit by bit. A found node is then in the configuration state and
+takes no further part. Some devices do not follow this, so that an identity comes twice and hides later ones.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from ..errors import BusError, InputError
 from .nodes import NODES, pass_time
 
 ANSWER_S = 0.1
-"""How long an LSS answer is waited for; a bit of an identity that is 1 takes so long, as nobody answers."""
+"""Wait for an LSS answer. A bit of an identity that is 1 takes this long, since no node answers."""
 _SETTLE_S = 0.01
-"""Between two questions, for the answers of further nodes."""
+"""Pause between two requests, for the answers of further nodes."""
 _LOOK_S = 0.001
 _ANYBODY = 0x80
 _FASTSCAN = struct.Struct("<BIBBB")
 BOOT_S = 0.5
-"""For the boot-up of nodes that have got their number."""
+"""Wait for the boot-up of nodes after they got their number."""
 
 
 @dataclass(frozen=True, order=True)
 class Identity:
-    """Of a node without number: 0x1018 subs 1 to 4."""
+    """Identity of a node without number: 0x1018 subs 1 to 4."""
 
     vendor: int
     product: int
@@ -56,7 +56,7 @@ class Assignment:
 class Unconfigured:
     """The nodes without number.
 
-    hidden  why there may be more than could be identified; None: these are all
+    hidden  why there may be more that could not be identified; None: these are all
     """
 
     identities: tuple[Identity, ...]
@@ -64,7 +64,7 @@ class Unconfigured:
 
 
 def find_unconfigured(network: Network) -> Unconfigured:
-    """Asks all nodes without number who they are. No node keeps anything of it. Raises BusError."""
+    """Finds the identities of all nodes without number. No node stores anything. Raises BusError."""
     scan, found = _Fastscan(network), list[Identity]()
     with _waiting_after(network):
         while (answer := scan.next_identity()) is not None:
@@ -83,7 +83,7 @@ def find_unconfigured(network: Network) -> Unconfigured:
 def matched(
     wanted: Sequence[Assignment], found: Sequence[Identity], taken: Mapping[int, Identity]
 ) -> list[tuple[Identity, int]]:
-    """Which identity gets which node number. Raises InputError where that is not clear, or a number is taken.
+    """The identity for each node number. Raises InputError: the assignment is not unique, or a number is taken.
 
     taken  identities of the nodes that have a number
     """
@@ -114,7 +114,7 @@ def matched(
 def assign(network: Network, identity: Identity, node: int, *, store: bool) -> None:
     """Gives a node its number, which it takes at once. Raises BusError.
 
-    store  it keeps the number without power
+    store  the node keeps the number without power
     """
     if node not in NODES:
         raise ValueError(f"node number {node}")
@@ -152,16 +152,18 @@ def _waiting_after(network: Network) -> Iterator[Any]:
 
 
 class _Fastscan:
-    """The master's side of Fastscan. canopen's own takes one answer of two nodes for two, and sleeps in real time."""
+    """The master's side of Fastscan. Own code: that of canopen counts simultaneous answers wrongly, and sleeps in real
+    time.
+    """
 
     def __init__(self, network: Network) -> None:
         self._network, self._answers = network, 0
         network.subscribe(LssMaster.LSS_RX_COBID, self._heard)
 
     def next_identity(self) -> Identity | str | None:
-        """The lowest identity that takes part, whose node is in the configuration state then.
+        """The lowest identity that takes part; its node is in the configuration state then.
 
-        None: nobody takes part. A text: somebody does, but cannot be identified.
+        None: no node takes part. A text: a node does, but cannot be identified.
         """
         if not self._asked(0, _ANYBODY, 0, 0):
             return None
@@ -179,7 +181,7 @@ class _Fastscan:
         self._answers += data[0] == CS_IDENTIFY_SLAVE
 
     def _asked(self, number: int, bit: int, sub: int, then: int) -> bool:
-        """Whether anybody answers. Several nodes answer alike, one after the other."""
+        """Whether any node answers. Several nodes send equal answers, one after the other."""
         pass_time(self._network, _SETTLE_S)
         self._answers = 0
         self._network.send_message(

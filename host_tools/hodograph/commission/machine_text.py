@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A machine file for the drives that were found, with comments: what they report, and what remains to be set."""
+"""Writes a machine file for the drives that were found, with comments on their reports and on values that remain to be
+set.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ NAMES = ("x", "y", "z", "a", "b", "c")
 COUNTS_PER_MM = 1_000_000
 _NO_LIMIT = 2**31 - 1
 _FEED, _ACCELERATION, _JERK = 20, 200, 5000
-"""To begin with: low."""
+"""Low initial limits."""
 
 
 def machine_text(drives: Sequence[DriveProperties], bitrate: int, where: str) -> str:

@@ -31,7 +31,7 @@ def opened_bus(address: BusAddress, bitrate: int) -> Iterator[Network]:
 
 
 def require_no_controller(network: Network, address: BusAddress) -> None:
-    """Raises BusError where somebody sends SYNC: a controller asks its drives by the same SDO channel as we would."""
+    """Raises BusError: a node sends SYNC. A controller uses the same SDO channels of its drives."""
     heard: list[int] = []
     network.subscribe(_SYNC, lambda cob, data, time_s: heard.append(cob))
     pass_time(network, LISTEN_S)
@@ -42,7 +42,7 @@ def require_no_controller(network: Network, address: BusAddress) -> None:
 
 
 def found_nodes(network: Network, wait_s: float, nodes: Collection[int] = NODES) -> list[int]:
-    """Numbers of the nodes that answer a question for their device type within `wait_s`."""
+    """Numbers of the nodes that answer a request for their device type within `wait_s`."""
     network.scanner.nodes.clear()
     for node in nodes:
         request = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
@@ -69,9 +69,9 @@ class NodeReader:
         self._sdo.RESPONSE_TIMEOUT = _ANSWER_S
 
     def data(self, index: int, sub: int = 0) -> bytes | None:
-        """The bytes of an object; None: the node has none; empty: it has one that it does not report now, or never.
+        """The bytes of an object; None: the node does not have it; empty: the node has it but does not report it.
 
-        Raises BusError when the node does not answer.
+        Raises BusError: the node does not answer.
         """
         try:
             return bytes(self._sdo.upload(index, sub))
@@ -83,12 +83,12 @@ class NodeReader:
             ) from error
 
     def number(self, index: int, sub: int = 0, *, signed: bool = False) -> int | None:
-        """The same as a whole number; None: there is none to be read."""
+        """The same as a whole number; None: there is none."""
         data = self.data(index, sub)
         return int.from_bytes(data[:8], "little", signed=signed) if data else None
 
     def text(self, index: int) -> str | None:
-        """The same as a text, without what cannot be printed."""
+        """The same as a text, without unprintable characters."""
         data = self.data(index)
         if not data:
             return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The paper's numbers beside ours: `hodograph paper`, docs/validation/paper.md."""
+"""Compares the paper's printed numbers with computed ones: `hodograph paper`, docs/validation/paper.md."""
 
 from .compare import compare, plain_plan
 from .dynamics import Dynamics, Maximum, constant_feed_dynamics

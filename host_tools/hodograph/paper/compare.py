@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The paper's printed results beside ours (paper section 6), and what it leaves out.
+"""Compares the paper's printed results (paper section 6) with computed ones.
 
-Its contour errors come from a servo loop that it does not describe whole. They are computed in two readings: the one
-that fits every printed unit, and one with a loop of 1 ms (docs/validation/paper.md, "Contour error").
+The paper does not fully describe the servo loop of its contour errors. They are computed in two readings: one that fits
+all printed units, and one with a loop of 1 ms (docs/validation/paper.md, "Contour error").
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ PEAK_JERK_MM_S3, REDUCTION_PERCENT = 48500.0, 14.0
 
 
 def compare() -> dict[str, Any]:
-    """Paper and ours by curve: {curve: {quantity: {"unit", "paper", "ours", "ours_1ms"}}}.
+    """Printed and computed numbers by curve: {curve: {quantity: {"unit", "paper", "ours", "ours_1ms"}}}.
 
     `paper` None: not printed. `ours_1ms`: with the servo loop of 1 ms; None for quantities that no loop changes.
     """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What constant feed on a curved path asks of the machine: acceleration and jerk of vector and axes.
+"""Acceleration and jerk, as vectors and by axis, at constant feed on a curved path.
 
 With the unit tangent T, curvature kappa and its slope kappa' along the arc,
 r_ss = i kappa T and r_sss = (i kappa' - kappa^2) T; at constant feed V, a = V^2 r_ss and j = V^3 r_sss.

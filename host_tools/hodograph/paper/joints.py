@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The paper's disturbance at the joints: differences of chord speed at constant feed.
 
-The paper does not define it; paper section 6 in our reading: with points r_k one period apart at constant feed,
-chord speed |r_{k+1} - r_k| / dt, its first and second differences over dt. Both would be zero on a straight line.
-On a curve they are not, even for an exact interpolator: a chord is shorter than its arc by
-kappa^2 (V dt)^3 / 24, so that the chord speed follows V^3 dt^2 kappa^2 / 24 (`chord_acceleration_mm_s2`).
+The paper does not define it. This is a reading of paper section 6: with points r_k at a distance of one period at
+constant feed, the chord speed |r_{k+1} - r_k| / dt and its first and second differences over dt. Both would be zero on
+a straight line. On a curve they are not, even for an exact interpolator: a chord is shorter than its arc by kappa^2 (V
+dt)^3 / 24, so that the chord speed follows V^3 dt^2 kappa^2 / 24 (`chord_acceleration_mm_s2`).
 """
 
 from __future__ import annotations
@@ -67,6 +67,6 @@ def joint_disturbance(spline: PHSpline, feed_mm_s: float, period_s: float) -> Jo
 def chord_acceleration_mm_s2(
     spline: PHSpline, s_mm: Real, feed_mm_s: float, period_s: float
 ) -> Real:
-    """What the shortening of chords alone gives: d/dt of -V^3 dt^2 kappa(s)^2 / 24, at arc lengths `s_mm`."""
+    """The part from the shortening of chords alone: d/dt of -V^3 dt^2 kappa(s)^2 / 24, at arc lengths `s_mm`."""
     shortening = -(feed_mm_s**3) * period_s**2 / 24.0 * spline.curvature(s_mm) ** 2
     return np.asarray(np.gradient(shortening, s_mm) * feed_mm_s)

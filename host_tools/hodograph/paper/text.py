@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The comparison as a table for people."""
+"""The comparison as a text table."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def comparison_text(comparison: dict[str, Any]) -> str:
 
 
 def shown(value: float | None) -> str:
-    """A number with the digits that mean something; a dash for the others."""
+    """A number with its significant digits; a dash: there is none."""
     if value is None:
         return "-"
     if isinstance(value, int) or float(value).is_integer():

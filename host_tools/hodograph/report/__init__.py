@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reports: with the paper's figures remade from a run, and of a toolpath."""
+"""Reports as HTML with figures: of runs (in the form of the paper's figures), toolpaths and tunings."""
 
 from .html import Case, write_report
 from .toolpath_report import write_toolpath_report

@@ -18,7 +18,7 @@ _SAMPLES = 1600
 
 
 def feed_figure(pipeline: Pipeline, plan: FeedPlan) -> bytes:
-    """Feed, acceleration and jerk of the profile used; whole run and first ramp, with the plain quintic beside it.
+    """Feed, acceleration and jerk of the profile; whole run and first ramp, with the plain quintic for comparison.
 
     Of profile `optimal`, which has no ramps: whole run and first quarter.
     """
@@ -64,7 +64,7 @@ def _limits(row: np.ndarray, limit: float | None) -> None:
 
 
 def search_figure(plan: FeedPlan) -> bytes | None:
-    """Progress of the pattern search for n_c, beside the function it minimises; None without a search."""
+    """Progress of the pattern search for n_c, and the function that it minimises; None: there was no search."""
     if not plan.history:
         return None
     figure, (progress, function) = pyplot.subplots(1, 2, figsize=(9.6, 3.8))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report: one HTML file that needs nothing else, and its figures as PNG files."""
+"""The report of runs: one self-contained HTML file, and its figures as PNG files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def write_report(cases: Sequence[Case], directory: Path) -> Path:
 
 
 def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Leaves out figures that an earlier case has already: paths of one profile share its search."""
+    """Leaves out figures of earlier cases: paths of one profile share its search."""
     first: dict[bytes, str] = {}
     for case in shown_cases:
         for figure in list(case["figures"]):
@@ -88,7 +88,7 @@ def _case(pipeline: Pipeline, motion: Motion, run: BusRun | None) -> dict[str, A
 
 
 def _unit_note(pipeline: Pipeline) -> tuple[str, ...]:
-    """What mm stands for on a path that moves rotary axes alone."""
+    """A text in which mm is degrees on a path that moves rotary axes alone."""
     if pipeline.unit == "mm":
         return ()
     return ("rotary axes move alone: mm stands for degrees, µm for thousandths of a degree",)
@@ -204,7 +204,7 @@ def _summary(cases: Sequence[Case]) -> list[tuple[str, list[str]]]:
 
 
 def _orientation(cases: Sequence[Case], motion: Motion) -> dict[str, str]:
-    """A row for the axes after x, y, z, where one of the cases has such."""
+    """A row for the axes after x, y, z, if one of the cases has such axes."""
     if not any(one.extra_names for _, one, _ in cases):
         return {}
     every = zip(motion.extra_names, motion.units[3:], motion.max_orientation_error, strict=True)

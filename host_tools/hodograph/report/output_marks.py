@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Marks of outputs in figures: where they switch on a path in the plane or in space, and when in a run."""
+"""Marks of outputs in figures: places on a path in the plane or in space, and times in a run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def mark_outputs(axes: Any, pipeline: Pipeline) -> None:
 
 
 def mark_switching_times(axes: Axes, motion: Motion) -> None:
-    """When the outputs of a run switched, with their names, in a figure over time in s."""
+    """Marks the times at which outputs of a run switched, with their names, in a figure over time in s."""
     acted = motion.acted_outputs
     for time_s in sorted({one.time_s for one in acted}):
         words = words_of([one for one in acted if one.time_s == time_s])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One page: an HTML file that needs nothing else, and its figures as PNG files beside it."""
+"""One page: a self-contained HTML file, and its figures as PNG files next to it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def file_name(text: str, otherwise: str) -> str:
 
 
 def render(template: str, **values: Any) -> str:
-    """The HTML of a template of this folder; what the template names and `values` lack is an error."""
+    """The HTML of a template of this folder; each name in the template has to be in `values`."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("hodograph.report", "."),
         autoescape=True,

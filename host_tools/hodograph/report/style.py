@@ -52,7 +52,7 @@ _SETTINGS: Any = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Our settings, for the figures made inside."""
+    """Applies the settings to the figures made inside."""
     with matplotlib.rc_context(_SETTINGS):
         yield
 

@@ -35,7 +35,7 @@ class Place:
     """A place of the path that is shown enlarged: a programmed vertex.
 
     section, vertex  the section, and the number of the vertex in its reference
-    distance_mm      how near the curve comes to it
+    distance_mm      distance of the curve from it
     """
 
     section: JobSection
@@ -114,7 +114,7 @@ def _near(section: JobSection, at_mm: float) -> Real:
 
 
 def _kind(place: Place) -> tuple[int, int, int]:
-    """Corners that look alike have the same kind: by their turn in steps of 10 degrees, and their distance."""
+    """The kind of corners: their turn in steps of 10 degrees, and their distance."""
     reference = place.section.fitted.reference
     a, b = np.diff(reference.point[place.vertex - 1 : place.vertex + 2], axis=0)
     cosine = a @ b / (np.linalg.norm(a) * np.linalg.norm(b))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report of a toolpath: what became of a file. Its view of the path names the source line under the cursor."""
+"""The report of a toolpath. Its view of the path names the source line under the cursor."""
 
 from __future__ import annotations
 
@@ -95,8 +95,8 @@ def _section_rows(run: JobMotion) -> list[tuple[str, ...]]:
 
 
 def view_data(run: JobMotion) -> dict[str, object]:
-    """What the view draws: columns of ticks in the program's own coordinates, the source lines that they name, and the
-    programmed path with its tolerance (0: sections have several).
+    """The data of the view: columns of ticks in program positions, their source lines, and the programmed path with its
+    tolerance (0: sections have several).
     """
     step = max(1, -(-run.ticks // MOST_POINTS))
     columns = no_places()
