@@ -6,9 +6,11 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 Q40_PER_MM = 2.0**40
 """Steps in a mm, or in a degree."""
@@ -19,6 +21,8 @@ MM_PER_Q40 = 2.0**-40
 
 def to_q40(mm: ArrayLike) -> NDArray[np.int64]:
     """Lengths of any shape rounded to steps, halves to even. Each has to be below 2^23 mm, which 64 bits hold."""
+    import numpy as np  # here, so that commands without arrays start quickly
+
     return np.rint(np.asarray(mm, dtype=np.float64) * Q40_PER_MM).astype(np.int64)
 
 
