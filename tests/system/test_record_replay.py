@@ -177,7 +177,7 @@ def test_for_some_seconds(
     status, line = failed(capsys, "record", str(tmp_path / "bus.txt"))
     assert (status, "the end of its name gives the format" in line) == (2, True), line
     status, line = failed(capsys, "record", str(file), "--bus", f"local:{tmp_path / 'none'}")
-    assert (status, "nobody serves it" in line) == (4, True), line
+    assert (status, "no hub serves it" in line) == (4, True), line
 
 
 def test_two_runs_give_the_same_recording(one_core: None, tmp_path: Path) -> None:

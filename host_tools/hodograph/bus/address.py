@@ -82,7 +82,7 @@ def check_raw(address: BusAddress) -> None:
 
 def _check_local(address: BusAddress) -> None:
     if not Path(address.channel).is_socket():
-        raise BusError(f"{address}: nobody serves it: start hodograph-hub {address.channel}")
+        raise BusError(f"{address}: no hub serves it: start hodograph-hub {address.channel}")
 
 
 def _check_socketcan(address: BusAddress) -> None:

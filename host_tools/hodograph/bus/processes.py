@@ -208,7 +208,7 @@ def virtual_clock(address: BusAddress) -> VirtualClock | None:
         return hub_clock(address.channel)
     except OSError as error:
         raise BusError(
-            f"{address}: nobody serves it: start hodograph-hub {address.channel} ({error})"
+            f"{address}: no hub serves it: start hodograph-hub {address.channel} ({error})"
         ) from None
 
 

@@ -299,7 +299,7 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     ]
     if lost and not unhomed:
         raise RefusedError(
-            f"axis {', '.join(lost)} is not homed, so nobody knows where it stands: hodograph home, hodograph goto "
+            f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home, hodograph goto "
             "back to the path, then hodograph stream --continue"
         )
     counts = at.controller.targets(machine.path_count)

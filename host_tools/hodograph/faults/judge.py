@@ -185,7 +185,7 @@ def _not_seen_at_rest(record: CaseRun, evidence: CaseRecord, codes: list[int]) -
     unknown = [node for node, time_us in last.items() if time_us is None]
     if expect.unseen and len(unknown) < len(last):
         return []
-    return [f"nobody saw when node {node} came to rest" for node in unknown]
+    return [f"no report shows when node {node} came to rest" for node in unknown]
 
 
 def _not_on_path(record: CaseRun, evidence: CaseRecord) -> list[str]:

@@ -161,7 +161,7 @@ def _read(reader: StreamReader, source: Connection, sink: Connection) -> NoRetur
         known = len(reader.notes)
         try:
             sink.send_bytes(message)
-        except OSError:  # nobody reads any more
+        except OSError:  # the reader has ended
             os._exit(0)
 
     try:

@@ -465,7 +465,7 @@ def test_a_controller_is_operated_step_by_step(machine: hg.Machine) -> None:
 
 def test_connect_names_a_bus_that_is_not_there(machine: hg.Machine) -> None:
     with (
-        pytest.raises(hg.BusError, match="nobody serves it"),
+        pytest.raises(hg.BusError, match="no hub serves it"),
         hg.connect(machine, "local:/nowhere"),
     ):
         pass

@@ -199,15 +199,15 @@ def test_a_rest_that_nobody_saw_is_no_rest() -> None:
         | (seen["time_us"] < BEGAN_US + 80_000)
         | (seen["time_us"] > BEGAN_US + 400_000)
     ]
-    assert "nobody saw when node 3 came to rest" in violations(record(silent))
+    assert "no report shows when node 3 came to rest" in violations(record(silent))
     never = seen[seen["id"] != 0x182]
-    assert "nobody saw when node 2 came to rest" in violations(record(never))
+    assert "no report shows when node 2 came to rest" in violations(record(never))
     reported = record(silent)
     reported.rest_us = BEGAN_US + 100_000  # somebody asked the drives
     excused = record(silent, replace(EXPECT, unseen=True))
     unlimited = record(silent, replace(EXPECT, rest_ticks=FOREVER))
     for made in (record(seen), reported, excused, unlimited):
-        assert not any(words.startswith("nobody saw") for words in violations(made))
+        assert not any(words.startswith("no report shows") for words in violations(made))
     nobody = seen[(seen["id"] != 0x182) & (seen["id"] != 0x183)]
     assert len(violations(record(nobody, replace(EXPECT, unseen=True)))) >= 2
 
