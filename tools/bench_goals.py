@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Goals beside measured figures: benchmarks/goals.toml and the figures of all benchmarks, by script."""
+"""Compares measured figures with goals: benchmarks/goals.toml and the figures of all benchmarks, by script."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Judged:
-    """A goal and what was measured; `kept` None: not measured."""
+    """A goal and its measured figure; `kept` None: not measured."""
 
     text: str
     wanted: str
@@ -49,7 +49,7 @@ def _judge(goal: dict[str, Any], values: list[Any]) -> Judged:
 
 
 def _at(figures: Any, way: Sequence[str]) -> Iterator[Any]:
-    """The figures at the end of a way of keys; "*" is every key."""
+    """The figures at a path of keys; "*" is any key."""
     if not way:
         yield figures
         return

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks every frame of a machine's bus: nothing may be there that should not.
+"""Checks each frame of a machine's bus for unexpected frames and content. Used by the soaks and tests.
 
 Known identifiers with the length that the machine's DBC gives them; SYNC counters in order; each PDO of SYNC type
 once a SYNC while its drive is operational, and none of a drive that is not; setpoints within the feed limit; legal
@@ -34,7 +34,7 @@ _MAY_REFUSE = {
     (0x100C, 0x06020000),  # no node guarding
     (0x100D, 0x06020000),
 }
-"""What a simulated drive has not, and the controller asks every drive for at its configuration."""
+"""Objects that the controller reads from each drive at its configuration, and that a simulated drive lacks."""
 _NOT_YET = (0x2001, 0x08000022)
 """`start` while the axes settle; a refusal that the host does not expect ends its run."""
 _NO_OBJECT = 0x06020000
@@ -93,7 +93,7 @@ class BusChecker:
         return Drive(node, known)
 
     def found(self, text: str) -> None:
-        """Notes something that should not be."""
+        """Notes a finding."""
         self.finding_count += 1
         if len(self.findings) < _KEPT_FINDINGS:
             self.findings.append(f"after {self.syncs} SYNCs: {text}")
@@ -104,7 +104,7 @@ class BusChecker:
 
     @property
     def late(self) -> int:
-        """Frames of a SYNC that came after the next one: no finding, but reported."""
+        """Number of frames of a SYNC that came after the next one: no finding, but reported."""
         return sum(s.late for drive in self._drives.values() for s in drive.streams.values())
 
     @property
@@ -213,7 +213,7 @@ class BusChecker:
     def _aborts(self, frames: Frames) -> None:
         answers = np.flatnonzero(frames["id"] == _SDO_ANSWER + self.machine.node)
         if not self._controller_answered:
-            # A host that asks whether the controller is there yet gives up again and again.
+            # A host that waits for the controller sends requests that time out.
             self._controller_answered = bool(answers.size)
             before = frames[: answers[0]] if answers.size else frames
             asked = before["id"] == _SDO_ASK + self.machine.node

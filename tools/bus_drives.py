@@ -39,7 +39,7 @@ _FROM_TO = {
 
 @dataclass
 class Drive:
-    """What is known of one drive."""
+    """The state of one drive."""
 
     node: int
     streams: dict[int, Stream]
@@ -48,7 +48,7 @@ class Drive:
     target: int | None = None
 
     def statuswords(self, frames: Frames) -> Iterator[str]:
-        """What is wrong with its statuswords in these frames."""
+        """Findings about its statuswords in these frames."""
         words = field_of(frames, _TPDO1 + self.node, 0, "<u2").astype(np.int64)
         if not words.size:
             return
@@ -69,7 +69,7 @@ class Drive:
         self.statusword = int(states[-1])
 
     def setpoints(self, frames: Frames, most_counts: int) -> Iterator[str]:
-        """What is wrong with its targets; `most_counts`: of a step."""
+        """Findings about its targets; `most_counts`: greatest step."""
         targets = field_of(frames, _RPDO1 + self.node, 2, "<i4").astype(np.int64)
         if not targets.size:
             return

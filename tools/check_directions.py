@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_directions.py [ROOT]: who may use whom. Prints FILE:LINE and the rule for each breach; exit status 1 then.
+"""check_directions.py [ROOT]: checks which layer uses which. Prints FILE:LINE and the rule for each breach; exit status
+1 then.
 
-The two tables below are the whole of the rules. A C layer is a folder (or single header), known by the
-longest prefix of the path; a Python layer is a package or module directly under hodograph, or one within it that has a
-row of its own (who may use a package may use all of it). A file may use
-its own layer, and those its row names. A folder without a row is a breach too, so that new ones are
-thought about. Besides: no circles between modules (a Python file, or a C source with the header of its name), and no
-I/O or heap headers in C_FREESTANDING.
+The two tables below are all rules. A C layer is a folder (or single header), by the longest prefix of the path. A
+Python layer is a package or module directly under hodograph, or one within it that has its own row; a layer that may
+use a package may use all of it. A file may use its own layer, and those in its row. A folder without a row is a breach,
+so that a row for each new one is chosen on purpose. In addition: no circles between modules (a Python file, or a C
+source with the header of its name), and no I/O or heap headers in C_FREESTANDING.
 
 Own code, because import-linter knows Python only: the tables, circles and messages here are the same for C.
 """
@@ -93,7 +93,7 @@ C_RULES: dict[str, set[str]] = {
     },
 }
 
-# Where neither operating system nor heap may be needed: the only system headers allowed.
+# Layers that may need neither operating system nor heap: only these system headers are allowed.
 C_FREESTANDING = (
     *("firmware/can", "firmware/core", "firmware/canopen", "firmware/app", "sim/plant"),
     "host_tools/numerics",

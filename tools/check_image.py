@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_image.py [--soft-float] IMAGE: whether a linked image keeps what docs/reference/architecture.md promises.
+"""check_image.py [--soft-float] IMAGE: checks that a linked image keeps the rules of docs/reference/architecture.md.
 
 Run after each link. It has no heap, no double arithmetic, no 64-bit division, no float without an FPU, with one no
 instruction on floats outside the float kernel, and its worst stack fits the stack of its linker script. A line for

@@ -3,7 +3,7 @@
 """check_registers.py [BUILD]: the constants of firmware/port/stm32g4/reg_*.h against crate stm32-metapac.
 
 Compared are addresses, offsets, fields, values of fields, numbers of interrupts and of alternate functions, and the
-memories of the linker script. A constant that the crate does not know must be in NOT_THERE, with what stands for it.
+memories of the linker script. A constant that the crate does not have must be in NOT_THERE, with its source.
 Prints each difference; exit status 1 then, or when the crate cannot be had.
 """
 
@@ -121,7 +121,7 @@ def memory_facts(facts: Facts) -> dict[str, int]:
 
 
 def expected(facts: Facts, name: str) -> int | None:
-    """What the crate says of a constant; None: it does not know it."""
+    """The crate's value of a constant; None: it does not have it."""
     if (base := re.fullmatch(r"(\w+)_BASE", name)) is not None:
         address: int = facts.peripherals[base[1]]["address"]
         return address

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """check_symbols.py ARCHIVE...: global names that two static libraries define. Prints them; exit status 1 then.
 
-Programs and tests link several libraries at once. Of two functions with one name the linker takes the one that it meets
-first, without a word. Only what port.h declares may be defined by each port: a program links one of them.
+Programs and tests link several libraries at once. If two functions have one name, the linker takes the first without a
+message. Only what port.h declares may be defined by each port: a program links one of them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_test_names.py [ROOT]: modules of the tests that Python could take for one another. Run by `make lint`.
+"""check_test_names.py [ROOT]: finds test modules whose names collide in Python. Run by `make lint`.
 
 pytest imports a test file by its base name, unless its folder is a package. So two files of one name in two folders
 cannot be collected together, and a module that tests import (tests/support, or beside the test) must not have the name

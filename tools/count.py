@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: MIT
 """count.py: `make count`: instructions of the tick on all cores, compared with the committed ones.
 
-Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when
-a count differs; `--update` takes the new ones over, there and into docs/validation/counts.md. A core is not
-counted again while
-its images, the emulator and the programs are the same (testing/cache.py); `--no-stamps` counts all. Counts belong to a
-compiler: with another version nothing is compared, and this is said.
+Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when a
+count differs; `--update` takes the new ones over, there and into docs/validation/counts.md. A core is not counted again
+while its images, the emulator and the programs are the same (testing/cache.py); `--no-stamps` counts all. Counts are
+those of one compiler version: with another version nothing is compared, and a message is printed.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ def blocks(figures: dict[str, Any]) -> dict[str, str]:
 
 
 def everything(build: Path, stamps: Stamps | None = None) -> dict[str, Any]:
-    """All that is counted; with `stamps`, only what has changed since it was."""
+    """All counts; with `stamps`, only changed ones are counted again."""
     counting = campaign.Campaign(build, stamps)
     figures = counting.run()
     cores = [TARGETS[core] for core, _ in taylor.CORES]

@@ -37,13 +37,13 @@ _SHIFT = 6
 """Of the other boards, where --icount does not say another one."""
 _BUS_STATUS, _MACHINE_STATUS, _USAGE_STATUS = 4, 1, 2
 _GRACE_S = 60.0
-"""For the board to notice that its bridge is gone, and the other way round: at once, if they get the processor."""
+"""Longest time in which the board notices that its bridge is gone, and vice versa."""
 _UNBEGUN_S = 5.0
-"""For a board that was commanded to end, or has SLCAN: one that waits for a bridge to open its FIFO, or for datagrams,
-would wait for ever.
+"""Longest wait for the end of a board after the command to end, or with SLCAN. A board that waits for its FIFO or for
+datagrams would not end.
 """
 _LOOK_S = 0.1
-"""Between two looks whether the time for an end is over."""
+"""Time between two checks whether the time for an end is over."""
 _PRIORITY = 15
 """Of a board in real time, where permitted: below the simulated drives (20), above everything ordinary. One for all its
 threads and its bridge, which take turns: one above another would be woken by each character.
@@ -51,8 +51,8 @@ threads and its bridge, which take turns: one above another would be woken by ea
 _SO_RCVBUFFORCE = 33
 _BUFFER_BYTES = 4 * 2**20
 _STOP_S = 8.0
-"""In real time, for the controller to stop the axes and switch them off: it takes 6 s at most. With FIFOs its clock is
-its own, and nobody knows how long it takes here: a second signal ends it.
+"""In real time, for the controller to stop the axes and switch them off, which takes at most 6 s. With FIFOs it has its
+own clock, and its time here is not known: a second signal ends it.
 """
 
 

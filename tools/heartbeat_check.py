@@ -25,11 +25,11 @@ AFTER = {
 }
 """NMT commands, and the state that each leads to."""
 _LATEST_S = 1.0
-"""The shortest time after which one of those who listen would notice: the controller's, where 0x1016 has no entry."""
+"""The shortest heartbeat time of all monitors: the controller's, if 0x1016 has no entry."""
 
 
 class Beats:
-    """What has been received of the controller and of the drives."""
+    """The state of the heartbeats of controller and drives."""
 
     def __init__(self, controller: int, drives: Collection[int]) -> None:
         self._controller, self._drives = controller, tuple(drives)
@@ -40,7 +40,7 @@ class Beats:
         """The longest time between two of a node."""
 
     def commanded(self, drive: int, command: int) -> None:
-        """The heartbeat that was on its way may still tell the state before."""
+        """A heartbeat in transmission may still have the state before."""
         self._commanded.setdefault(drive, {_PRE}).add(AFTER[command])
         if command in (RESET, RESET_COMMUNICATION):
             self._boots[drive] -= 1
@@ -49,7 +49,7 @@ class Beats:
     def take(
         self, frames: Frames, times_s: NDArray[np.float64], operational: Collection[int]
     ) -> Iterator[str]:
-        """What is wrong with the heartbeats in these frames; `operational` are the drives that were started."""
+        """Findings about the heartbeats in these frames; `operational` are the drives that were started."""
         for node in (self._controller, *self._drives):
             yield from self._heartbeats(node, frames, times_s, operational)
             if times_s.size and node in self._last_s:

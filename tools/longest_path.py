@@ -66,7 +66,7 @@ SPATIAL_GOALS = {
 def motion_part(
     build: Path, target: str, kernel: str, kind: str = "override", axes: str = "2"
 ) -> Longest:
-    """Ready to be asked for functions of setpoints.elf with this kernel; `kind` is of NOT_PLAIN, `axes` of PATHS."""
+    """The longest paths in setpoints.elf with this kernel; `kind` is of NOT_PLAIN, `axes` of PATHS."""
     own = f"kernel_{kernel}_{'segment' if axes == '2' else 'space'}_at"
     paths = (f"kernel_{k}_{p}_at" for k in emulator.KERNELS for p in ("segment", "space"))
     others = [*(path for path in paths if path != own), *PATHS[axes]]
@@ -77,7 +77,9 @@ def motion_part(
 
 
 def counted_at_most(counts: dict[str, Any], kind: str) -> int:
-    """Of the scenarios without override, or of all, which have stops; 0: nobody counts ticks with override alone."""
+    """The most counted instructions of the scenarios without override, or of all, which have stops; 0: ticks with
+    override alone are not counted.
+    """
     if kind == "override":
         return 0
     rows = (row for name, row in counts.items() if kind == "stop" or name.startswith(kind))
@@ -115,7 +117,7 @@ def table(build: Path) -> str:
 
 
 def _goal(target: str, kernel: str, axes: str, path: int) -> str:
-    """What is wanted of a spatial tick."""
+    """The goal of a spatial tick."""
     goal = SPATIAL_GOALS.get((target, kernel, axes))
     if goal is None:
         return ""

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""mutants.py [--count N] [--seed N] [--again] [--list] AREA...: do the tests notice a mistake in the code?
+"""mutants.py [--count N] [--seed N] [--again] [--list] AREA...: checks whether tests find planted mistakes.
 
 Plants one mistake at a time (a comparison turned round, a constant one off, a statement left out) in the
 sources of an area and runs the area's tests: C sources with the unit tests that link them, under the

@@ -29,7 +29,7 @@ class Stream:
         self.due = None
 
     def take(self, intervals: Intervals) -> Iterator[str]:
-        """Takes the next frames: for each the number of the SYNC before it. Yields what is wrong."""
+        """Takes the next frames: for each the number of the SYNC before it. Yields findings."""
         self.frames += intervals.size
         if not intervals.size:
             return

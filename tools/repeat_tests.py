@@ -5,7 +5,7 @@ whether its verdict is always the same.
 
 The runs take the modes in turn:
 
-    idle      nothing beside
+    idle      no other load
     busy      four processes that compute: `stress-ng --cpu 4` where it is installed, else of Python
     one-core  pinned to one core
 
@@ -107,7 +107,7 @@ def _run(command: Sequence[str], log: Path, one_core: bool) -> int:
 
 
 def _plain() -> dict[str, str]:
-    """The environment without what `make` tells its own parts: a run is a command of its own."""
+    """The environment without the variables that `make` sets for its parts, since each run is a separate command."""
     return {name: text for name, text in os.environ.items() if name not in ("MAKEFLAGS", "MFLAGS")}
 
 

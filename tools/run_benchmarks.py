@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""run_benchmarks.py: runs every benchmarks/*.py, prints its figures and gathers them in build/bench.json; at the end
-every goal of benchmarks/goals.toml beside what was measured, and the load of the computer before and after.
+"""run_benchmarks.py: runs each benchmarks/*.py, prints its figures and gathers them in build/bench.json. At the end it
+prints each goal of benchmarks/goals.toml with its measured figure, and the load of the computer before and after.
 
 Each script takes `--json OUT` and writes one JSON object: name of a figure to its value (a number, text,
 or an object). A script with the line `# bench: bus` near its top runs under tools/with-vcan. Exit status

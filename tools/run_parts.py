@@ -3,10 +3,10 @@
 """run_parts.py [--step NAME COMMAND | --tests NAME COMMAND]...: runs commands one after the other and sums them up.
 
 The output of a part passes through. A part given by --tests has to end with a line `N passed, N failed`, with or
-without `, N skipped`. A part fails when its exit status is not 0, and one of --tests also when it has no such line or
-counts a failure; whatever fails, the parts after it run all the same. At the end there is a table of how long each
-part took, and as the last line the sum: `N passed, N failed`. A part that fails without having counted a failure is
-one failure. Exit status 1 when there is any. Standard library only: it runs before anything is installed.
+without `, N skipped`. A part fails if its exit status is not 0; a part of --tests also if it has no such line or counts
+a failure. After a failure the other parts still run. At the end there is a table of how long each part took, and as the
+last line the sum: `N passed, N failed`. A part that fails without having counted a failure is one failure. Exit status
+1 when there is any. Standard library only: it runs before anything is installed.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def judge(part: Part, status: int, last: Iterable[str], seconds: float) -> Resul
 
 
 def run(part: Part) -> Result:
-    """Runs a part; what it says passes through."""
+    """Runs a part; its output passes through."""
     print(f"\n==== {part.name}: {part.command}", flush=True)
     began_s = time.monotonic()
     last: deque[str] = deque(maxlen=_LAST)

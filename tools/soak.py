@@ -6,7 +6,7 @@
 
 Without --bus it has local buses of its own, in virtual time. `--seconds` is bus time: SYNCs times period. It is shared
 equally by the periods. Setpoints and encoders of each repetition must have the hashes that `hodograph simulate` gives
-for the program. Prints a summary; exit status 1 when anything unexpected was on the bus, 4 when the machine failed.
+for the program. Prints a summary; exit status 1 if the bus had unexpected frames, 4 if the machine failed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _REPORT_S = 60.0
 
 
 class Soak:
-    """One soak: its programs, their hashes, what was seen."""
+    """One soak: its programs, their hashes, and its findings."""
 
     def __init__(self, address: BusAddress, machine: Path, note: Callable[[str], None]) -> None:
         """Plans and simulates the programs. Raises HodographError."""
@@ -96,7 +96,7 @@ class Soak:
             self.checker.found(f"{self.dropped} frames dropped by the kernel: not all were checked")
 
     def line(self) -> str:
-        """Where it stands, in a line."""
+        """The progress in a line."""
         return (
             f"{self.machine.period_us} us: {self.bus_s:.0f} s of bus time in {self.wall_s:.0f} s, "
             f"{self.checker.frames} frames, {self.repetitions} programs, {self.checker.finding_count} unexpected"

@@ -7,7 +7,7 @@
 Streams one job of about `--seconds` of motion on a local bus in virtual time to the controller on an emulated board.
 The setpoints on the bus must have the hash that the same chunks have in the offline simulation, without the standstill
 before and after. Virtual time stands still while the host plans, so no load on this computer makes a chunk late. Prints
-a summary; exit status 1 when hashes differ or the motion rested for want of chunks, 4 when the machine failed.
+a summary; exit status 1 if hashes differ or an underrun occurred, 4 if the machine failed.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _PAGE_MB = 4096 / 2**20
 
 
 def write_job(file: Path, seconds: float) -> int:
-    """Half circles to and fro, whose radius grows and shrinks, of about so much motion; how many lines."""
+    """Writes half circles of changing radius with about this much motion; returns the number of lines."""
     x_mm, radius_mm, growth_mm, side, length_mm, lines = 0.0, LEAST_MM, GROWTH_MM, 1, 0.0, 0
     with file.open("w", encoding="ascii") as out:
         out.write(f"G21 G90 G64 P0.02\nF{60.0 * FEED_MM_S:g}\n")
@@ -128,7 +128,7 @@ class MovingHash:
 
     @property
     def sha256(self) -> str:
-        """So far."""
+        """The hash so far."""
         return self._digest.hexdigest()
 
 
@@ -172,7 +172,7 @@ class PatientPlan(JobPlan):
         return found
 
     def copies(self) -> Iterator[Chunk]:
-        """The chunks, as they are read elsewhere."""
+        """Copies of the chunks."""
         last = False
         while not last:
             chunk = self.copy.get()
@@ -196,7 +196,7 @@ class Memory:
             self.samples[name].append(pages * _PAGE_MB)
 
     def summary(self) -> dict[str, dict[str, float]]:
-        """Of each: after a quarter of the samples, at the end, and the most."""
+        """Memory of each process: after a quarter of the samples, at the end, and the most."""
         return {
             name: {"quarter": found[len(found) // 4], "end": found[-1], "most": max(found)}
             for name, found in self.samples.items()
@@ -284,7 +284,7 @@ class Soak:
         return done
 
     def equal_marks(self) -> str:
-        """How many hashes on the way are equal, of those that both sides have."""
+        """Number of equal intermediate hashes, of those that both sides have."""
         pairs = list(zip(self.bus.moving.marks, self.offline.marks, strict=False))
         return f"{sum(one == other for one, other in pairs)} of {len(pairs)}"
 

@@ -32,7 +32,7 @@ def _note(text: str) -> None:
 
 @contextmanager
 def local_bus(*, virtual: bool = True) -> Iterator[str]:
-    """A bus of our own, as an address; in virtual time no clock of this computer decides anything."""
+    """A local bus, as an address; in virtual time results do not depend on the clock of this computer."""
     with LocalHub(virtual=virtual) as hub:
         yield str(hub.address)
 

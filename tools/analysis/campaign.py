@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All that `make count` counts: each kernel on each core, over the example programs and those made to be expensive."""
+"""The campaign of `make count`: counts each kernel on each core, over the example programs and worst-case programs."""
 
 from __future__ import annotations
 
@@ -91,9 +91,9 @@ def _rising(counts: Counts) -> npt.NDArray[np.bool_]:
 
 
 class Campaign:
-    """Images of the programs, each made once, and the counting.
+    """Images of the programs, each made once, and their counting.
 
-    With `stamps`, what was counted before on the same image, by the same emulator and tools, is taken from there.
+    With `stamps`, earlier counts of the same image by the same emulator and tools are used.
     """
 
     def __init__(self, build: Path, stamps: Stamps | None = None) -> None:
@@ -155,7 +155,7 @@ class Campaign:
         return counter.count(kernel, programs, _commands(commands), setpoints=Path(what))
 
     def kinds(self, motion: Counter, kernel: str) -> dict[str, Any]:
-        """Instructions of the rate, by what a tick does with it, over all scenarios."""
+        """Instructions of the feed override, by what a tick does with it, over all scenarios."""
         by_name = Counter(self.build, motion.target, functions=True)
         rate, called = [], []
         for scenario in SCENARIOS:

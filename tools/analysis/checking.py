@@ -22,7 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("alpha", "heart", "star", "alpha_optimal", "heart_optimal")
 CORES = ("an386", "microbit")
 STOP_NAMES = ("alpha", "alpha_optimal")
-"""The others take minutes."""
+"""The cores that are counted; others take minutes."""
 KINDS = ("hold", "fault")
 
 
@@ -47,8 +47,8 @@ def costs(build: Path) -> dict[str, Any]:
 
 
 def stop_costs(build: Path) -> dict[str, Any]:
-    """By example and kind of stop, on the Cortex-M4F: instructions of brake_check_piece over the feed pieces that have
-    stop parameters: how many, the median, the most, and all together.
+    """By example and kind of stop, on the Cortex-M4F: instructions of brake_check_piece over the feed pieces with stop
+    parameters: number of pieces, median, most, and sum.
     """
     counter = Counter(build, TARGETS[CORES[0]], "stop_checker", "brake_check_piece")
     out: dict[str, Any] = {}

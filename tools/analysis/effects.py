@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What an instruction does to the stack pointer and where the code goes on; Thumb and RISC-V, as objdump writes it."""
+"""The effect of an instruction on the stack pointer, and the instructions that may follow; Thumb and RISC-V, as written
+by objdump.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,7 @@ _SP_MATH = re.compile(r"(add|sub)w?s?$")
 
 
 class StackError(Exception):
-    """An instruction that this file cannot judge: the bound would be a guess."""
+    """An instruction that this module cannot interpret, so that no bound can be given."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ def _thumb_branch(image: Image, function: Function, index: int, name: str) -> Ef
 
 
 def _inside(function: Function, address: int) -> bool:
-    """Behind the first instruction of the function, where no call goes."""
+    """Whether it is after the first instruction of the function, to which no call goes."""
     own = function.instructions
     return own[0].address < address <= own[-1].address
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What no image may hold: functions of libraries, known by their names, and floats outside the float kernel."""
+"""Forbidden content of images: functions of libraries, by name, and float instructions outside the float kernel."""
 
 from __future__ import annotations
 

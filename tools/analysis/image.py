@@ -52,7 +52,7 @@ class Image:
 
     @cached_property
     def symbols(self) -> dict[str, int]:
-        """Address of each name; None stands for no name. Names that an object only asks for have 0."""
+        """Address of each name; 0 for names that an object only refers to."""
         found = {}
         for line in self._tool("nm").splitlines():
             words = line.split()

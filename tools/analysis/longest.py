@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The longest path through a function of a linked image, with all that it calls, in instructions.
 
-Every path that the instructions allow counts, whether values can take it or not, so nothing that runs can be
-longer. firmware/targets/loops.toml has what they do not say: how often loops go round, where calls through pointers go,
-and what a tick of the controller never calls. A loop or a call that it does not know is a LongestError.
+Each path that the instructions allow counts, whether values can take it or not, so no run can be longer.
+firmware/targets/loops.toml has what instructions do not show: bounds of loops, targets of calls through pointers, and
+functions that a tick of the controller never calls. A loop or a call that is not in it is a LongestError.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _NEVER = -(10**9)  # what no path reaches
 
 
 class LongestError(Exception):
-    """There is no bound, or none that could be shown."""
+    """No bound exists, or none could be shown."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class Longest:
         return max((self._of(f) for f in there), default=0)
 
     def _leave(self, graph: _Graph, at: int, leaving: int, to: Function, falls: bool) -> None:
-        """A jump into another function, which returns to the caller: whoever takes it does nothing else."""
+        """A jump into another function, which returns to the caller."""
         cost = self._most_expensive([to])
         if cost > 0:
             graph.cost[leaving], graph.follow[leaving] = cost, []

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Which instruction of an image belongs to which part of the tick: the map that count_plugin.c reads.
+"""Maps the instructions of an image to parts of the tick, for count_plugin.c.
 
-The compiler merges functions, so an address is asked for the functions it was inlined from (DWARF, addr2line). The
-innermost of them that has a rule below gives the part. A function without a rule (helpers, the compiler's own library)
-counts for whatever part calls it.
+The compiler merges functions, so addr2line (DWARF) gives the functions from which an address was inlined. The innermost
+of them that has a rule below gives the part. A function without a rule (helpers, the compiler's own library) counts for
+whatever part calls it.
 """
 
 from __future__ import annotations

@@ -5,11 +5,10 @@
 A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
 contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), those that it `shows:`, more `options:`, what stands
 `instead:` of something equal that the prover cannot follow, and its `mutant:`s, both `FILE: OLD => NEW`. It counts as
-proven when the prover has no doubt left and has come to the proof's end, reached(), for machines of 64 and of 32 bits;
-then in each mutant, a copy of the firmware with that mistake, the prover must find something: so no proof holds of
-nothing. What one proof takes for granted another has to show, or argued.txt has it, with the argument and a test;
---contracts prints that table and runs nothing. The last line is `N passed, N failed`, mutants counted too. Exit status
-1 unless all is as it should be.
+proven if the prover reports no alarm and reaches the proof's end, reached(), for machines of 64 and of 32 bits. In each
+mutant, a copy of the firmware with that mistake, the prover must find an alarm: so no proof is empty. Another proof has
+to show what a proof assumes, or argued.txt has it, with the argument and a test; --contracts prints that table and runs
+nothing. The last line is `N passed, N failed`, including mutants. Exit status 1 if one failed.
 
 A run that ended as it should is kept in the cache (testing/cache.py) under the hash of the proof, the files that it
 includes after its changes, the provers, their options and this program; as long as these are the same it is taken from
@@ -37,7 +36,7 @@ sys.path.insert(0, str(ROOT / "tools"))
 from testing.cache import Stamps, content, digest, tree  # noqa: E402
 
 PROOFS = ROOT / "tests" / "proofs"
-LIMIT_S = 300  # of processor time, for one run of a prover
+LIMIT_S = 300  # seconds of processor time for one run of a prover
 PATIENCE = (
     40  # times that, of wall time: only what waits for nothing gets there, however busy the machine
 )
@@ -61,7 +60,7 @@ class BadProof(Exception):
 
 @dataclass
 class Proof:
-    """What the first comment of a proof says."""
+    """The first comment of a proof, parsed."""
 
     name: str
     prover: str = ""
@@ -130,7 +129,7 @@ def _call(command: list[str]) -> tuple[int, str]:
 
 
 class CannotTell(Exception):
-    """A prover gave up, or never came to the end of a proof."""
+    """A prover gave up, or did not reach the end of a proof."""
 
 
 def _undeclared(proof: Proof, out: str) -> list[str]:
@@ -338,7 +337,7 @@ class Prover:
 
 
 def read_argued() -> dict[str, str]:
-    """What no prover shows: by function, the argument and its test."""
+    """Contracts that no prover shows: by function, the argument and its test."""
     lines = (PROOFS / "argued.txt").read_text().splitlines()
     pairs = (line.split(None, 1) for line in lines if line and not line.startswith("#"))
     return {name: how.strip() for name, how in pairs}

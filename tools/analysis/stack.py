@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """The most stack that a linked image can need, from its own instructions.
 
-Every path through every function is followed with the value of the stack pointer, so that each call is known with what
-is taken at that place; functions of the libraries are as good as ours. What the instructions do not say is in
-firmware/targets/stack.toml: where calls through pointers go, and which interrupts there are. Recursion, a stack that
-grows in a loop and anything that cannot be judged are StackErrors.
+Each path through each function, also of libraries, is followed with the value of the stack pointer, so the stack in use
+at each call is known. firmware/targets/stack.toml has what instructions do not show: targets of calls through pointers,
+and the interrupts. Recursion, a stack that grows in a loop, and instructions that cannot be interpreted are
+StackErrors.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ def whole_table(figures: Figures, section: str) -> str:
 
 
 def goal_of(section: str, target: str, kernel: str, scenario: str) -> int | None:
-    """Most instructions wanted, None where there is no goal."""
+    """The goal: most instructions allowed; None: there is no goal."""
     goal = GOALS.get((target, kernel))
     if goal is None or section == "receive" or scenario in ("settling", "drive lost"):
         return None
@@ -108,7 +108,7 @@ def _spread(most: int, median: int) -> str:
 
 
 def goal_lines(figures: Figures) -> str:
-    """The goals with what was counted."""
+    """The goals with the counts."""
     head = [
         "core, kernel",
         "",
@@ -286,7 +286,7 @@ _KINDS = {
 
 
 def kinds_table(figures: Figures) -> str:
-    """Instructions of the rate by what a tick does with it, on the cores that have goals."""
+    """Instructions of the feed override by what a tick does with it, on the cores that have goals."""
     chosen = [f"{target} {kernel}" for target, kernel in GOALS]
     cores = [TARGETS[target].core for target, _ in GOALS]
     head = [
@@ -303,7 +303,7 @@ def kinds_table(figures: Figures) -> str:
 
 
 def taylor_table(figures: Figures) -> str:
-    """The usual NURBS interpolator beside ours."""
+    """Comparison with the usual NURBS interpolator."""
     head = ["core", "interpolator", "min", "median", "max", "max / median", "feed ripple"]
 
     def rows() -> Iterator[list[str]]:

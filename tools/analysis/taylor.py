@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The usual NURBS interpolator (tests/target/taylor.c) beside ours: instructions of a tick and ripple of the feed.
+"""Compares the usual NURBS interpolator (tests/target/taylor.c) with the PH kernel: instructions of a tick and ripple
+of the feed.
 
-Both run the alpha at its feed of 100 mm/s: ours the PH spline, without its ramps, the other
-the B-spline of the same control polygon, which our spline meets at its knots.
+Both run the alpha at its feed of 100 mm/s: the kernel runs the PH spline without ramps, the other one the B-spline of
+the same control polygon, which the PH spline meets at its knots.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Programs made to be as expensive as the controller accepts them, and the commands to run them with.
+"""Worst-case programs: as expensive as the controller accepts, with the commands to run them.
 
-At 200 % a tick of these crosses two ends of segments and two of pieces again and again: neighbours are a very short and
-a long one, together just longer than docs/reference/protocol.md 1.2 and 1.3 ask for. Segments have the
-greatest speed ratio. The
-override bounds of the pieces make the look-ahead of the rate as long as it can be.
+At 200 % many ticks cross two ends of segments and two of pieces: a very short and a long one alternate, together just
+longer than docs/reference/protocol.md 1.2 and 1.3 require. Segments have the greatest speed ratio. The override bounds
+of the pieces make the look-ahead window of the override as long as possible.
 
 Only + - * / and roots of Python's own numbers: the same bytes on every machine.
 """
@@ -40,7 +39,7 @@ Bounds = tuple[float, float, float]  # factor, rate per s, second rate per s^2
 
 @dataclass(frozen=True)
 class Adversary:
-    """A program and what it is after."""
+    """A program and its commands."""
 
     name: str
     bounds: Callable[[random.Random, int], Bounds]
@@ -59,13 +58,15 @@ def _scattered(rng: random.Random, _index: int) -> Bounds:
 
 
 def _ladder(_rng: random.Random, index: int) -> Bounds:
-    """Sixteen pieces, each tighter than the one before: every look a little further finds less."""
+    """Sixteen pieces, each with lower bounds than the one before, so that each longer look-ahead window has lower
+    bounds.
+    """
     step = index % 16
     return 2.0 - step / 32, 150.0 * math.ldexp(1.0, -step // 3), 3e5 * math.ldexp(1.0, -step // 2)
 
 
 def _narrow(rng: random.Random, index: int) -> Bounds:
-    """One piece that allows little among many that allow all: an attempt above it, and back, again and again."""
+    """One piece with low bounds among many without: repeated attempts above it, and back."""
     return (1.0, 20.0, 2e4) if index % 60 == 0 else (2.0, 300.0 + rng.random(), 1e6)
 
 

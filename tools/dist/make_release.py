@@ -83,7 +83,7 @@ def make_share(tree: Path) -> None:
 
 
 def normalised(archive: Path, target: Path, time_s: int) -> Path:
-    """The same archive with its members in order, of nobody, at one time."""
+    """The archive with its members in order, without owners, with one time."""
     with (
         tarfile.open(archive) as source,
         target.open("wb") as raw,

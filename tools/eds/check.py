@@ -92,7 +92,7 @@ _RESTRICTED = (
 
 
 def check(path: Path) -> list[str]:
-    """What is wrong with an EDS file, a line each. Raises EdsError when it cannot be read."""
+    """The faults of an EDS file, a line each. Raises EdsError: it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -36,7 +36,7 @@ EXAMPLES = ROOT / "examples"
 STATUSES = (0, 2, 3, 4, 5, 6, 7)
 _WALL_TIME = ("planning_s",)
 _ROUNDED_US = 20.0
-"""By so much the controller's bounds of stops may be above those in Python (hodograph.program.check_stops)."""
+"""The controller's bounds of stops may be above those in Python by this (hodograph.program.check_stops)."""
 _LONG_US = 1 << 31
 """Longer than any stop."""
 

@@ -116,7 +116,7 @@ def _other_number(value: float, random: Random) -> float:
 
 
 def _spoil(document: Document, random: Random) -> None:
-    """What nobody may take: an unknown key, or a value that is no number where a number was."""
+    """A change that each reader has to refuse: an unknown key, or a value that is no number in place of a number."""
     found = list(places(document.data))
     numbers = [
         (t, k)

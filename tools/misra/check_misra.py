@@ -34,7 +34,7 @@ class Deviation:
     used: bool = False
 
     def covers(self, file: str, rule: str) -> bool:
-        """Whether it lets this be."""
+        """Whether the deviation allows a violation."""
         return rule == self.rule and fnmatch(file, self.place)
 
 
@@ -52,7 +52,7 @@ def read_deviations(text: str) -> list[Deviation]:
 
 
 def judge(output: str, deviations: list[Deviation]) -> list[str]:
-    """What is to be complained of in cppcheck's output."""
+    """The violations in cppcheck's output that no deviation allows."""
     found = sorted(
         {
             (m["file"], int(m["line"]), m["rule"])

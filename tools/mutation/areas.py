@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The areas whose tests are tried with planted mistakes: which sources, and which tests are meant to notice."""
+"""The areas whose tests are tried with planted mistakes: their sources, and the tests that should find the mistakes."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def _indices(text: str) -> Iterator[tuple[str, int, int, str]]:
 
 
 def _statements(text: str) -> Iterator[tuple[str, int, int, str]]:
-    """Assignments and calls whose value nobody takes, left out; the lines stay, so later ones keep their numbers."""
+    """Assignments, and calls without use of their value, left out; the lines stay, so later ones keep their numbers."""
     for found in _STATEMENT.finditer(text):
         if _DECLARATION.match(found[1]) is None:
             lines = found[1].count("\n")

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Compiles one C source with a mistake in it and runs the unit tests that link it.
 
-Compiling is quick, linking each test anew is not: so every test is linked once, under BUILD/mutation/c,
-against shared objects, and a first one, libmutant.so, is made anew for each mutant. It holds the source
-with the mistake; its symbols stand in for those of the same name in the objects behind it. Nothing under
-BUILD/asan changes. `make unit` must have built the tests there, under the sanitizers.
+Compiling is quick, linking each test anew is not: so every test is linked once, under BUILD/mutation/c, against shared
+objects, and a first one, libmutant.so, is made anew for each mutant. It holds the source with the mistake; its symbols
+replace those of the same name in the objects after it. Nothing under BUILD/asan changes. `make unit` must have built
+the tests there, under the sanitizers.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class CTests:
         self.seconds = {name: self._seconds(name) for name in self.tests}
 
     def try_out(self, mutant: Mutant, source: str) -> tuple[str, str]:
-        """What became of the mutant, and the test that noticed it."""
+        """The outcome of the mutant, and the test that found it."""
         changed = mutant.applied(source)
         code = self._assembly(changed)
         if code is None:

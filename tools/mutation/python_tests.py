@@ -36,7 +36,7 @@ class PythonTests:
         self.files = _quickest_first(said)
 
     def try_out(self, mutant: Mutant, source: str) -> tuple[str, str]:
-        """What became of the mutant, and the test that noticed it."""
+        """The outcome of the mutant, and the test that found it."""
         changed = mutant.applied(source)
         try:
             compile(changed, mutant.path, "exec")

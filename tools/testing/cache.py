@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Stamps: what was found for one content of all inputs, kept outside the tree so that it is not found again.
+"""Stamps: results for one content of all inputs, kept outside the tree so that they need not be computed again.
 
 A stamp lies in ${XDG_CACHE_HOME:-~/.cache}/hodograph/PART, under the hash of all that the finding depends on: sources,
-tools, flags. Whoever writes one makes sure that its key has them all. A file that is damaged in any way, or was made
-for another key, is treated as absent. A cache that cannot be written costs time and nothing else.
+tools, flags. The writer of a stamp has to include all of them in its key. A file that is damaged in any way, or was
+made for another key, is treated as absent. A cache that cannot be written costs time and nothing else.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Counts from what test programs print. Anything that is not understood counts as a failure."""
+"""Counts tests from the output of test programs. Output that is not understood counts as a failure."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Count:
 
 
 def read_unity(name: str, output: str, status: int) -> Count:
-    """What a Unity binary's output and exit status mean."""
+    """The counts in a Unity binary's output and exit status."""
     count = Count()
     for line in output.splitlines():
         found = _RESULT.match(line)
@@ -58,7 +58,7 @@ def read_unity(name: str, output: str, status: int) -> Count:
 
 
 def read_junit(path: Path, group: str, status: int) -> Count:
-    """What pytest's XML report and exit status mean."""
+    """The counts in pytest's XML report and exit status."""
     try:
         cases = list(ElementTree.parse(path).iter("testcase"))
     except (OSError, ElementTree.ParseError):

@@ -111,7 +111,7 @@ class Agent:
                 self.send(frames.CREDIT, it.number, frames.COUNT.pack(frames.STDIN, count))
         except BlockingIOError:
             return
-        except OSError:  # nobody reads it any more
+        except OSError:  # the reader is gone
             it.close_stdin()
             return
         if it.stdin_ended:
@@ -168,7 +168,7 @@ class Agent:
         del self.channels[it.number]
 
     def _drop(self, it: Channel) -> None:
-        """Nobody listens to it any more."""
+        """The client of the channel is gone."""
         del self.channels[it.number]
         it.close()
         it.abandon()

@@ -60,7 +60,7 @@ class Broker:
         self._selector.register(self._line, selectors.EVENT_READ, self._line_turn)
 
     def serve(self) -> None:
-        """Until the owner is gone or the kernel has ended; then everything is taken away."""
+        """Serves until the owner is gone or the kernel has ended; then removes everything."""
         trouble = "the bus has ended"
         limit = time.monotonic() + BOOT_LIMIT_S
         try:

@@ -25,7 +25,7 @@ class Channel:
         self.credit = {frames.STDOUT: frames.WINDOW, frames.STDERR: frames.WINDOW}
 
     def close_stdin(self) -> None:
-        """Nothing more goes in."""
+        """Closes the input."""
         if self.stdin >= 0:
             os.close(self.stdin)
             self.stdin = -1
@@ -37,14 +37,14 @@ class Channel:
         os.close(fd)
 
     def close(self) -> None:
-        """Gives all descriptors back."""
+        """Closes all descriptors."""
         self.close_stdin()
         for fd in self.outputs:
             os.close(fd)
         self.outputs = {}
 
     def signal(self, number: int) -> None:
-        """A signal for whoever is behind it."""
+        """Sends a signal to the command."""
 
     def abandon(self) -> None:
-        """Nobody listens any more, and it is closed."""
+        """The client is gone: closes the channel."""

@@ -36,6 +36,6 @@ class Connection(Channel):
         self.status = trouble
 
     def close(self) -> None:
-        """Gives all descriptors back."""
+        """Closes all descriptors."""
         super().close()
         self._socket.close()

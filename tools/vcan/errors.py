@@ -3,4 +3,4 @@
 
 
 class BusUnavailable(Exception):
-    """There is no bus, or no longer; the text says why and what to do."""
+    """There is no bus, or it has ended; the text has the reason and the remedy."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Frames of the multiplexed channel between client, broker and agent.
 
-A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command
-inside, or one TCP connection to a port inside. Data flows against credit, so that a slow reader holds up only
-itself: each side may send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
+A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command inside, or one TCP
+connection to a port inside. Data flows against credit, so that a slow reader delays its own channel only: each side may
+send WINDOW bytes per stream more than the other has acknowledged with CREDIT.
 
 The line itself needs the same once more: a serial line of user-mode Linux whose 4096-byte input buffer
 has once been full may receive nothing any more (seen with Linux 6.1). So the broker keeps at most LINE_IN bytes

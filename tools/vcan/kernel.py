@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The buses of this kernel: vcan0 where there is one, else one in a network namespace of the command's own; and vcan1.
+"""The buses of this Linux kernel: vcan0 if there is one, else one in a network namespace of the command; and vcan1.
 
-vcan1 is a second bus for whatever stands between two of them, such as the fault injector.
+vcan1 is a second bus for processes between two buses, such as the fault injector.
 
 A namespace keeps buses apart, so that tests may run at once, and leaves nothing behind. Without root it
 is entered through a user namespace, in which the user keeps his number.
@@ -33,7 +33,7 @@ _IFLA_INFO_KIND = 1
 
 
 BUSES = ("vcan0", "vcan1")
-"""What a command finds."""
+"""The buses of a command."""
 
 
 def has_bus(name: str = BUSES[0]) -> bool:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Which buses are open: one folder each under /tmp/hodograph-bus-UID.
 
-A folder holds `info.json` and `lock`. Whoever keeps the bus alive holds the lock (flock), so a folder
-whose lock is free is a left-over, whatever became of its processes. A user-mode bus also keeps its
-socket and boot log there. The lock is flock itself, not `filelock`: tools/with-vcan runs before .venv is there.
+A folder holds `info.json` and `lock`. The process that keeps the bus alive holds the lock (flock), so a folder whose
+lock is free is left over from an ended process. A user-mode bus also keeps its socket and boot log there. The lock is
+flock itself, not `filelock`: tools/with-vcan runs before .venv is there.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def in_user_mode_linux() -> bool:
 
 
 def _sweep() -> None:
-    """Removes folders that nobody keeps."""
+    """Removes folders whose lock is free."""
     if in_user_mode_linux():
         return
     for folder in root().iterdir():
