@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""How many of our own plans the controller accepts: its proof of the axis limits needs a little headroom.
+"""Share of plans that the controller accepts: its proof of the axis limits needs a little headroom.
 
     python benchmarks/acceptance.py [--json OUT] [--plans N] [--first SEED]
 
 Random paths in the plane, in space and of five axes, with random limits of the machine's axes, in all profiles. A plan
-keeps 0.998 of these limits. It is checked against the limits themselves (0.2 % of room), and against those that leave
+keeps 0.998 of these limits. It is checked against the limits themselves (0.2 % of headroom), and against limits with
 0.5 %. Stops are searched with few trials: the proof does not depend on them.
 """
 
@@ -78,7 +78,7 @@ def accepted(program: NativeProgram, machine: Machine, share: float) -> bool:
 
 
 def measure(seeds: range, folder: Path) -> dict[str, float]:
-    """Counts: plans, those that no feed keeps or the compiler refuses, and those accepted at either room."""
+    """Counts: plans, plans without a feed or refused by the compiler, and accepted plans at both headrooms."""
     counts: Counter[str] = Counter()
     for done, seed in enumerate(seeds, 1):
         pipeline = random_case(seed, folder)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # bench: bus
-"""Runs on the bus: seconds of motion for a second of wall time, deadline misses, hashes beside those of simulate.
+"""Runs on the bus: seconds of motion for a second of wall time, deadline misses, hashes compared with those of
+simulate.
 
     tools/with-vcan .venv/bin/python benchmarks/bus.py --json OUT
 

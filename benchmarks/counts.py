@@ -3,11 +3,10 @@
 
     python benchmarks/counts.py [--json OUT] [--build BUILD]
 
-Needs `make counter`. The main figures of docs/validation/counts.md: for each core and kernel the median over
-the examples and the
-most over all programs, plain and with the override in use, of the motion part and of the whole interrupt; the same of
-the usual NURBS interpolator, with the ripple of the feed of both; what the check of a program costs; and what the proof
-of its stops costs.
+Needs `make counter`. The main figures of docs/validation/counts.md: for each core and kernel the median over the
+examples and the most over all programs, plain and with the override in use, of the motion part and of the whole
+interrupt; the same of the usual NURBS interpolator, with the ripple of the feed of both; the cost of the check of a
+program; and the cost of the proof of its stops.
 """
 
 from __future__ import annotations

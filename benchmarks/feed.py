@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Feed figures: peak jerk of each profile beside the bang-bang limit, the search for n_c, the error of the
-pieces in 50 digits, and the time that planning and compiling take.
+"""Feed figures: peak jerk of each profile over the bang-bang limit, the search for n_c, the error of the pieces in 50
+digits, and the time for planning and compiling.
 
     python benchmarks/feed.py [--json OUT] [--feed MM_S] [--ramp S]
 """
@@ -39,7 +39,7 @@ SHARES = (1e-6, 0.13, 0.5, 0.77, 1.0 - 1e-6)
 
 
 def profiles(feed: float, ramp: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Peak jerk and acceleration by profile, and what the search did."""
+    """Peak jerk and acceleration by profile, and figures of the search."""
     best = optimise_n_c(feed, ramp)
     found: dict[str, Ramp] = {
         "quintic": quintic_ramp(feed, ramp),

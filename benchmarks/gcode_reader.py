@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 # bench: gcode
-"""Reading G-code: lines for each second of processor time, beside a loop that only reads the lines.
+"""Reading G-code: lines per second of processor time, compared with a loop that only reads the lines.
 
     .venv/bin/python benchmarks/gcode_reader.py --json OUT
 
-The program is a flood of G1 lines as CAM systems write them. `plain` takes the short path, `general` does without it.
+The program has many G1 lines as CAM systems write them. `plain` uses the fast method for such lines, `general` does
+not.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""What the monitor's pump costs: frames to samples, derived figures, contour error, decimation, JSON.
+"""Cost of the monitor's pump: frames to samples, derived figures, contour error, decimation, JSON.
 
-The alpha's traffic over and over at 1 kHz, five frames a tick, taken 40 ticks at a time as the pump does. Figures:
-processor time of one thread for a tick, the share of a processor that 1000 ticks a second take, bytes a second to a
-browser.
+The traffic of the alpha is repeated at 1 kHz, with five frames a tick, and read 40 ticks at a time as by the pump.
+Figures: processor time of one thread for a tick, the share of a processor that 1000 ticks a second take, bytes a second
+to a browser.
 """
 
 from __future__ import annotations

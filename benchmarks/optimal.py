@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Profile `optimal` beside the best known optimum (collocation), a bound from below (TOPP-RA) and the best program of
+"""Compares profile `optimal` with the best known optimum (collocation), a lower bound (TOPP-RA) and the best program of
 the paper's kind, all under the same limits, on the paper's curves, in space, with five axes, and on random ones.
 
     python benchmarks/optimal.py [--json OUT] [--only NAME…] [--intervals N]
@@ -66,7 +66,7 @@ jerk_mm_s3 = [35000, 40000, 20000, 30000, 60000]
 """
 SPACE_SEEDS = range(201, 204)
 SEEDS = range(101, 106)
-"""Of paths that nothing was ever tuned on."""
+"""Seeds of paths that were never used for tuning."""
 
 RAMPS_S = (0.02, 0.03, 0.045, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6)
 COARSE = 8

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Planning with profile `optimal`: time and memory by number of segments, and what the verifier says of the plan.
+"""Planning with profile `optimal`: time and memory by number of segments, and the verifier's result for each plan.
 
     python benchmarks/planning.py [--json OUT] [--segments N…]
 

@@ -2,7 +2,7 @@
 """Speed of `simulate`, and the accuracy of the simulated drives.
 
 Speed: 10^6 ticks of 1 ms on one core, contour error included, for each kernel: the heart, 350 laps, each turned by one
-degree. Accuracy: alpha and heart at servo sample rates up to 1.024 MHz, beside the rate of the drive files.
+degree. Accuracy: alpha and heart at servo sample rates up to 1.024 MHz, compared with the rate of the drive files.
 """
 
 from __future__ import annotations

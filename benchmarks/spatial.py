@@ -235,7 +235,7 @@ def compare(p: Real) -> dict[str, tuple[float, float]]:
 
 
 def criteria(count: int) -> dict[str, Any]:
-    """Median energies beside those of the guide's frame, over short walks with turns of up to 60 and 120 degrees."""
+    """Median energies over those of the guide's frame, over short walks with turns of up to 60 and 120 degrees."""
     out: dict[str, Any] = {}
     for degrees in (60, 120):
         rows = [compare(walk(seed, np.radians(degrees))[:9]) for seed in range(count)]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Stops beside the least time to rest on the same path under the same limits: feed hold and fault stop, at instants
-spread over each program.
+"""Compares stops with the least time to rest on the same path under the same limits: feed hold and fault stop, at
+instants spread over each program.
 
     python benchmarks/stops.py [--json OUT] [--only NAME…] [--instants N]
 """

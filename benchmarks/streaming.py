@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Streaming: how much faster than it runs a job is planned, how soon its first part is there, memory by length, and how
-much motion a ring of 48 KiB holds ahead.
+"""Streaming: ratio of motion to planning time, time to the first chunk, memory by length of the job, and motion ahead
+in a ring of 48 KiB.
 
     python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…] [--files FILE…]
 

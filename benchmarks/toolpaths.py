@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Cycle times of toolpaths beside those that were measured with LinuxCNC, and the certified deviation.
+"""Cycle times of toolpaths compared with those measured with LinuxCNC, and the certified deviation.
 
     python benchmarks/toolpaths.py [--json OUT] [--only NAME…] [--folder DIR…] [--lines N]
 
-The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs: with what a plan is
-slower so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with its
-S-curve planner and 50000 mm/s^3. Files that are in none of the folders are left out, with a line that says so. Then
+The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs, including the time
+that plans lose so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with
+its S-curve planner and 50000 mm/s^3. Files that are in none of the folders are left out, with a line that says so. Then
 generated programs of N lines, and the processor time that they take.
 """
 

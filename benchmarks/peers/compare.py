@@ -49,7 +49,7 @@ _SAG_MM = 1e-5
 
 @dataclass(frozen=True)
 class Row:
-    """What is measured of one motion."""
+    """The measured figures of one motion."""
 
     toolpath: str
     feed_mm_min: float

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A peer's motion: commanded positions at 1 kHz, and what is measured of it."""
+"""A peer's motion: commanded positions at 1 kHz, and its measured figures."""
 
 from __future__ import annotations
 

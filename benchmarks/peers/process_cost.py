@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Processor time and memory of a command, beside what it prints.
+"""Processor time and memory of a command, in addition to its output.
 
     process_cost.py OUT COMMAND ...
 

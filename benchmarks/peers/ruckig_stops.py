@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Ruckig: state to state, jerk-limited and time-optimal, here from rest to rest at each point of a program.
 
-Its way through intermediate points at speed is not part of the published package (a remote service plans it). So it
-stands for the exact stop: the time that jerk-limited motion takes that leaves the path nowhere and rests in each
-corner. Synchronised by phase, straight legs are kept.
+Motion through intermediate points at speed is not part of the published package (a remote service plans it). So Ruckig
+represents exact stops: jerk-limited motion that never leaves the path and rests in each corner. Phase synchronisation
+keeps straight legs.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """TOPP-RA: the least time along the C2 cubic spline through the points of a program, without a limit of the jerk.
 
-It plans no path: corners, tolerance and feed words are not its business. So it is asked only for programs whose points
-sample a smooth curve, with the feed word as a limit of the speed along the path.
+It plans no path and has no corners, tolerance or feed words. So it is used only for programs whose points sample a
+smooth curve, with the feed word as a limit of the speed along the path.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def drawing() -> str:
 
 
 def machine(printed: Printed) -> hg.Machine:
-    """Two axes with the printed limits; those along the path do not bind."""
+    """Two axes with the printed limits; those along the path are never reached."""
     axis = {
         "travel_mm": (-200, 200),
         "velocity_mm_s": printed.feed_mm_s,
@@ -118,7 +118,7 @@ def machine(printed: Printed) -> hg.Machine:
 
 
 def measured(printed: Printed, file: Path) -> dict[str, Any]:
-    """Ours beside the printed numbers."""
+    """Computed and printed numbers."""
     job = hg.load_job(
         file, machine(printed), tolerance_mm=TOLERANCE_MM, feed_mm_s=printed.feed_mm_s
     )

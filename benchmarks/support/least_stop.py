@@ -4,8 +4,8 @@
 The stop is one phase of unknown length, cut into equal intervals. Jerk is linear in each interval and free to jump
 between them; speed and acceleration are 0 at the end. The path's tangent, curvature and change of curvature are cubic
 splines over arc length through many places of each span; the change of curvature jumps between spans, and is smoothed
-there over a few hundredths of a span. Limits hold at five points of every
-interval. CasADi transcribes, Ipopt solves. Nothing here is used by the stops that the tool plans.
+there over a few hundredths of a span. Limits are imposed at five points of each interval. CasADi transcribes, Ipopt
+solves. The planned stops use nothing of this module.
 """
 
 from __future__ import annotations

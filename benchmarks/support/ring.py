@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""How much motion the ring of a small controller holds ahead, and what the bytes of chunks are; by streaming.py.
+"""Motion ahead in the ring of a small controller, and bytes of chunks by part; used by streaming.py.
 
-Paths of the examples are too short to fill a ring: those here repeat their shape, with their limits.
+Paths of the examples are too short to fill a ring: the paths here repeat their shape, with their limits.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ from hodograph.toolpath.files import ReadOptions
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 MACHINES = EXAMPLES / "machines"
 RING, BUS_BYTES_S = 48 * 1024, 17e3
-"""Of a small controller; what the bus carries beside the setpoints of two axes at 1 kHz."""
+"""Bytes of the ring of a small controller; bytes per second of the bus in addition to setpoints of two axes at 1
+kHz.
+"""
 
 _ALPHA = [(0, 0), (12, 18), (24, 27), (36, 9), (24, -9), (12, 0), (0, 18)]
 _HEART = [(-20, -50), (0, 5), (0, -5), (-20, 50), (40, 50), (75, -5), (75, 5), (40, -50)]

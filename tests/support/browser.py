@@ -18,9 +18,9 @@ import aiohttp
 from hodograph.bus.processes import guarded
 
 LOST_S = 600.0
-"""Without a word for so long the browser hangs: no page takes that, however busy the machine is."""
+"""A browser that sends nothing for this long counts as hanging."""
 MOST_LOOKS = 20_000
-"""At a page, each at another frame of its screen, until it shows what is waited for: some minutes."""
+"""Most checks of a page, each at another frame of its screen, until a condition holds: some minutes."""
 _NEXT_FRAME = "new Promise(r => { requestAnimationFrame(r); setTimeout(r, 100); })"
 """A page that is not seen has no frames."""
 
@@ -109,7 +109,7 @@ class Page:
         self._opened = (loop, session, port, url.partition("#")[0], width, height)
         self.complaints: list[str] = []
         self.meanwhile: Callable[[], None] = _nothing
-        """Done between two looks while something is waited for: lets time pass where it is virtual."""
+        """Called between two checks while a condition is waited for: lets virtual time pass."""
         self._socket = loop.run_until_complete(_attach(session, port))
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")

@@ -10,7 +10,7 @@ from contextlib import suppress
 
 _PERIOD_S = 0.001
 _PRIORITY = 40
-"""Above everything of ours: what is measured is the host, not those who are tested."""
+"""Above all processes of this project: it measures the host, not the tested processes."""
 
 
 class Lateness:

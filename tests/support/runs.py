@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `run --json` on a bus and `simulate --json` without one say of the same motion."""
+"""Compares `run --json` on a bus with `simulate --json` without one, for the same motion."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Segment:
         return rows
 
     def ways(self) -> list[Fraction]:
-        """Ways in x, y, z and along the segment, mm."""
+        """Distances in x, y, z and along the segment, mm."""
         return [sum(row, Fraction(0)) / 5 for row in self.hodograph()]
 
     def ratio(self) -> Fraction:

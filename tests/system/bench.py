@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A simulated machine on the bus, and where things are; fixtures that make one are in conftest.py."""
+"""A simulated machine on the bus, and paths of files; fixtures that make one are in conftest.py."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the tests with python canopen as client share: devices on a local bus in virtual time, a client of them, and
+"""Parts of the tests with python canopen as client: devices on a local bus in virtual time, a client of them, and
 frames made by hand.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What system tests share: where the tree is, and the bus that they run on.
+"""Fixtures of system tests: the bus that they run on.
 
 A test runs in virtual time on a local bus of its own (fixtures `hub`, `make_bench`); one that needs the CAN of the
 kernel is marked `bus`, and has vcan0.

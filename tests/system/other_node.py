@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A second node on the bus that speaks out of turn, drives that say they are real, and how a machine is afterwards."""
+"""Another node on the bus that sends unexpected frames, drives that report a vendor, and checks of the machine
+afterwards.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,7 @@ LIMIT_S = 20.0
 
 
 class OtherNode:
-    """A node that sends what it likes, in the time of the test."""
+    """A node that sends any frames, in the time of the test."""
 
     def __init__(self, channel: str) -> None:
         self._bus = LocalBus(channel, can_filters=NOTHING)
@@ -51,7 +53,7 @@ class OtherNode:
 
 @contextmanager
 def other_node(hub: LocalHub) -> Iterator[OtherNode]:
-    """A second node on the bus."""
+    """Another node on the bus."""
     made = OtherNode(hub.address.channel)
     try:
         yield made
@@ -64,7 +66,9 @@ FRAME_BITS_LEAST = 111
 
 
 def flood(other: OtherNode, identifier: int, seconds: float) -> None:
-    """So much of the bus, without a gap: frames that all wait at once, as those of a node with a broken driver."""
+    """Occupies the bus for this time without a gap: all frames are queued at once, as from a node with a broken
+    driver.
+    """
     for _ in range(round(seconds * 1e6 / FRAME_BITS_LEAST)):
         other.send(identifier, b"\xaa" * 8)
 

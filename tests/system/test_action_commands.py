@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Home, quick stop, reset; what commands say while they wait."""
+"""Home, quick stop, reset; messages of commands while they wait."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""NMT, heartbeat, EMCY, SYNC and what is refused, with python canopen as the master."""
+"""NMT, heartbeat, EMCY, SYNC and refusals, with python canopen as the master."""
 
 from __future__ import annotations
 

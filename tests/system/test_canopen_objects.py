@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Every object of both EDS files on the bus: type, access, default, limits; and what is not there."""
+"""Each object of both EDS files on the bus: type, access, default, limits; and objects that do not exist."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Half a minute of bus time with programs: nothing on the bus that should not be there (`make soak`: an hour)."""
+"""Half a minute of bus time with programs: no unexpected frame on the bus (`make soak`: an hour)."""
 
 from __future__ import annotations
 

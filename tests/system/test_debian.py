@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`make deb` and `make container`: in a clean root of Debian, where nothing else of this project is."""
+"""`make deb` and `make container`: in a clean root of Debian, without other files of this project."""
 
 from __future__ import annotations
 

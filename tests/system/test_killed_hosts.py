@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph stream` killed at random instants, again and again: the machine rests on its path, and goes on."""
+"""`hodograph stream` killed repeatedly at random instants: the machine comes to rest on its path, and the job
+continues.
+"""
 
 from __future__ import annotations
 

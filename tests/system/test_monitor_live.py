@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph monitor` as it is used: on a bus in virtual time, seen with a browser.
+"""`hodograph monitor` on a bus in virtual time, in a browser.
 
-The time of the bus goes on only while a test lets it; so what the page shows may take as long as it takes.
+The time of the bus advances only while a test allows it, so the page may take any time.
 """
 
 from __future__ import annotations

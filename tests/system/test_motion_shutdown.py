@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""How a moving machine is left, at any instant of an optimal program: by signals, once and twice, and by its host.
+"""Shutdown of a moving machine at any instant of an optimal program: by one and by two signals, and by the loss of its
+host.
 
-The frames on the bus are the evidence: setpoints rest within the bound of the stop, or the drives were commanded
-a quick stop; and a drive whose axis moves is never switched off.
+The frames on the bus are the evidence: setpoints come to rest within the bound of the stop, or the drives get a quick
+stop. A drive whose axis moves is never switched off.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""An operator's walk through a day, by the command alone: from upload to a fault, its words, its reset, and on."""
+"""A day of an operator by commands only: from upload to a fault, its text, its reset, and further programs."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A clumsy or hostile second node: nothing that it does to a machine ends in a state that says all is well when it is
-not, or that only a restart gets it out of.
+"""A faulty or hostile node on the bus: after any of its frames the machine reports its true state, and needs no restart
+to recover.
 """
 
 from __future__ import annotations

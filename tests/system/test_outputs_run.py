@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs on a bus: at the I/O module for the very setpoint that the simulation says, and a replay gives them again."""
+"""Outputs on a bus: they reach the I/O module with the same setpoint as in the simulation, and a replay gives them
+too.
+"""
 
 import json
 from pathlib import Path

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands without --bus: the local bus of this user where the kernel has no vcan0; and `hodograph demo`."""
+"""Commands without --bus: the local bus of this user if the Linux kernel has no vcan0; and `hodograph demo`."""
 
 from __future__ import annotations
 

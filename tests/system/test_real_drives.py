@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Drives that name a vendor in 0x1018: what simulated ones are spared."""
+"""Drives with a vendor in 0x1018: checks that simulated drives do not need."""
 
 from __future__ import annotations
 

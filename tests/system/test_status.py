@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph status`: once, watching, as JSON; what it says when something is wrong."""
+"""`hodograph status`: once, watching, as JSON; its messages on faults."""
 
 from __future__ import annotations
 

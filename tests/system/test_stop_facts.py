@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""compile, inspect, feed and status say the same of the longest stops of a program."""
+"""compile, inspect, feed and status give the same longest stops of a program."""
 
 from __future__ import annotations
 

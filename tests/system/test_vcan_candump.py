@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""docs/guides/candump.md does what it says: its commands are run, with Debian's can-utils, and their output
-compared."""
+"""The commands of docs/guides/candump.md are run with Debian's can-utils, and their output is compared with the
+page.
+"""
 
 from __future__ import annotations
 

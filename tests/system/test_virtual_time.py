@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Virtual time: what a simulation does is a function of its inputs alone, whatever the computer does meanwhile."""
+"""Virtual time: the result of a simulation depends on its inputs only, not on the load of the computer."""
 
 from __future__ import annotations
 

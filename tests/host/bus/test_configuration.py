@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a machine file makes of the controller's objects: in the dictionary, in range, and the requested values."""
+"""Objects of the controller from a machine file: in the dictionary, in range, with the requested values."""
 
 from __future__ import annotations
 

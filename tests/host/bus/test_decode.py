@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From frames to ticks: late answers are found, lost and doubled frames are never taken for good."""
+"""From frames to ticks: late answers are found, lost and doubled frames are never accepted."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A node that is not what our EDS describes is refused before anything is sent to it."""
+"""A node that differs from the EDS is refused before any command is sent to it."""
 
 from __future__ import annotations
 

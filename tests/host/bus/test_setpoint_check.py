@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Setpoint jumps are found, and motion within the limits is not taken for one."""
+"""The setpoint step check: jumps are found, and motion within the limits is not reported as one."""
 
 from __future__ import annotations
 

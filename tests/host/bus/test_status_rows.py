@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What `hodograph status` shows of a snapshot, to people and as JSON."""
+"""Output of `hodograph status` for a snapshot, as text and as JSON."""
 
 from __future__ import annotations
 

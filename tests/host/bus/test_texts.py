@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Words for numbers: the numbers are those of the firmware's headers, and every one has words."""
+"""Diagnostics texts: the numbers are those of the firmware's headers, and each has a text."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Turns at a controller's SDO channel: a lock that is waited for, but not for ever."""
+"""The SDO channel lock: clients wait for it in turn, for a bounded time."""
 
 import os
 import queue

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is found out before a program is sent."""
+"""Checks before a program is sent."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A machine whose tick cannot fit is refused before anything is sent, with what would fit."""
+"""A machine whose tick cannot fit is refused before any frame is sent, with values that would fit."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The bounds of the model against a bus that arbitrates frame by frame, with everybody as unkind as they may be."""
+"""The bounds of the model against a bus that arbitrates frame by frame, with all senders at their worst case."""
 
 from __future__ import annotations
 

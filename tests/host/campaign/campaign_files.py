@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the tests of campaigns run: a short path on the machine of the alpha."""
+"""Files for the tests of campaigns: a short path on the machine of the alpha."""
 
 from __future__ import annotations
 

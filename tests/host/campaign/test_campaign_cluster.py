@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""By Dask: on this machine's cores, killed and gone on with, and on a cluster, which may lose workers."""
+"""Campaigns by Dask: on the cores of this computer, killed and continued, and on a cluster, which may lose workers."""
 
 from __future__ import annotations
 

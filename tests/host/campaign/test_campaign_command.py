@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph campaign on one core: the table, errors, and going on after any interruption."""
+"""hodograph campaign on one core: the table, errors, and continuation after any interruption."""
 
 from __future__ import annotations
 

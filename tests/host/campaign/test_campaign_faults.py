@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rules of faults as a run without a bus has them."""
+"""Fault rules in a run without a bus."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws: the same for ever, spread as asked, and each on its own."""
+"""Draws: reproducible, distributed as requested, and independent."""
 
 from __future__ import annotations
 

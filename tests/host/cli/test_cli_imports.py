@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Commands that only speak to a controller load nothing that computes: an operator's `hold` must not wait for it."""
+"""Commands that only need a controller load no numeric modules: an operator's `hold` must not wait for these."""
 
 from __future__ import annotations
 

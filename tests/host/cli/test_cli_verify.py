@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph verify: keys, statuses, and what it is given."""
+"""hodograph verify: keys, exit statuses, and inputs."""
 
 from __future__ import annotations
 

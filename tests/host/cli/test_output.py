@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What commands write beside their results: notes, progress, numbers for people."""
+"""Output of commands besides their results: notes, progress, numbers as text."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph init and schema: files to begin with that work as they are, and schemas for editors."""
+"""hodograph init and schema: initial files that work without changes, and schemas for editors."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph check` asks for what the controller writes, and `hodograph scan` writes files that can be read."""
+"""`hodograph check` reads the objects that the controller writes, and `hodograph scan` writes files that can be
+read.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The JSON schemas of the input files say what the readers say: keys, ranges, words, what has to be there."""
+"""The JSON schemas of the input files agree with the readers: keys, ranges, words, required keys."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The generator of the C tables: what it makes, and what it says about a faulty EDS."""
+"""The generator of the C tables: its output, and its messages about a faulty EDS."""
 
 from __future__ import annotations
 

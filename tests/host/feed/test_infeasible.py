@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits with which profile `optimal` cannot plan: the message names limit and place, and the value it gives works."""
+"""Infeasible limits of profile `optimal`: the message names limit and place, and its value is feasible."""
 
 from __future__ import annotations
 

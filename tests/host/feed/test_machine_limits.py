@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The limits of a machine's axes bind every plan, whatever the path file says."""
+"""Each plan keeps the limits of a machine's axes, also if the path file has higher ones."""
 
 from __future__ import annotations
 

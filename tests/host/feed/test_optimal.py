@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Profile `optimal`: inside all limits on any path, fast, in windows as in one, and clear where nothing will do."""
+"""Profile `optimal`: inside all limits on any path, fast, equal in several windows and in one, with clear messages if
+no feed exists.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The plant comes out of a recorded run with noise: within one per cent, and within what the fit says of itself."""
+"""The plant from a recorded run with noise: within one per cent, and within the confidence intervals of the fit."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The decoder: same samples however the stream is cut, and it goes on whatever is missing."""
+"""The decoder: the samples do not depend on the parts of the stream, and missing frames do not stop it."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What the plots show agrees with what `simulate` computes."""
+"""The figures of the plots agree with those of `simulate`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fetching the program to draw: it yields to commands, and a failure is not the last word."""
+"""Reading the program to draw: commands interrupt it, and it is tried again after a failure."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Who may see, who may command."""
+"""Permissions of the live page: who may see it, who may command."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The server as a browser, or somebody who is none, meets it."""
+"""The server of the live page, with requests of browsers and of other clients."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What a streamed toolpath says of commands that nobody executes."""
+"""Notes of a streamed toolpath on commands that the machine does not execute."""
 
 from collections.abc import Iterator
 from pathlib import Path

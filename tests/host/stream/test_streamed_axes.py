@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Streamed toolpaths that turn axes along with x, y and z: in windows, as chunks, continued in the middle."""
+"""Streamed toolpaths with rotary axes that move with x, y and z: in windows, as chunks, continued in the middle."""
 
 from __future__ import annotations
 

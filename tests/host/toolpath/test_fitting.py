@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves of toolpaths: continuity, the certificate beside sampled distances, times, and what noise does."""
+"""Curves of toolpaths: continuity, the certificate compared with sampled distances, times, and effects of noise."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The reader of G-code beside LinuxCNC's own interpreter, on its programs and on generated ones."""
+"""The reader of G-code compared with LinuxCNC's own interpreter, on its programs and on generated ones."""
 
 from __future__ import annotations
 

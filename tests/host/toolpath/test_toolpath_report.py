@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The report and `verify` of a toolpath: what they draw and say is what the file and the run have."""
+"""The report and `verify` of a toolpath: their figures and texts are those of the file and the run."""
 
 from __future__ import annotations
 

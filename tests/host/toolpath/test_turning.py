@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Axes that turn along with a toolpath: smooth, within the tolerance, and run on a machine."""
+"""Rotary axes that move with a toolpath: smooth, within the tolerance, and run on a machine."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The linear model beside the simulated drive, and margins beside what happens when they are used up."""
+"""The linear model compared with the simulated drive, and margins with the behaviour at their ends."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph tune`: goals met, what is requested, files that lose nothing, refusals."""
+"""`hodograph tune`: goals are met, requested properties, files without loss, refusals."""
 
 from __future__ import annotations
 
