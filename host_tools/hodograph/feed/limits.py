@@ -43,6 +43,15 @@ class FeedZone:
             )
 
 
+def zones_after(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
+    """The zones of the part of a path from `base_mm` on, as arc lengths of that part."""
+    return tuple(
+        FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
+        for zone in zones
+        if zone.to_mm > base_mm
+    )
+
+
 @dataclass(frozen=True)
 class Limit:
     """One bound that a motion has to keep.

@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from ..config import Machine
 from ..errors import PlanError
 from ..events import EVENT
-from ..feed import FeedZone
 from ..feed.pieces import FeedPieces, joined_pieces
 from ..fixed_point import nearest_q40
-from ..machine_limits import program_limits, stop_terms
+from ..machine_limits import program_limits
 from ..native.program import NativeFault, NativeLimits, NativeProgram
 from ..program.check import REACH_Q40, brief_pairs
 from ..program.codes import ProgramError
 from ..program.image import COMPACT_PIECE_BYTES, Program, encode, segment_size
-from ..program.stop_planning import stop_codes, with_bounds, without_long_stops
-from ..program.stops import DECELERATION, no_stops
+from ..program.stop_planning import with_bounds, without_long_stops
+from ..program.stops import no_stops
 from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
 from .geometry import Block
+from .stop_search import Codes, StopSearch, no_codes
 from .tails import Tails
 from .windows import (
     JOINTS,
@@ -35,10 +35,6 @@ from .windows import (
     Window,
     last_s,
 )
-
-Codes = NDArray[np.uint8]
-Real = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 CHUNK_S = 1.0
 """Most new motion of a chunk."""
@@ -63,9 +59,6 @@ FEWEST_SHARED_PIECES = 4
 """Shared pieces if LEAST_SHARED_PIECES take too many bytes because they have many segments. An override ramp with a
 larger look-ahead window then delays the takeover; a motion at 100 % is not affected.
 """
-
-SEARCH_S, GAP_S = 0.02, 0.06
-"""Stop parameters are searched for one piece in SEARCH_S. Where none are found for GAP_S, all pieces are searched."""
 
 _TAIL_SHARE = 0.8
 """A chunk is planned only if its tail has room for this share of the last tail's bytes."""
@@ -144,7 +137,7 @@ class _Kept:
     """The pieces of the last chunk without its tail, with their stop codes; arc lengths are those of the section."""
 
     pieces: FeedPieces | None = None
-    codes: Codes = field(default_factory=lambda: _no_codes(0))
+    codes: Codes = field(default_factory=lambda: no_codes(0))
 
     def with_new(self, pieces: FeedPieces, codes: Codes) -> _Kept:
         """These pieces and new ones after them."""
@@ -165,16 +158,6 @@ class _Kept:
         shift = max(int(np.searchsorted(times, late, side="right")) - 1, 0)
         kept = _Kept(self.pieces.part(slice(shift, None)), self.codes[shift:])
         return kept, shift, int(times[shift])
-
-
-@dataclass
-class _Searched:
-    """Stop codes (M, 2, 3) of the pieces of a window."""
-
-    window: Window
-
-    def __post_init__(self) -> None:
-        self.codes = _no_codes(len(self.window.stretch.pieces))
 
 
 class _RefusedPartError(PlanError):
@@ -256,7 +239,7 @@ class SectionChunks:
         self._kept = _Kept()
         self._alone_q40: int | None = None
         self._last: _Made | None = None
-        self._searched: _Searched | None = None
+        self._search = StopSearch(machine, self._feed, self._program)
         self._tail_bytes = 0
         self._rested_s = 0.0
         self.rest_lines: list[int] = []
@@ -345,7 +328,11 @@ class SectionChunks:
         """The chunk with the most of these joints that fits and that the controller accepts; if there is none, the last
         one tried. `self._kept` has its pieces then.
         """
-        searched, before, tails = self._searched_in(window), self._kept, Tails(self._feed, window)
+        searched, before, tails = (
+            self._search.of_window(window),
+            self._kept,
+            Tails(self._feed, window),
+        )
         tried = None
         for used, least in [
             *((count, LEAST_SHARED_PIECES) for count in range(len(joints), 0, -1)),
@@ -354,7 +341,7 @@ class SectionChunks:
             repeated, piece_shift, time_shift = before.repeated(least)
             joint, new = joints[used - 1], slice(first, joints[used - 1])
             pieces = window.stretch.pieces.part(new)
-            self._kept = repeated.with_new(pieces, searched.codes[new])
+            self._kept = repeated.with_new(pieces, searched[new])
             kept_bytes = self._size_kept(window, joint)
             if used > 1 and kept_bytes + _TAIL_SHARE * self._tail_bytes > self._most:
                 continue
@@ -374,7 +361,9 @@ class SectionChunks:
         for thorough in (False, True):
             if fault is None or fault.code != ProgramError.STOP_LONG:
                 break
-            self._search_kept(tails.window, joint, fault.index if thorough else None)
+            kept, late = self._kept, fault.index if thorough else None
+            assert kept.pieces is not None
+            kept.codes = self._search.of_kept(tails.window, joint, kept.pieces, kept.codes, late)
             program, fault = self._with_tail(tails, joint, thorough)
         return program, fault
 
@@ -476,7 +465,7 @@ class SectionChunks:
         least_q40 = 0 if self._last is None else self._last.end_q40
         for tail in tails.after(joint, least_q40):
             whole = Stretch(joined_pieces([kept, tail.pieces]), tail.end_q40)
-            own = self._tail_codes(window, tail, thorough)
+            own = self._search.of_tail(window, tail, thorough)
             program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 continue
@@ -542,70 +531,13 @@ class SectionChunks:
         codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
         bad = np.asarray((codes == 0).any(axis=1))
         if not bad.any():
-            program = self._program(stretch, _no_codes(len(pieces)))
+            program = self._program(stretch, no_codes(len(pieces)))
             fault = self._fault(program)
             if fault is not None and fault.code in _MOVING_FAULTS:
                 bad[fault.index] = True
             elif fault is not None and fault.code == ProgramError.SEGMENT_SHORT:
                 bad = _on_short_segments(program)
         return bad
-
-    def _searched_in(self, window: Window) -> _Searched:
-        """Stop codes of the kept pieces of a window. Their brakes keep the limits on the path that the window knows
-        after them. Of brief pieces only some are searched: a stop in another piece begins in the next one with codes, a
-        little later.
-        """
-        if self._searched is not None and self._searched.window is window:
-            return self._searched
-        searched, count = _Searched(window), window.count
-        durations = window.stretch.pieces.duration_q32_s[:count]
-        seconds = np.ldexp(durations.astype(np.float64), -32)
-        for spacing_s in (SEARCH_S, 0.0):
-            found = np.asarray(searched.codes[:count, :, DECELERATION].all(axis=1))
-            self._add_codes(searched, _spaced(seconds, spacing_s, found))
-        self._searched = searched
-        return searched
-
-    def _add_codes(self, searched: _Searched, wanted: NDArray[np.bool_]) -> None:
-        """Searches stop codes for the wanted ones of the kept pieces (count,)."""
-        if wanted.any():
-            window, mask = searched.window, np.zeros(len(searched.codes), dtype=np.bool_)
-            mask[: wanted.size] = wanted
-            searched.codes[mask] = self._codes(window, window.stretch, mask, False)[mask]
-
-    def _search_kept(self, window: Window, joint: int, late: int | None) -> None:
-        """Searches stop codes for the kept pieces without any, with the window's path after the joint. With `late`: all
-        pieces from that one on, with all trials.
-        """
-        kept, codes = self._kept.pieces, self._kept.codes
-        assert kept is not None
-        rest = window.stretch.pieces.part(slice(joint, None))
-        whole = Stretch(joined_pieces([kept, rest]), window.stretch.end_q40)
-        count = _kinds(codes)
-        wanted = count < codes.shape[1] if late is None else np.arange(len(codes)) >= late
-        mask = np.concatenate((wanted, np.zeros(len(rest), dtype=np.bool_)))
-        found = self._codes(window, whole, mask, late is not None)[: len(codes)]
-        better = wanted & (_kinds(found) >= count)
-        self._kept.codes = np.where(better[:, None, None], found, codes)
-
-    def _tail_codes(self, window: Window, tail: Stretch, thorough: bool | None) -> Codes:
-        """Stop codes of a tail; `thorough` as in `_with_tail`."""
-        if thorough is None:
-            return _no_codes(len(tail.pieces))
-        return self._codes(window, tail, np.ones(len(tail.pieces), dtype=np.bool_), thorough)
-
-    def _codes(
-        self, window: Window, stretch: Stretch, wanted: NDArray[np.bool_], thorough: bool
-    ) -> Codes:
-        path = self._feed.path
-        program = self._program(stretch, _no_codes(len(stretch.pieces)))
-        begin = path.segment_at(int(stretch.pieces.start_q40[0]))
-        base_mm = float(path.curve.segment_starts_mm[begin])
-        limits = window.plan.limits
-        zones = zones_after(limits.zones, base_mm)
-        plan = replace(window.plan, limits=replace(limits, zones=zones))
-        terms = replace(stop_terms(self.machine, limits), quick=not thorough)
-        return stop_codes(program, plan, terms, wanted)
 
 
 def _on_short_segments(program: Program) -> NDArray[np.bool_]:
@@ -619,33 +551,3 @@ def _on_short_segments(program: Program) -> NDArray[np.bool_]:
         last = int(np.searchsorted(starts, ends[pair + 2] + REACH_Q40, side="right"))
         bad[max(first, 0) : last] = True
     return bad
-
-
-def _spaced(seconds: Real, spacing_s: float, found: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The pieces (M,) to search next: one in `spacing_s`; if that is 0, all pieces in gaps of GAP_S between found
-    ones.
-    """
-    t = np.concatenate((np.zeros(1), np.cumsum(seconds)))
-    if spacing_s > 0.0:
-        return np.asarray(np.diff(np.floor(t / spacing_s)) > 0.0)
-    before = np.maximum.accumulate(np.where(found, t[1:], 0.0))
-    after = np.minimum.accumulate(np.where(found, t[:-1], t[-1])[::-1])[::-1]
-    return np.asarray((after - before > GAP_S) & ~found)
-
-
-def _kinds(codes: Codes) -> Index:
-    """Number of kinds of stops for which each piece (M,) has codes."""
-    return np.asarray(np.count_nonzero(codes[:, :, DECELERATION], axis=1))
-
-
-def _no_codes(count: int) -> Codes:
-    return np.zeros((count, 2, 3), dtype=np.uint8)
-
-
-def zones_after(zones: tuple[FeedZone, ...], base_mm: float) -> tuple[FeedZone, ...]:
-    """The zones of the part of a path from `base_mm` on, as arc lengths of that part."""
-    return tuple(
-        FeedZone(max(zone.from_mm - base_mm, 0.0), zone.to_mm - base_mm, zone.feed_mm_s)
-        for zone in zones
-        if zone.to_mm > base_mm
-    )

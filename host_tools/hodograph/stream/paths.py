@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..config import ListedPath, Machine, load_paths
 from ..errors import InputError, PlanError
 from ..events import Events, SwitchedOutputs, events_after, no_events
+from ..feed.limits import zones_after
 from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..pipeline import Pipeline, pipeline_of
 from ..program.inspection import end_point_q40
@@ -22,7 +23,7 @@ from ..spline.build import FoundSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from ..toolpath.moves import Command, Dwell, ProgramStop
 from .chunk import Chunk, ChunkHeader, Rest, make
-from .chunks import JobPlace, zones_after
+from .chunks import JobPlace
 from .geometry import LEAST_REST_MM, curve_after
 
 Int = NDArray[np.int64]
