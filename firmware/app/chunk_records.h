@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * chunk_records: the coefficient records of a job in chunks. Only records near the motion exist, in the port's memory
- * for them (core/coefficient_cache.h). The main loop computes them ahead of the tick, for about half of the cache. If the
- * main loop stalls for longer than that, the tick has no point: fault 0x6100, and the drives stop by their own ramps.
+ * for them (core/coefficient_cache.h). The main loop computes them ahead of the tick, for about half of the cache. If
+ * the main loop stalls for longer than that, the tick has no point: fault 0x6100, and the drives stop by their own
+ * ramps.
  *
  * Used by app/stream. Main loop; takes the machine's lock where it is needed.
  */

@@ -40,8 +40,8 @@ static enum machine_refusal prepare_any(struct controller *controller, int64_t f
                                                                          : MACHINE_OUTSIDE_LIMITS;
 }
 
-/* What keeps the program from being started. Costs a check of it where it was not checked under this configuration: apart from
- * the start, so that the stack never holds the check and a prepared motion. */
+/* What keeps the program from being started. Costs a check of it where it was not checked under this configuration:
+ * apart from the start, so that the stack never holds the check and a prepared motion. */
 static enum machine_refusal program_refusal(struct controller *controller)
 {
     struct program_slot *slot = &controller->slot;

@@ -41,8 +41,8 @@ struct controller {
     struct tick tick;
     struct frame_queue queue;
     bool checks_chunk; /* the main loop is busy with a chunk while the motion may go on: */
-    uint16_t
-        urgent; /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
+    /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
+    uint16_t urgent;
     /* main loop only */
     struct config config; /* the same values as machine.config */
     struct configured configured;

@@ -7,8 +7,8 @@
  *   0x1400 + i  TPDO1 of its drive      0x1800 + i  its RPDO1; third object 0x202B where the drive maps a torque offset
  *                                       0x1806 + i  its RPDO2, where the drive maps a velocity offset
  *
- * PDO parameters describe the frames on the bus. PDOs of axes that are not configured, and of offsets that are not sent,
- * have bit 31 of the COB-ID set.
+ * PDO parameters describe the frames on the bus. PDOs of axes that are not configured, and of offsets that are not
+ * sent, have bit 31 of the COB-ID set.
  *
  * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under
  * the lock.

@@ -14,8 +14,9 @@
  *     CRC-32 of (index u16, sub u8, size u8) of each parameter u32 | CRC-32 of the configuration u32 | confirmed u8 |
  *     zero u8 x 3 | values in rising order of (index, sub), little-endian | zeros to a multiple of 8 bytes
  *
- * A content of 0 bytes stands for the defaults (0x1011). Only the content of the newest record is used. If it is damaged,
- * has a value that this firmware refuses, or is of a firmware with other parameters, nothing is restored. Main loop.
+ * A content of 0 bytes stands for the defaults (0x1011). Only the content of the newest record is used. If it is
+ * damaged, has a value that this firmware refuses, or is of a firmware with other parameters, nothing is restored. Main
+ * loop.
  */
 #ifndef APP_PARAMETER_STORE_H
 #define APP_PARAMETER_STORE_H

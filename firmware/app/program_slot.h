@@ -2,9 +2,9 @@
 /*
  * program_slot: the active program and the upload of its successor (object 0x2000).
  *
- * An upload goes to the spare bank of the port's store. Only a complete image that passes every check becomes the active
- * program. A broken or refused upload leaves the active program unchanged. The commit record of a bank (bank_record.h)
- * is written last. So after a loss of power at any moment the new program or its predecessor is found.
+ * An upload goes to the spare bank of the port's store. Only a complete image that passes every check becomes the
+ * active program. A broken or refused upload leaves the active program unchanged. The commit record of a bank
+ * (bank_record.h) is written last. So after a loss of power at any moment the new program or its predecessor is found.
  *
  * The commit record also holds the CRC-32 of the configuration that the program was checked against. Under another
  * configuration, and once after each power-on, the program is checked again before it may run.
@@ -29,9 +29,9 @@ enum program_slot_state {
 };
 
 struct program_slot {
-    void (*attend)(
-        void *
-            self); /* called with `self` from time to time while a program is checked; may be NULL */
+    /* Called with `self` at each step of the check of a program, so that the main loop can send heartbeats. May be
+     * NULL. */
+    void (*attend)(void *self);
     void *self;
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */

@@ -1,20 +1,22 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
+ * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h,
+ * docs/reference/protocol.md 1.7).
  *
- * Chunks are downloaded in order to a ring in RAM, and checked there as strictly as a program. Coefficient records are made
- * of what is near the motion only (app/chunk_records.h).
- * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
- * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
- * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
- * goes on when the next chunk has come.
+ * Chunks are downloaded in order to a ring in RAM, and checked there as strictly as a program. Coefficient records are
+ * made of what is near the motion only (app/chunk_records.h).
+ * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the
+ * next chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So
+ * whatever happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an
+ * underrun), and goes on when the next chunk has come.
  *
- * Where the next chunk begins at rest, behind a dwell, it is taken over at the end of its predecessor, and the motion counts the
- * ticks until it starts. Before a program stop the path is held once, until a resume.
+ * Where the next chunk begins at rest, behind a dwell, it is taken over at the end of its predecessor, and the motion
+ * counts the ticks until it starts. Before a program stop the path is held once, until a resume.
  *
- * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
- * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
- * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
+ * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped
+ * or has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power
+ * takes it away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where
+ * it has to be.
  */
 #ifndef APP_STREAM_H
 #define APP_STREAM_H
@@ -55,9 +57,8 @@ struct stream {
     struct program_fault refused; /* last refusal; code 0: none */
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
-    void (*attend)(
-        void
-            *self); /* called with `self` from time to time while a chunk is checked; may be NULL */
+    /* Called with `self` at each step of the check of a chunk. May be NULL. */
+    void (*attend)(void *self);
     void *self;
 
     struct chunk_ring ring;
@@ -71,8 +72,8 @@ struct stream {
     bool started;
     bool waits;         /* this underrun has been counted */
     bool optional_stop; /* optional program stops are made */
-    uint32_t
-        stopped_for; /* sequence of the chunk before which a program stop was made last; 0: none */
+    /* sequence of the chunk before which a program stop was made last; 0: none */
+    uint32_t stopped_for;
     enum stream_state state;
 };
 
@@ -101,8 +102,8 @@ enum machine_refusal stream_prepare(struct stream *stream, const struct config *
 /* machine_start has accepted it. */
 void stream_started(struct stream *stream);
 
-/* A round: makes records further on, takes the next chunk over where it can be; notes underrun and end. Short; also to be called
- * from `attend`. */
+/* A round: makes records further on, takes the next chunk over where it can be; notes underrun and end. Short; also to
+ * be called from `attend`. */
 void stream_process(struct stream *stream, struct machine *machine);
 
 /* The longest hold of the program that is executed, us; 0: none is. */

@@ -4,7 +4,8 @@
  *
  *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
  *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close
- *   C\r             from our bridge to a board: close, that is stop the axes and end; the board's own C reports that it has
+ *   C\r             from our bridge to a board: close, that is stop the axes and end; the board's own C reports that it
+ *   has
  *
  * Other lines (extended and remote frames, answers of an adapter) are passed over. A time stamp (four hex digits after
  * the data) is allowed. Pure; the two directions are independent.

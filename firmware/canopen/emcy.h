@@ -56,8 +56,8 @@ struct emcy {
  * history. */
 struct emcy_producer {
     uint8_t *error_register; /* 0x1001 */
-    uint32_t
-        *history; /* 0x1003 sub 1 ...: newest first; low half code, high half first detail bytes */
+    /* 0x1003 sub 1 ...: newest first; low half code, high half first detail bytes */
+    uint32_t *history;
     uint8_t *history_count; /* 0x1003 sub 0 */
     uint8_t history_size;
     uint8_t node;

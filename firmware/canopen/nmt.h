@@ -37,8 +37,8 @@ enum nmt_error_behaviour {
 /* Called by nmt_slave_process. Each may be NULL. */
 struct nmt_hooks {
     void (*reset_node)(void *context); /* all values back to power-on, then communication */
-    void (*reset_communication)(
-        void *context); /* communication objects 0x1000 ... 0x1FFF back to power-on */
+    /* Communication objects 0x1000 ... 0x1FFF back to power-on. */
+    void (*reset_communication)(void *context);
     void (*changed)(void *context, enum nmt_state state);
 };
 

@@ -11,8 +11,8 @@
  *     od_init(&od, &od_controller_table, &values, &hooks, app);
  *
  * By hooks the application computes a value when it is read, refuses a write, is notified of a write, and moves DOMAIN
- * data. Each hook may be NULL and runs in the context of the caller (SDO: main loop). The read hook should copy fields of
- * 64 bits that another context writes, under the port's lock, because the processor loads them in two instructions.
+ * data. Each hook may be NULL and runs in the context of the caller (SDO: main loop). The read hook should copy fields
+ * of 64 bits that another context writes, under the port's lock, because the processor loads them in two instructions.
  *
  * od_find, od_size are pure. The rest: main loop.
  */
@@ -125,8 +125,8 @@ void od_init(struct od *od, const struct od_table *table, void *storage,
 
 #define OD_FIRST_MANUFACTURER 0x2000u /* the first index that is no communication object */
 
-/* Gives the communication objects, those below OD_FIRST_MANUFACTURER, the values of the generated `od_<name>_defaults`, as
- * NMT reset communication asks for. Handlers are not called. */
+/* Gives the communication objects, those below OD_FIRST_MANUFACTURER, the values of the generated `od_<name>_defaults`,
+ * as NMT reset communication asks for. Handlers are not called. */
 void od_reset_communication(struct od *od, const void *defaults);
 
 /* The entry (index, sub), or NULL. */

@@ -6,8 +6,8 @@
  * its EDS. This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
  * (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of 0x1400 ... are
  * received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object must be readable
- * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application updates
- * fields before packing, and checks received values when it uses them.
+ * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application
+ * updates fields before packing, and checks received values when it uses them.
  * 
  * Rules for writes, with their abort codes:
  *   COB-ID (sub 1)      another identifier while the PDO is valid (bit 31 clear), an identifier of

@@ -1,30 +1,30 @@
 /* SPDX-License-Identifier: MIT */
-/* sdo_server: lets one SDO client at a time read and write an object dictionary (CiA 301, 7.2.4). Used by the controller and
- * by each simulated drive. No I/O: frames in, frames out.
+/* sdo_server: lets one SDO client at a time read and write an object dictionary (CiA 301, 7.2.4). Used by the
+ * controller and by each simulated drive. No I/O: frames in, frames out.
  * 
  * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client reads): expedited,
  * segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.
  * 
  * One transfer at a time. During a transfer an initiate request comes from another client: it is refused with
- * SDO_ABORT_LOCAL and the object of the request, and the transfer continues. There is one exception: before any data has
- * moved, an initiate request for the same object restarts the transfer, because its client has lost a response. After
- * that, a client has to abort before it begins again. A client that sends nothing is dropped after the timeout. An abort
- * is accepted if it names the object of the transfer, or no object (index 0).
+ * SDO_ABORT_LOCAL and the object of the request, and the transfer continues. There is one exception: before any data
+ * has moved, an initiate request for the same object restarts the transfer, because its client has lost a response.
+ * After that, a client has to abort before it begins again. A client that sends nothing is dropped after the timeout.
+ * An abort is accepted if it names the object of the transfer, or no object (index 0).
  * 
  * Stop commands are executed during a transfer: the hook `urgent` of the dictionary names them (expedited writes of one
  * byte). The server executes and answers such a write, and the transfer continues. The client of the transfer has to
- * ignore this response, which names another object. Within a block, all eight bytes of such a write distinguish it from a
- * segment.
+ * ignore this response, which names another object. Within a block, all eight bytes of such a write distinguish it from
+ * a segment.
  * 
  * Within a block, frames are segments with a number. A frame is refused as the request of another client if it has the
  * form of a request for an existing object and its number is not one of the next two. A frame of another client that
- * happens to have the next number is taken for a segment. The transfer then fails at the true segment, which has the same
- * number and other bytes, or, if that is lost, at the CRC.
+ * happens to have the next number is taken for a segment. The transfer then fails at the true segment, which has the
+ * same number and other bytes, or, if that is lost, at the CRC.
  * 
  * Lost segments: the server ignores segments after a gap. Its response at the end of the block names the last good
  * segment, from which the client repeats. If the last segment of a block is lost, the server sends this response after
- * half of the timeout; a client that only paused then repeats a few segments. A block that is lost as a whole ends in the
- * timeout.
+ * half of the timeout; a client that only paused then repeats a few segments. A block that is lost as a whole ends in
+ * the timeout.
  * 
  * A client receives nothing while it sends a block. So after an abort by the server the rest of the block still comes.
  * Frames whose numbers continue from the last segment are therefore not taken for requests.

@@ -6,8 +6,8 @@
 #include "core/stop_check.h"
 
 #define STEPS 16 /* of a brake, about */
-#define MOST_STEPS                                                                                 \
-    160 /* of a brake, until the remaining states must be within the limits as a whole */
+/* of a brake, until the remaining states must be within the limits as a whole */
+#define MOST_STEPS      160
 #define MOST_HALVINGS   3     /* of a step */
 #define MOST_PARTS      14    /* of a piece at a time */
 #define MOST_LOOKS      3000  /* at a stretch of a brake, for a piece and kind, */
@@ -137,8 +137,8 @@ static int within(struct span value, struct real limit)
     return limit.m == 0 || real_less(limit, real_max(real_negative(value.low), value.high)) == 0;
 }
 
-/* With derivatives c1, c2, c3 of an axis by arc length: velocity c1 v, acceleration c2 v^2 + c1 a, jerk c3 v^3 + 3 c2 v a + c1 j.
- * All combinations of states and jerks, on all of their stretch. */
+/* With derivatives c1, c2, c3 of an axis by arc length: velocity c1 v, acceleration c2 v^2 + c1 a, jerk c3 v^3 + 3 c2 v
+ * a + c1 j. All combinations of states and jerks, on all of their stretch. */
 static int keeps_on(const struct brake_check *check, const struct path_stretch *path,
                     const struct states *at, struct span jerk)
 {
@@ -194,8 +194,8 @@ static struct real least_release(const struct flow *flow)
     return real_div(real_mul(flow->own->up, steady), most);
 }
 
-/* The speed that the jerk of the onset makes in a tick, times 2: by so much a brake may lose less whose last tick before the
- * release phase has no jerk. */
+/* The speed that the jerk of the onset makes in a tick, times 2: by so much a brake may lose less whose last tick
+ * before the release phase has no jerk. */
 static struct real tick_change(const struct flow *flow)
 {
     return real_mul(flow->own->down, square(flow->period_s));
@@ -345,8 +345,8 @@ static void flow_step(struct flow *flow, struct real step_s, struct states *swep
     flow->time_s = later_s;
 }
 
-/* The greatest speed in the release phase at a deceleration up to b: of least jerk all the way, or of one that began with b1
- * and v1 = b1^2 / (2 j2) 1.016 + 2 T b1 at most, and had at most j2 since. */
+/* The greatest speed in the release phase at a deceleration up to b: of least jerk all the way, or of one that began
+ * with b1 and v1 = b1^2 / (2 j2) 1.016 + 2 T b1 at most, and had at most j2 since. */
 static struct real release_speed(const struct flow *flow, struct real b)
 {
     const struct real twice_up = real_scale(flow->own->up, 1);
@@ -358,8 +358,8 @@ static struct real release_speed(const struct flow *flow, struct real b)
     return twice_slow.m == 0 ? began : real_min(began, real_div(square(b), twice_slow));
 }
 
-/* The limits in one step. While the acceleration falls, or is the least, there is no jerk above 0; in the release phase none
- * below, and the speed is low. */
+/* The limits in one step. While the acceleration falls, or is the least, there is no jerk above 0; in the release phase
+ * none below, and the speed is low. */
 static int step_keeps(struct brake_check *check, const struct flow *flow,
                       const struct states *swept, struct real before_s)
 {
@@ -506,7 +506,8 @@ static struct span derivative(const struct feed_polynomial *poly, const struct s
     return out;
 }
 
-/* Speed lambda F', acceleration lambda^2 F'' + lambda' F'; of a hold lambda' F' is at most a quarter of the deceleration. */
+/* Speed lambda F', acceleration lambda^2 F'' + lambda' F'; of a hold lambda' F' is at most a quarter of the
+ * deceleration. */
 static void states_of(const struct feed_polynomial *poly, const struct part *part,
                       struct real most_turned, struct states *out)
 {

@@ -187,8 +187,8 @@ static int same_event(const struct program *p, uint32_t i, const struct program 
            own.channel == old.channel && own.mask == old.mask && own.value == old.value;
 }
 
-/* Up to the predecessor's end both have the same events, so that the next event is the same one whenever the takeover happens.
- * Where those of the next chunk are in disorder, the check of its program finds it. */
+/* Up to the predecessor's end both have the same events, so that the next event is the same one whenever the takeover
+ * happens. Where those of the next chunk are in disorder, the check of its program finds it. */
 static int check_events(const struct chunk *next, const struct chunk *previous, uint32_t *index)
 {
     const struct program *before = &previous->program;
@@ -211,8 +211,8 @@ static int check_events(const struct chunk *next, const struct chunk *previous, 
 
 /* --- One that begins at rest --- */
 
-/* The start is not checked yet, so it may be any number: the difference is one of unsigned numbers, which may wrap. An end
- * has a magnitude below 2^62, so a difference that wraps is far from 0. */
+/* The start is not checked yet, so it may be any number: the difference is one of unsigned numbers, which may wrap. An
+ * end has a magnitude below 2^62, so a difference that wraps is far from 0. */
 static int meets(int64_t start_q40, int64_t end_q40)
 {
     const uint64_t off_q40 = (uint64_t)start_q40 - (uint64_t)end_q40;

@@ -5,12 +5,12 @@
  * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside
  * the limits of the program. The next chunk begins inside its predecessor: it repeats the pieces and segments before
  * the joint, where that tail begins, with the same numbers, and goes on from there. The controller takes it over while
- * the motion is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the tail and
- * rests on the path. Events are shared like segments: both chunks have those up to the end of the predecessor, so that none
- * acts twice or is left out, whichever chunk the motion passes it with.
+ * the motion is in the shared part (feed_override_take_over). If there is no next chunk in time, the motion follows the
+ * tail and rests on the path. Events are shared like segments: both chunks have those up to the end of the predecessor,
+ * so that none acts twice or is left out, whichever chunk the motion passes it with.
  *
- * A chunk with flag REST shares nothing: it begins at rest, where its predecessor ends, after a dwell or a program stop. So
- * paths with exact stops between them are one job.
+ * A chunk with flag REST shares nothing: it begins at rest, where its predecessor ends, after a dwell or a program
+ * stop. So paths with exact stops between them are one job.
  *
  * A chunk is never copied; its bytes must stay unchanged as long as a struct chunk refers to them. No heap, no globals.
  */
@@ -33,8 +33,8 @@
 #define CHUNK_REST_OPTIONAL 2u /* an optional one */
 #define CHUNK_REST_TICKS    8u /* the shortest rest before a chunk with flag REST */
 #define CHUNK_TIME_UNKNOWN  UINT32_MAX
-#define CHUNK_SHARED_PIECES                                                                        \
-    16u /* of a chunk whose takeover no look-ahead delays: the longest window */
+/* of a chunk whose takeover no look-ahead delays: the longest window */
+#define CHUNK_SHARED_PIECES 16u
 
 struct chunk {
     /* The header, as in protocol.md 1.7. */
@@ -44,8 +44,8 @@ struct chunk {
     uint32_t sequence;
     uint32_t piece_shift;   /* number in the predecessor of piece 0, */
     uint32_t segment_shift; /* and of segment 0 */
-    uint32_t
-        shared_pieces; /* so many from the first are the predecessor's; the joint is behind them */
+    /* so many from the first are the predecessor's; the joint is behind them */
+    uint32_t shared_pieces;
     uint32_t shared_segments;
     int64_t arc_shift_q40_mm;  /* arc length in the predecessor of arc length 0, */
     uint64_t time_shift_q32_s; /* and program time in it of time 0 */

@@ -100,7 +100,8 @@ static void add_segment(struct making *m)
     m->room -= m->segment_size;
 }
 
-/* Adds a piece, or a segment: what the records come less far with along the path. 0: there is no more of it, or no room. */
+/* Adds a piece, or a segment: what the records come less far with along the path. 0: there is no more of it, or no
+ * room. */
 static int add_next(struct making *m)
 {
     const struct program_header *h = &m->program->header;

@@ -7,8 +7,8 @@
  * They hold native structs: for the binary that made them and no other. Any context but where it says otherwise.
  *
  * A tick goes from record to record by the links in them. So it needs a window of records round its place, and no more:
- * all of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). Where a window ends before
- * the program does, the link is 0, and a tick that would have to go on is refused (INTERPOLATOR_ERR_JUMP).
+ * all of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). Where a window ends
+ * before the program does, the link is 0, and a tick that would have to go on is refused (INTERPOLATOR_ERR_JUMP).
  */
 #ifndef HODOGRAPH_CORE_COEFFICIENTS_H
 #define HODOGRAPH_CORE_COEFFICIENTS_H
@@ -78,7 +78,8 @@ uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
 /* Takes the next bytes of the records; 0 or a negative error. */
 typedef int coefficients_sink(void *context, const uint8_t *bytes, uint32_t size);
 
-/* Makes all records, in order: those of the pieces, then those of the segments, each of one size. Gives the sink's first error, or 0. Main loop; linear. */
+/* Makes all records, in order: those of the pieces, then those of the segments, each of one size. Gives the sink's
+ * first error, or 0. Main loop; linear. */
 int coefficients_make(const struct program *p, const struct kernel *kernel, coefficients_sink *sink,
                       void *context);
 

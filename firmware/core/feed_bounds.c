@@ -128,7 +128,8 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
                             scaled_bound(high_q24, scale, order, e));
 }
 
-/* One of the scaled Bernstein coefficients (q36, tau) in 2^-24 physical units, not below; a unit more than rounding takes. */
+/* One of the scaled Bernstein coefficients (q36, tau) in 2^-24 physical units, not below; a unit more than rounding
+ * takes. */
 static int64_t unscaled_above(int64_t b, int64_t scale, int order, int exponent)
 {
     int64_t size = (int64_t)qmath_div_u64((uint64_t)qmath_magnitude(b), (uint64_t)scale);

@@ -20,12 +20,12 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 #define SEARCH_STEPS      2        /* in a tick at rest */
 #define NO_NUMBERS        2u
 #define MOST_FEED_Q32     ((int64_t)1 << 45)
-#define MOST_SLOPE_Q56                                                                             \
-    (((int64_t)1 << 57) - 1)         /* 2^57, the greatest, less a unit: it is made an int32_t */
-#define REACH_Q40 ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
-#define MS_Q40    1099511628u        /* 2^40 / 1000 */
-#define UM_PER_MM 1000u
-#define US_PER_S  1000000u
+/* 2^57, the greatest, less a unit: it is made an int32_t */
+#define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
+#define REACH_Q40      ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
+#define MS_Q40         1099511628u        /* 2^40 / 1000 */
+#define UM_PER_MM      1000u
+#define US_PER_S       1000000u
 
 /* The clock has been set. */
 static void begin(struct feed_override *f, const struct program *p)
@@ -278,8 +278,8 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. The remainder is
- * rounded down, to micrometres and microseconds. */
+/* Whether any brake of the stop table would rest before the end of the path, and before the program does. The remainder
+ * is rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
@@ -295,8 +295,9 @@ static int is_far_from_end(const struct feed_override *f, const struct path_stat
 
 /* --- From the plan to the brake --- */
 
-/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk of the
- * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
+/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk
+ * of the program's limits would have to take away more than a quarter of the deceleration first: the rise is cut
+ * instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
     if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
@@ -336,8 +337,9 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
-/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited for the end of a
- * rise of the override, which the bound of the piece before does not know of: then the bound of this piece counts. */
+/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited
+ * for the end of a rise of the override, which the bound of the piece before does not know of: then the bound of this
+ * piece counts. */
 static void enter_piece(struct feed_override *f)
 {
     read_numbers(f);
@@ -416,8 +418,8 @@ int feed_override_next(struct feed_override *f, struct interpolator *it,
 
 /* --- The next chunk --- */
 
-/* In motion: the last setpoint and all up to the joint are the same in both programs. A piece that reaches beyond an end of
- * one of them is not: it is held inside there (core/interpolator). */
+/* In motion: the last setpoint and all up to the joint are the same in both programs. A piece that reaches beyond an
+ * end of one of them is not: it is held inside there (core/interpolator). */
 static int is_shared(const struct feed_override *f, const struct chunk *next)
 {
     const struct program *p = f->clock.program;
@@ -460,8 +462,8 @@ static int may_take_over(const struct feed_override *f, const struct chunk *next
            (rests(f) ? may_take_over_resting(f, next) : may_take_over_moving(f, next));
 }
 
-/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the first
- * piece. */
+/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the
+ * first piece. */
 static void place_in_next(const struct feed_override *f, const struct interpolator *it,
                           const struct chunk *next, struct feed_place *place)
 {

@@ -6,17 +6,17 @@
  *
  * Override and resume change the override (core/override_plan) along jerk-limited ramps inside the override bounds of
  * every feed piece that they touch. Hold, stop and fault stop leave the nominal motion: they are path stops
- * (core/path_brake) from the speed and acceleration of the last setpoint, with the stop parameters of the piece. Where a
- * path stop may not begin, the nominal motion continues for another tick. If the program would end before a path stop
+ * (core/path_brake) from the speed and acceleration of the last setpoint, with the stop parameters of the piece. Where
+ * a path stop may not begin, the nominal motion continues for another tick. If the program would end before a path stop
  * would, it ends without one. So a stop takes at most the bound of the piece in which it was requested
- * (docs/reference/protocol.md 1.4). A hold or stop that is requested while the override rises first ends the rise. If the
- * program is in another piece by then, the bound of that piece counts from that instant.
+ * (docs/reference/protocol.md 1.4). A hold or stop that is requested while the override rises first ends the rise. If
+ * the program is in another piece by then, the bound of that piece counts from that instant.
  *
- * At standstill of a hold the program time of the place is searched, a step in each tick; a resume goes on from there. It
- * is found to 2^-42 s of program time.
+ * At standstill of a hold the program time of the place is searched, a step in each tick; a resume goes on from there.
+ * It is found to 2^-42 s of program time.
  *
- * In a job in chunks (core/chunk.h) feed_override_take_over replaces the program under way by the next one. At the end of
- * a tail the motion rests and waits for the takeover. Its state is still running, held or stopped.
+ * In a job in chunks (core/chunk.h) feed_override_take_over replaces the program under way by the next one. At the end
+ * of a tail the motion rests and waits for the takeover. Its state is still running, held or stopped.
  *
  * Integers only, the same on every target. One owner: no tick may run while a command is called from elsewhere.
  */
@@ -60,8 +60,9 @@ struct feed_override {
     int64_t left_q30; /* ticks at override 1 until the deadline */
 };
 
-/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42), running, override 100 %.
- * period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay as it is. */
+/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42),
+ * running, override 100 %. period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay
+ * as it is. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
@@ -77,15 +78,15 @@ struct feed_place {
     uint32_t piece;
     uint32_t segment;
     int64_t arc_length_q40_mm;
-    uint32_t
-        by_arc; /* 1: the piece is to be looked for from this one on, as that of the arc length */
+    /* 1: the piece is to be looked for from this one on, as that of the arc length */
+    uint32_t by_arc;
 };
 
 void feed_override_place(const struct feed_override *f, const struct interpolator *it,
                          struct feed_place *place);
 
-/* Goes on with these records of the program under way. 1, or 0: they do not have what the next tick needs, and nothing has
- * changed. After 1 the records before are no longer in use. Constant time. */
+/* Goes on with these records of the program under way. 1, or 0: they do not have what the next tick needs, and nothing
+ * has changed. After 1 the records before are no longer in use. Constant time. */
 int feed_override_use(struct feed_override *f, struct interpolator *it,
                       const struct coefficients_window *window);
 
@@ -105,14 +106,14 @@ static inline int feed_override_wants_records(const struct feed_override *f,
 int feed_override_may_take_over(const struct feed_override *f, const struct interpolator *it,
                                 const struct chunk *next, struct feed_place *place);
 
-/* Takes the next chunk, which chunk_check has accepted behind the one under way and of which these records are there, for the
- * same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those of the
- * program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a ramp or is on
- * one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from the same arc length;
- * the motion goes on when it is running and the place is found, with the override from 0. A chunk that begins at rest: at the end
- * of its predecessor, running; the next tick gives its first setpoint, as of a program.
- * Returns 1, or 0: not now, or not with these records, and nothing has changed; try again after the next tick. After 1 the
- * program before and its records are no longer in use. Constant time. */
+/* Takes the next chunk, which chunk_check has accepted behind the one under way and of which these records are there,
+ * for the same kernel, for the program from the next tick on. In motion: where all setpoints up to the joint are those
+ * of the program under way, bit for bit. So not in a brake, nor beyond the joint, nor while the override looks for a
+ * ramp or is on one that was decided with pieces behind the joint. At rest (held, or at the end of the tail): on from
+ * the same arc length; the motion goes on when it is running and the place is found, with the override from 0. A chunk
+ * that begins at rest: at the end of its predecessor, running; the next tick gives its first setpoint, as of a program.
+ * Returns 1, or 0: not now, or not with these records, and nothing has changed; try again after the next tick. After 1
+ * the program before and its records are no longer in use. Constant time. */
 int feed_override_take_over(struct feed_override *f, struct interpolator *it,
                             const struct chunk *next, const struct coefficients_window *window);
 
@@ -136,16 +137,17 @@ void feed_override_fault_stop(struct feed_override *f);
 /* --- Tick --- */
 
 /* The next setpoint; *it is an interpolator of the same program that nobody else moves. After the end, or at rest, the
- * same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time, tick context. */
+ * same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time, tick context.
+ * */
 int feed_override_next(struct feed_override *f, struct interpolator *it,
                        struct interpolator_point *out);
 
-/* Part of feed_override_next: a tick in which a stop is under way, or rest. By itself, so that the longest path of a tick
- * in which only the plan goes on can be counted without it. */
+/* Part of feed_override_next: a tick in which a stop is under way, or rest. By itself, so that the longest path of a
+ * tick in which only the plan goes on can be counted without it. */
 int feed_override_stop_tick(struct feed_override *f, struct interpolator *it);
 
-/* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the override
- * adds to the acceleration. Returns 1, or 0 where the feed is beyond all brakes. */
+/* Part of a tick of a stop: how the plan passes the place of its last setpoint; in *turned_q56 what the change of the
+ * override adds to the acceleration. Returns 1, or 0 where the feed is beyond all brakes. */
 int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56);
 
@@ -160,8 +162,8 @@ int feed_override_late(const struct feed_override *f);
  * until the place of rest is found. */
 uint64_t feed_override_time_q42(const struct feed_override *f);
 
-/* The longest time, in us, of a stop that is requested now: what the stop table says. Where less than twice that is left to
- * the end of the program, it is the time to that end, since a brake may not fit before it. */
+/* The longest time, in us, of a stop that is requested now: what the stop table says. Where less than twice that is
+ * left to the end of the program, it is the time to that end, since a brake may not fit before it. */
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind);
 
 /* Feed along the path, 2^-32 mm/s. */

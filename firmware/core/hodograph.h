@@ -48,10 +48,10 @@
  * ## Errors
  *
  * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and
- * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in: COEFFICIENTS_ERR_SIZE.
- * interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed program_check a tick
- * never fails. Only program_check validates: what a header demands of the caller is not checked again. Questions with
- * two answers return an int, 1 or 0.
+ * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in:
+ * COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed
+ * program_check a tick never fails. Only program_check validates: what a header demands of the caller is not checked
+ * again. Questions with two answers return an int, 1 or 0.
  *
  * ## Numbers
  *

@@ -23,8 +23,8 @@ enum interpolator_result {
     INTERPOLATOR_END = 1, /* time is at or beyond the end: the point is the exact end point */
     INTERPOLATOR_ERR_COEFFICIENTS = -1, /* the program has no coefficient records */
     INTERPOLATOR_ERR_PROGRAM = -2,      /* no program */
-    INTERPOLATOR_ERR_JUMP =
-        -3, /* time is before the cursor, or more than two ends ahead: seek first; or a record is not there */
+    /* time is before the cursor, or more than two ends ahead: seek first; or a record is not there */
+    INTERPOLATOR_ERR_JUMP = -3,
 };
 
 /* Segment ends that a tick may cross by arc length. */
@@ -88,14 +88,14 @@ void interpolator_use(struct interpolator *it, const struct coefficients_window 
 void interpolator_ends(const struct program *p, const struct kernel *kernel,
                        struct interpolator_point *first, struct interpolator_point *last);
 
-/* The record of the segment with this arc length, at most INTERPOLATOR_MOST_SEGMENTS from that of this number (0 for one below 0);
- * NULL: the window does not have both, and those between. Main loop; bounded time. */
+/* The record of the segment with this arc length, at most INTERPOLATOR_MOST_SEGMENTS from that of this number (0 for
+ * one below 0); NULL: the window does not have both, and those between. Main loop; bounded time. */
 const struct coefficients_segment *interpolator_segment_in(const struct coefficients_window *window,
                                                            int64_t number,
                                                            int64_t arc_length_q40_mm);
 
-/* Goes on in another program for the same kernel and axes, which has these records and this exact end point, in this segment
- * of it. Main loop; constant time. */
+/* Goes on in another program for the same kernel and axes, which has these records and this exact end point, in this
+ * segment of it. Main loop; constant time. */
 void interpolator_carry(struct interpolator *it, const struct program *p,
                         const struct coefficients_window *window,
                         const struct coefficients_segment *segment,
@@ -143,8 +143,8 @@ struct interpolator_search {
 void interpolator_search_begin(struct interpolator_search *search, uint32_t index,
                                int64_t arc_length_q40_mm);
 
-/* One step: goes on by a piece of the image, or halves the time. 1 when it is found, else 0. Some 60 steps and one for each
- * piece on the way; it waits where the record of the piece is not there. Tick context; bounded time. */
+/* One step: goes on by a piece of the image, or halves the time. 1 when it is found, else 0. Some 60 steps and one for
+ * each piece on the way; it waits where the record of the piece is not there. Tick context; bounded time. */
 int interpolator_search_step(const struct interpolator *it, struct interpolator_search *search);
 
 /* The same at a time in 2^-32 s, for tools. A tick uses the finer one: at 100 mm/s, 2^-33 s of

@@ -75,8 +75,8 @@ static struct real five_per_speed(const struct program_segment *g, int coefficie
                     real_add(real_make(sigma.high, 50 - 88), real_make(sigma.low, -88)));
 }
 
-/* The slopes of the extra axes by arc length go on: within 2^-20 of one and the slope itself, and what four units of the
- * coefficients make of it. */
+/* The slopes of the extra axes by arc length go on: within 2^-20 of one and the slope itself, and what four units of
+ * the coefficients make of it. */
 static int same_slopes(const struct program_segment *a, const struct program_segment *b)
 {
     const struct real per_end = five_per_speed(a, 2);

@@ -47,7 +47,8 @@ static void set_inverses(struct kernel_float_arc *k)
     }
 }
 
-/* By how much polynomials in q48 are shifted down: what the sums of all powers but the linear one need beyond 31 bits. */
+/* By how much polynomials in q48 are shifted down: what the sums of all powers but the linear one need beyond 31 bits.
+ * */
 static int shift_of(const struct ph_segment *ph)
 {
     int64_t most = (int64_t)1 << 31; /* the linear one leaves less than that */

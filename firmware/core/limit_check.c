@@ -24,10 +24,10 @@ static const struct real zero = {0, 0};
 struct cell {
     const struct feed_polynomial *poly;
     const struct path *path;
-    struct real
-        c[FEED_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
-    struct real per_s;      /* d x / d t */
-    struct real offset_mm;  /* start of the piece from the start of the segment */
+    /* F from the piece's start in powers of x = (u - middle) / half */
+    struct real c[FEED_DEGREE + 1];
+    struct real per_s;     /* d x / d t */
+    struct real offset_mm; /* start of the piece from the start of the segment */
 };
 
 struct check {
@@ -90,8 +90,8 @@ static void in_level(const struct program_override *own, uint32_t level,
 }
 
 /* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
- * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out.
- * docs/theory/numerics.md section 7. */
+ * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes
+ * out. docs/theory/numerics.md section 7. */
 static void at_all_overrides(const struct feed_polynomial *poly,
                              const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
 {
@@ -205,8 +205,8 @@ static void set_cell(struct cell *cell, const struct feed_polynomial *poly, cons
     cell->offset_mm = real_make(poly->start_q40_mm - path->start_q40_mm, -40);
 }
 
-/* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of step / period, and
- * so on. */
+/* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of
+ * step / period, and so on. */
 static int check_step(const struct check *check, const struct motion *now)
 {
     const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));

@@ -188,7 +188,8 @@ static void give_up(struct override_plan *plan)
     }
 }
 
-/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is it. */
+/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is it.
+ * */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
@@ -253,8 +254,8 @@ static void find_stage(struct override_plan *plan)
     }
 }
 
-/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above guaranteed_q57 the ramp
- * back. */
+/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above guaranteed_q57 the
+ * ramp back. */
 static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
 {
     const int64_t back_q57 = plan->high_q57 - plan->guaranteed_q57 + OVERRIDE_SPARE;
@@ -291,8 +292,8 @@ static int fits(struct override_plan *plan, const struct program_clock *clock)
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
-/* Until when an override above guaranteed_q57 may last: the ramp back, at most at this override, ends inside the window.
- * 0: not at all. */
+/* Until when an override above guaranteed_q57 may last: the ramp back, at most at this override, ends inside the
+ * window. 0: not at all. */
 static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t span = margin_q32(plan, clock) +
@@ -301,8 +302,8 @@ static uint64_t return_by(const struct override_plan *plan, const struct program
     return plan->ticks.half < MOST_TICKS && span < end_q32_s ? end_q32_s - span : 0;
 }
 
-/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the ramp
- * back too. */
+/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the
+ * ramp back too. */
 static void fit_above(struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t by_q32_s = return_by(plan, clock);
@@ -423,8 +424,8 @@ static int comes_steady(struct override_plan *plan)
 
 /* --- On a ramp --- */
 
-/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above guaranteed_q57 on the
- * way down, where nothing says how to return. */
+/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above guaranteed_q57 on
+ * the way down, where nothing says how to return. */
 static void change_target(struct override_plan *plan, int64_t wanted_q57)
 {
     struct override_ramp *ramp = &plan->ramp;

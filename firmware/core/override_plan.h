@@ -80,15 +80,15 @@ struct override_plan {
 /* For a program at rest, commanded 100 %. Reads all pieces: main loop. */
 void override_plan_begin(struct override_plan *plan, const struct program *p);
 
-/* The same for the next program of a job, which begins at rest, with its least override bounds: what is commanded stays.
- * Constant time. */
+/* The same for the next program of a job, which begins at rest, with its least override bounds: what is commanded
+ * stays. Constant time. */
 void override_plan_begin_next(struct override_plan *plan, const struct program_override *least);
 
 /* The most that counts of the commanded override. Not lowered while the override is above. */
 void override_plan_limit(struct override_plan *plan, int64_t most_q57);
 
-/* 1 when nothing on its way reaches pieces that begin at this program time or later: the override is steady, or on a ramp
- * that ends before, and no search is under way. */
+/* 1 when nothing on its way reaches pieces that begin at this program time or later: the override is steady, or on a
+ * ramp that ends before, and no search is under way. */
 int override_plan_ends_by(const struct override_plan *plan, uint64_t time_q32_s);
 
 /* The program of the next chunk takes over: it has these least bounds, and its program time is less by `shift`. Only at

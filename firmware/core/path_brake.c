@@ -279,8 +279,8 @@ static void fall_tick(struct path_brake *brake)
     brake->phase = READY;
 }
 
-/* The way to rest: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration are reduced
- * by what rounding takes (docs/theory/numerics.md section 12). */
+/* The way to rest: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration are
+ * reduced by what rounding takes (docs/theory/numerics.md section 12). */
 static void settle(struct path_brake *brake)
 {
     const uint64_t speed = (uint64_t)brake->at.speed_q56;

@@ -61,9 +61,9 @@ int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_s
 int path_brake_begin(struct path_brake *brake, const struct path_state *from,
                      const struct path_brake_numbers *numbers);
 
-/* Whether a brake that begins here, its first tick in place of a step or not, comes to rest within a distance. It compares
- * an upper bound of the stopping distance, one tick of the speed above it on the mean, so the result may be 0 although the
- * brake would just fit. */
+/* Whether a brake that begins here, its first tick in place of a step or not, comes to rest within a distance. It
+ * compares an upper bound of the stopping distance, one tick of the speed above it on the mean, so the result may be 0
+ * although the brake would just fit. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t distance_q40_mm);
 

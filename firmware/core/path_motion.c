@@ -139,7 +139,8 @@ static void read_space(struct path *path, const struct program_segment *segment)
     }
 }
 
-/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at least. */
+/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at
+ * least. */
 static void read_speed(struct path *path, const struct program_segment *segment)
 {
     int64_t e_q50[5][PH_AXES];
@@ -265,7 +266,8 @@ static void taylor(const struct real c[PATH_DEGREE + 1], struct real x, struct r
     out[2] = real_times(half_second, 2);
 }
 
-/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its motion. */
+/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its
+ * motion. */
 static void motion_in_space(const struct path *path, struct real xi,
                             const struct real f[QUANTITIES], struct motion *out)
 {
@@ -301,8 +303,8 @@ void path_motion_at(const struct path *path, struct real s_mm, const struct real
 
 /* --- Majorants: coefficients that bound those of the Taylor series at every instant of a cell --- */
 
-/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the distance from the
- * instant. */
+/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the
+ * distance from the instant. */
 static void majorant(struct real *out, const struct real *c, int degree, struct real middle,
                      struct real half)
 {

@@ -35,19 +35,19 @@ struct path_outputs {
 /* All outputs off, and no events. */
 void path_outputs_clear(struct path_outputs *outputs);
 
-/* From all outputs off: what all events at or before an arc length make of them; a negative one: of a program whose first
- * setpoint is to come. Main loop; linear in the number of events. */
+/* From all outputs off: what all events at or before an arc length make of them; a negative one: of a program whose
+ * first setpoint is to come. Main loop; linear in the number of events. */
 void path_outputs_begin(struct path_outputs *outputs, const struct program *program,
                         int64_t arc_length_q40_mm);
 
-/* Takeover of the next chunk in motion: the outputs stay, and the next event stays the same one. `program` begins at arc
- * length arc_shift_q40_mm of `before` and has the events of `before` from there on (core/chunk.h). Some 32 steps at
+/* Takeover of the next chunk in motion: the outputs stay, and the next event stays the same one. `program` begins at
+ * arc length arc_shift_q40_mm of `before` and has the events of `before` from there on (core/chunk.h). Some 32 steps at
  * most. */
 void path_outputs_carry(struct path_outputs *outputs, const struct program *before,
                         const struct program *program, int64_t arc_shift_q40_mm);
 
-/* Takeover at rest, of a program whose first setpoint is still to come: the outputs stay, and all its events are to come.
- * Constant time. */
+/* Takeover at rest, of a program whose first setpoint is still to come: the outputs stay, and all its events are to
+ * come. Constant time. */
 void path_outputs_begin_next(struct path_outputs *outputs, const struct program *program);
 
 /* The outputs at a setpoint, at this arc length and with this feed along the path. Tick context; at most

@@ -30,8 +30,8 @@ static inline int ph_last_axis(uint32_t axis_count)
  * within 2^-34 mm. */
 #define PH_LEAST_EXPONENT (-34)
 
-/* By how much, relative, 2^exponent is above sigma: |A| in 2^(exponent/2) stays below 1 - 2^-25, so that it is below 1 in
- * the kernels' words after any rounding. */
+/* By how much, relative, 2^exponent is above sigma: |A| in 2^(exponent/2) stays below 1 - 2^-25, so that it is below 1
+ * in the kernels' words after any rounding. */
 #define PH_MARGIN_BITS 24
 
 /* An extra axis in powers of z, exact; the first coefficient contains its start. */

@@ -155,8 +155,8 @@ struct program_event {
     uint8_t kind;    /* enum program_event_kind, of an image that passed program_check */
     uint8_t channel; /* of an analogue output; 0 for digital ones */
     uint16_t mask;   /* digital: the outputs that change; else 0 */
-    int32_t
-        value; /* digital: their levels; analogue: the value; proportional: q16, for each mm/s */
+    /* digital: their levels; analogue: the value; proportional: q16, for each mm/s */
+    int32_t value;
 };
 
 struct program {
@@ -199,8 +199,8 @@ int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
-/* Whether segment or piece i of one program has the numbers of number k of the other, but for the arc length of its start.
- * Of programs with the same number of path axes; one may be compact and the other not. */
+/* Whether segment or piece i of one program has the numbers of number k of the other, but for the arc length of its
+ * start. Of programs with the same number of path axes; one may be compact and the other not. */
 int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 

@@ -39,11 +39,11 @@ struct program_clock {
     uint32_t period_log2;  /* of the period in ms */
     uint32_t period_q32_s; /* rounded up, for look-ahead */
     uint64_t sixth_q70_s;  /* a sixth of the period */
-    uint64_t
-        even_q62_s; /* program time of a tick whose override does not change; 0: not known yet */
+    /* program time of a tick whose override does not change; 0: not known yet */
+    uint64_t even_q62_s;
     uint32_t piece; /* of the last tick, */
-    const struct coefficients_piece
-        *record; /* and its coefficient record; not in use while the program does not go on */
+    /* and its coefficient record; not in use while the program does not go on */
+    const struct coefficients_piece *record;
 };
 
 /* Sets the clock to a program time of a checked program with coefficient records; beyond the duration: to the duration.

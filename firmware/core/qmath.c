@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 #include "core/qmath.h"
 
-/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The first
- * estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
+/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The
+ * first estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
 static uint32_t digit(uint32_t *high, uint32_t next, uint32_t b)
 {
     uint32_t upper = b >> 16;

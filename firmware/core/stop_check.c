@@ -152,8 +152,8 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
 
 /* --- The brake --- */
 
-/* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is near the
- * least. */
+/* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is
+ * near the least. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop)
 {
     const struct stop_bound none = {NO_BOUND, NO_BOUND};

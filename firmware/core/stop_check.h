@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it cover the longest
- * stop? The bounds are computed anew from the feed pieces, the override bounds and the stop parameters
+ * Checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it cover the
+ * longest stop? The bounds are computed anew from the feed pieces, the override bounds and the stop parameters
  * (docs/theory/numerics.md section 7, "Stops"). A part of program_check; the host tools compute the table with it.
  *
  * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.
@@ -22,8 +22,8 @@
 /* The stop parameters that apply are those of a piece that begins within this time: three ticks at 200 %, in periods of
  * program time. */
 #define STOP_WINDOW_TICKS 6u
-#define STOP_WINDOW                                                                                \
-    8 /* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
+/* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
+#define STOP_WINDOW 8
 
 /* From the command to standstill; saturates at UINT32_MAX. */
 struct stop_bound {
@@ -46,8 +46,8 @@ struct stop_walk {
 struct stop_extent {
     uint64_t speed_um;  /* greatest, um/s, */
     uint64_t rising_um; /* and acceleration, um/s^2 */
-    uint32_t
-        waits; /* eighths of the piece, one after the other, in which no brake may fit, at most, */
+    /* eighths of the piece, one after the other, in which no brake may fit, at most, */
+    uint32_t waits;
     uint32_t last; /* and so many before its end */
 };
 

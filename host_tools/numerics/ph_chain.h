@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Chains of Pythagorean-hodograph quintic segments: places by arc length, and derivatives by arc length there, as the
- * planner of feeds needs them at very many places. docs/theory/numerics.md 4.3 and 5.6, docs/theory/spatial-splines.md 2.
+ * planner of feeds needs them at very many places. docs/theory/numerics.md 4.3 and 5.6, docs/theory/spatial-splines.md
+ * 2.
  *
  * Double arithmetic without contraction: the same bits on every computer. No heap. Main loop of a host.
  */

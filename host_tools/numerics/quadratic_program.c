@@ -510,7 +510,8 @@ static double link_step(struct solving *s, uint32_t interval, double most)
     return most;
 }
 
-/* Solves for a step. Returns the share of it to take: at most 1, and STEP_SHARE of the distance to the nearest boundary. */
+/* Solves for a step. Returns the share of it to take: at most 1, and STEP_SHARE of the distance to the nearest
+ * boundary. */
 static double direction(struct solving *s)
 {
     double most = 1.0 / STEP_SHARE;
@@ -539,7 +540,8 @@ static void correct(struct solving *s, double target)
     }
 }
 
-/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes START_PRODUCT. */
+/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes START_PRODUCT.
+ * */
 static void hard_start(struct side *one, double left)
 {
     const double least = fmax(LEAST_SLACK, START_SLACK * sqrt(dot(one->a, one->a)));

@@ -141,8 +141,8 @@ static bool is_hex(const char *digits)
     return digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X');
 }
 
-/* Decimal, or hexadecimal after 0x; a leading zero means nothing; fractions in FIELD_NUMBER only. False: no such number.
- * Whole numbers up to 2^53 are exact. */
+/* Decimal, or hexadecimal after 0x; a leading zero means nothing; fractions in FIELD_NUMBER only. False: no such
+ * number. Whole numbers up to 2^53 are exact. */
 static bool read_value(const char *text, enum field_type type, double *out)
 {
     char *end = NULL;

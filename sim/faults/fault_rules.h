@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and their
- * parser. Pure, but for fault_rules_read and the text of an error.
+/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and
+ * their parser. Pure, but for fault_rules_read and the text of an error.
  */
 #ifndef FAULTS_FAULT_RULES_H
 #define FAULTS_FAULT_RULES_H

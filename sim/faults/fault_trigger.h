@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_trigger: when a fault rule acts: by ticks, wall time, number of frames and probability; and which tick it is, from
- * the traffic (docs/reference/protocol.md section 4).
+/* fault_trigger: when a fault rule acts: by ticks, wall time, number of frames and probability; and which tick it is,
+ * from the traffic (docs/reference/protocol.md section 4).
  *
  * Tick 0 is the first SYNC after an enabled setpoint (RPDO1 with controlword bits 0 to 3 set) whose
  * target differs from the enabled one before it, of any drive. From then on ticks go by the SYNC

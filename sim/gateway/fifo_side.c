@@ -119,8 +119,9 @@ static int take_frames(void)
     return 0;
 }
 
-/* At lock step the processor belongs to the drives, which are to answer: the socket is not read before they can have done
- * so. Nor is the clock when they have, since that may cost a system call: guard times begin anew with the next request. */
+/* At lock step the processor belongs to the drives, which are to answer: the socket is not read before they can have
+ * done so. Nor is the clock when they have, since that may cost a system call: guard times begin anew with the next
+ * request. */
 static int wait_until_due(uint64_t now_ns)
 {
     bool over = false;

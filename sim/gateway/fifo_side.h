@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by main of the gateway. */
+/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by main of the
+ * gateway. */
 #ifndef GATEWAY_FIFO_SIDE_H
 #define GATEWAY_FIFO_SIDE_H
 

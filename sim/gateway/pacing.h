@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * pacing: decides when the gateway replies to a request of the emulated board, so that the ticks of the board come at the
- * same times as those of the Linux port (port/linux/schedule.h). Used by gateway/fifo_side. Pure arithmetic on monotonic
- * nanoseconds.
+ * pacing: decides when the gateway replies to a request of the emulated board, so that the ticks of the board come at
+ * the same times as those of the Linux port (port/linux/schedule.h). Used by gateway/fifo_side. Pure arithmetic on
+ * monotonic nanoseconds.
  *
  * The clock of the board stands while it waits for the reply to the request of a tick. So the next tick is due with the
  * reply.

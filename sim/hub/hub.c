@@ -59,8 +59,8 @@ static bool is_left_over(const char *path, const struct stat *found)
     return refused;
 }
 
-/* Hubs that start in one folder take turns, so that no two serve one path. Gives what to close when the turn is over, or a
- * negative errno. The turn of a killed process is over, too. */
+/* Hubs that start in one folder take turns, so that no two serve one path. Gives what to close when the turn is over,
+ * or a negative errno. The turn of a killed process is over, too. */
 static int take_turn(const char *path)
 {
     char folder[sizeof((struct sockaddr_un *)NULL)->sun_path];
@@ -180,8 +180,8 @@ static void take_connection(struct hub *hub, unsigned bus)
     hub->used = at < hub->used ? hub->used : at + 1u;
 }
 
-/* Whether the packet has left: a connection that has ended is dropped later. In virtual time nothing is lost, so a process that
- * does not take its frames is waited for. */
+/* Whether the packet has left: a connection that has ended is dropped later. In virtual time nothing is lost, so a
+ * process that does not take its frames is waited for. */
 static bool send_packet(const struct hub *hub, int fd, const void *packet, size_t size)
 {
     struct pollfd writable = {.fd = fd, .events = POLLOUT};
@@ -273,8 +273,8 @@ static bool matches(const struct can_filter *filters, size_t count, const struct
     return false;
 }
 
-/* The first frames that are held for a member as one packet. False: it has no room now. One without a participant is waited for.
- * What a connection that has ended does not take is gone. */
+/* The first frames that are held for a member as one packet. False: it has no room now. One without a participant is
+ * waited for. What a connection that has ended does not take is gone. */
 static bool send_held(struct hub *hub, struct hub_connection *to)
 {
     struct hub_held *held = &to->held;
@@ -410,7 +410,8 @@ static void take_frame(struct hub *hub, struct hub_connection *from, const struc
     }
 }
 
-/* What goes first on a bus that is free: the lowest identifier among the members' first frames. HUB_CONNECTIONS: nothing waits. */
+/* What goes first on a bus that is free: the lowest identifier among the members' first frames. HUB_CONNECTIONS:
+ * nothing waits. */
 static size_t arbitrate(const struct hub *hub, unsigned bus)
 {
     size_t best = HUB_CONNECTIONS;
@@ -484,8 +485,9 @@ static double ahead_ns(const struct hub *hub, uint64_t next_ns, uint64_t real_ns
     return virtual_ns / hub->options.speed - (double)(real_ns - hub->pace_real_ns);
 }
 
-/* Milliseconds of real time until this instant may come; 0: it may come now. Time goes on in steps of PACE_AHEAD_NS, since events are
- * closer together than a process can sleep. A simulation that is later than PACE_LATE_NS does not catch up. */
+/* Milliseconds of real time until this instant may come; 0: it may come now. Time goes on in steps of PACE_AHEAD_NS,
+ * since events are closer together than a process can sleep. A simulation that is later than PACE_LATE_NS does not
+ * catch up. */
 static int pace_ms(struct hub *hub, uint64_t next_ns)
 {
     if (hub->options.speed <= 0.0) {
@@ -525,7 +527,8 @@ static void grant(struct hub *hub, struct participant *next)
     (void)send_packet(hub, to->fd, &granted, sizeof granted);
 }
 
-/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a limit. */
+/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a limit.
+ * */
 static int go_on(struct hub *hub)
 {
     while (!virtual_time_is_held(&hub->time)) {
@@ -694,8 +697,8 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     return count;
 }
 
-/* The next message of the participant that alone computes, without polling the others: nothing that they do changes what
- * happens until it waits. False: it takes long, or it is time to poll all. */
+/* The next message of the participant that alone computes, without polling the others: nothing that they do changes
+ * what happens until it waits. False: it takes long, or it is time to poll all. */
 static bool take_granted(struct hub *hub)
 {
     union packet packet;

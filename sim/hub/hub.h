@@ -2,21 +2,22 @@
 /*
  * hub: CAN buses for the processes of one machine, whose kernel need not have CAN, in real or in virtual time.
  *
- * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all other
- * members of its bus, in one order.
+ * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all
+ * other members of its bus, in one order.
  *
- * In real time it goes at once. A member that does not take its frames loses those for which its buffer of some megabytes
- * has no room; the others do not wait for it.
+ * In real time it goes at once. A member that does not take its frames loses those for which its buffer of some
+ * megabytes has no room; the others do not wait for it.
  *
- * In virtual time a frame takes its bits (frame_bits.h) on a bus that carries one at a time. Of the frames that wait, the lowest identifier
- * goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN controller; equal identifiers keep their
- * order. What is sent when a frame has ended comes after what has waited for that. Nothing is lost but what a member sends beyond
- * HUB_QUEUE frames ahead of the bus. Time goes on when every participant waits (virtual_time.h).
+ * In virtual time a frame takes its bits (frame_bits.h) on a bus that carries one at a time. Of the frames that wait,
+ * the lowest identifier goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN
+ * controller; equal identifiers keep their order. What is sent when a frame has ended comes after what has waited for
+ * that. Nothing is lost but what a member sends beyond HUB_QUEUE frames ahead of the bus. Time goes on when every
+ * participant waits (virtual_time.h).
  *
- * A process that waits takes nothing. So the hub holds the frames for its members until its grant, and wakes it when they fill half of
- * HUB_HELD. It never waits for room in the socket of a member that has a participant: what has no room is held until the next grant.
- * A suspended process loses what comes when HUB_HELD is full. A member without a participant, as a recorder, reads at any time: the
- * hub waits for it.
+ * A process that waits takes nothing. So the hub holds the frames for its members until its grant, and wakes it when
+ * they fill half of HUB_HELD. It never waits for room in the socket of a member that has a participant: what has no
+ * room is held until the next grant. A suspended process loses what comes when HUB_HELD is full. A member without a
+ * participant, as a recorder, reads at any time: the hub waits for it.
  */
 #ifndef HUB_HUB_H
 #define HUB_HUB_H
@@ -95,9 +96,9 @@ struct hub {
     uint64_t lost;                  /* frames that found no room */
 };
 
-/* Serves a bus at each of these paths, which it makes. A socket that nobody serves, left by a hub that was killed, is replaced. 0,
- * or a negative errno with the index of the path that failed in `*failed`: -EADDRINUSE where a hub serves the path, or where
- * it is something else than a socket. */
+/* Serves a bus at each of these paths, which it makes. A socket that nobody serves, left by a hub that was killed, is
+ * replaced. 0, or a negative errno with the index of the path that failed in `*failed`: -EADDRINUSE where a hub serves
+ * the path, or where it is something else than a socket. */
 int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,
              size_t *failed);
 

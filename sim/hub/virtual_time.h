@@ -2,9 +2,9 @@
 /*
  * virtual_time: the participants of virtual time, and which of them computes next: conservative co-simulation. No I/O.
  *
- * A participant is active from its grant to its next wait, and time stands still meanwhile. When none is active, the next grant
- * goes to one that is due or was woken: of several, in the order of their names, and among equal names of their coming. When none is, time goes on to the
- * next instant at which one is due, or something else happens.
+ * A participant is active from its grant to its next wait, and time stands still meanwhile. When none is active, the
+ * next grant goes to one that is due or was woken: of several, in the order of their names, and among equal names of
+ * their coming. When none is, time goes on to the next instant at which one is due, or something else happens.
  */
 #ifndef HUB_VIRTUAL_TIME_H
 #define HUB_VIRTUAL_TIME_H
@@ -51,8 +51,8 @@ void virtual_time_leave(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_find(struct virtual_time *time, uint32_t number);
 struct participant *virtual_time_named(struct virtual_time *time, const char *name);
 
-/* The participant waits; `all`: frames that it defers wake it, too. A wait with the number of an older grant is out of date, and changes nothing. A second one
- * for the same grant ends the wait before its time: true. */
+/* The participant waits; `all`: frames that it defers wake it, too. A wait with the number of an older grant is out of
+ * date, and changes nothing. A second one for the same grant ends the wait before its time: true. */
 bool virtual_time_wait(struct virtual_time *time, uint32_t number, uint32_t grant,
                        uint64_t until_ns, bool all);
 

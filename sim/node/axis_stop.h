@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* axis_stop: how a simulated drive brings its axis to rest: by a ramp (0x6084, 0x6085), or at the motor's limits, as the
- * option codes 0x605A and 0x605E request. One call a period; all in one context.
+/* axis_stop: how a simulated drive brings its axis to rest: by a ramp (0x6084, 0x6085), or at the motor's limits, as
+ * the option codes 0x605A and 0x605E request. One call a period; all in one context.
  */
 #ifndef NODE_AXIS_STOP_H
 #define NODE_AXIS_STOP_H
@@ -21,9 +21,9 @@ struct axis_stop {
 /* The next period begins a new stop. */
 void axis_stop_reset(struct axis_stop *stop);
 
-/* One period of a stop by a ramp, counts/s^2. The ramp is the setpoint's: the stop has ended (true) when the motor, too,
- * has stood in the position window 0x6067 for its time 0x6068, or after 1 s: a motor that a load or a lost encoder keeps
- * in motion is left to its brake. */
+/* One period of a stop by a ramp, counts/s^2. The ramp is the setpoint's: the stop has ended (true) when the motor,
+ * too, has stood in the position window 0x6067 for its time 0x6068, or after 1 s: a motor that a load or a lost encoder
+ * keeps in motion is left to its brake. */
 bool axis_stop_ramp(struct axis_stop *stop, struct axis_motion *axis, const struct od_drive *values,
                     uint32_t deceleration_counts_s2);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values act
- * on the servo: a controlword at once or at SYNC, a target from the next period on. All in one context.
+/* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values
+ * act on the servo: a controlword at once or at SYNC, a target from the next period on. All in one context.
  */
 #ifndef NODE_DRIVE_PDOS_H
 #define NODE_DRIVE_PDOS_H

@@ -12,8 +12,8 @@
 
 enum { SEND_TRIES = 200, BATCHES = 4, PILE_BYTES = 256 * 1024 };
 
-/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is off:
- * the frame is lost. */
+/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is
+ * off: the frame is lost. */
 static void drives_send(void *context, const struct can_msg *frame)
 {
     struct drives *drives = context;

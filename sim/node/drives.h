@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program hodograph-drive.
+/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program
+ * hodograph-drive.
  *
  * It reads frames from the socket, gives them to the nodes, and sends what they return. All functions in one thread. An
- * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no space are lost.
+ * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no space are
+ * lost.
  */
 #ifndef NODE_DRIVES_H
 #define NODE_DRIVES_H

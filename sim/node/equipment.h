@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated drive
- * (node/drive_node, node/servo).
+/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated
+ * drive (node/drive_node, node/servo).
  *
  * Switches have places in the coordinates that the axis has at power-on. Homing changes the coordinates, not the
  * switches. Pure functions.

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* io_module: a simulated I/O module (CiA 401) with 16 digital and 3 analogue outputs, for one bus.
  *
- * Synchronous RPDOs act at the next SYNC, others at once. Outputs take their error values (0x6206, 0x6207, 0x6443, 0x6444) when
- * the heartbeat of the master is lost and when the node is STOPPED; at power-on and at a reset they are off. All functions in
- * one context.
+ * Synchronous RPDOs act at the next SYNC, others at once. Outputs take their error values (0x6206, 0x6207, 0x6443,
+ * 0x6444) when the heartbeat of the master is lost and when the node is STOPPED; at power-on and at a reset they are
+ * off. All functions in one context.
  */
 #ifndef NODE_IO_MODULE_H
 #define NODE_IO_MODULE_H
@@ -22,8 +22,8 @@
 
 #define IO_MODULE_RPDOS 4
 
-/* Private, except `values` (the object dictionary: 0x6200 and 0x6411 are the outputs), `id`, and `rpdos` for filters. Has
- * pointers to itself: not to be copied. */
+/* Private, except `values` (the object dictionary: 0x6200 and 0x6411 are the outputs), `id`, and `rpdos` for filters.
+ * Has pointers to itself: not to be copied. */
 struct io_module {
     struct od_module values;
     struct od od;

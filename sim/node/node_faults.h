@@ -36,7 +36,8 @@ void node_faults_receive(struct node_faults *faults, const struct can_msg *in, u
 /* Wall time passes: what lasts for ms ends. */
 void node_faults_process(struct node_faults *faults, uint64_t now_ns);
 
-/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_rules_parse has checked its figures:
+/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_rules_parse has checked its
+ * figures:
  *     stop             on: no power: sends and receives nothing, the axis is on its brake. Off: the drive boots
  *     restart          on: power lost and back at once
  *     heartbeat-stop   sends no heartbeats

@@ -20,7 +20,8 @@
 #include "node/supervision.h"
 #include "od_drive.h"
 
-/* Tests may read all of it; the PDOs set `setpoint_fresh`, injected faults change `axis.influence` and `supervision`. */
+/* Tests may read all of it; the PDOs set `setpoint_fresh`, injected faults change `axis.influence` and `supervision`.
+ * */
 struct servo {
     struct od_drive *values; /* borrowed: the object dictionary */
     struct cia402_device device;
@@ -37,8 +38,8 @@ struct servo {
     bool software_limit;   /* the setpoint is outside 0x607D */
 };
 
-/* All zero before. `values` must stay valid. The axis stands at a position, with the equipment of equipment_init. Returns
- * 0 or an enum drive_error. servo_power_on is next. */
+/* All zero before. `values` must stay valid. The axis stands at a position, with the equipment of equipment_init.
+ * Returns 0 or an enum drive_error. servo_power_on is next. */
 int servo_init(struct servo *servo, const struct drive_config *config, int32_t position_counts,
                struct od_drive *values);
 

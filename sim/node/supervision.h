@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* supervision: what a simulated drive supervises in each period: the following error, and the overload of its motor; and
- * what injected faults have done to switches, encoder and supply. It reports conditions; the servo decides what follows.
- * All in one context.
+/* supervision: what a simulated drive supervises in each period: the following error, and the overload of its motor;
+ * and what injected faults have done to switches, encoder and supply. It reports conditions; the servo decides what
+ * follows. All in one context.
  */
 #ifndef NODE_SUPERVISION_H
 #define NODE_SUPERVISION_H
@@ -19,8 +19,8 @@ struct supervision {
     struct overload overload;
     double load_per_volt;  /* motor load in units of the rated torque */
     uint32_t following_us; /* following error out of its window */
-    uint32_t
-        forced_inputs; /* injected fault: switches that are on wherever the axis is, bits of 0x60FD */
+    /* injected fault: switches that are on wherever the axis is, bits of 0x60FD */
+    uint32_t forced_inputs;
     bool overloaded;
     bool encoder_failed; /* injected fault, as the next one */
     bool supply_failed;

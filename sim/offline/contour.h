@@ -22,13 +22,13 @@
 #include "core/program.h"
 #include "offline/contour_curve.h"
 
-/* Distance in mm of a point (x, y, z in mm, machine coordinates; in the plane z counts for nothing) from the curve near the commanded arc
- * length, which is clamped to the program's. */
+/* Distance in mm of a point (x, y, z in mm, machine coordinates; in the plane z counts for nothing) from the curve near
+ * the commanded arc length, which is clamped to the program's. */
 double contour_distance_mm(struct contour *contour, double arc_length_mm, const double point_mm[3]);
 
 /* n points in bus counts at once: errors in um. arc_length_q40_mm as the interpolator gives it; act_counts
- * holds `stride` numbers for each point, one for each path axis of the program, of which those after z count for nothing: the
- * contour is that of the curve. counts_per_unit: of a mm, or of a degree, by axis. */
+ * holds `stride` numbers for each point, one for each path axis of the program, of which those after z count for
+ * nothing: the contour is that of the curve. counts_per_unit: of a mm, or of a degree, by axis. */
 void contour_errors_um(struct contour *contour, uint32_t n, const int64_t *arc_length_q40_mm,
                        const int32_t *act_counts, uint32_t stride, const uint32_t *counts_per_unit,
                        double *errors_um);

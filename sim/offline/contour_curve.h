@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The exact curve of a program for offline/contour.h: expands it once, and finds places on it near a point. All functions
- * but contour_begin are pure. */
+/* The exact curve of a program for offline/contour.h: expands it once, and finds places on it near a point. All
+ * functions but contour_begin are pure. */
 #ifndef HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 #define HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 

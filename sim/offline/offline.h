@@ -120,7 +120,8 @@ void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double
  * Returns 0 or OFFLINE_ERR_FAULT. */
 int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count);
 
-/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the simulation. Returns 0 or OFFLINE_ERR_FAULT. */
+/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the simulation. Returns 0 or
+ * OFFLINE_ERR_FAULT. */
 int offline_orders(struct offline *sim, const struct offline_order *orders, uint32_t count);
 
 /* What became of the last order to stop. */
@@ -130,7 +131,8 @@ void offline_stop_get(const struct offline *sim, struct offline_stop *stop);
 int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n);
 
 /* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
- * counts: those of all axes of a point, one point after the other, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
+ * counts: those of all axes of a point, one point after the other, or NULL. The interpolator has to have begun. Returns
+ * 0 or OFFLINE_ERR_INTERP. */
 int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
                    uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 

@@ -6,12 +6,12 @@
 #define GREATEST_CODE 255
 #define LEAST_MM_S    1e-4 /* slower is rest */
 #define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
-#define SURE_EACH                                                                                  \
-    12 /* ticks of a brake between two looks whether the rest of it, or so many ticks, surely keep the limits */
+/* ticks of a brake between two looks whether the rest of it, or so many ticks, surely keep the limits */
+#define SURE_EACH   12
 #define SPARE_TIME  1.25 /* of stop_brake_time, */
 #define SPARE_TICKS 10.0 /* and ticks more */
-#define FASTER                                                                                     \
-    0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+/* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+#define FASTER 0.03
 
 double stop_number_of(int k, int code)
 {
@@ -127,8 +127,8 @@ double stop_brake_extent(const struct stop_setting *setting,
     return most->s + extent->speed * most_s;
 }
 
-/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
- * limits, and to follow each of them would take nearly all of the time of a search. */
+/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are
+ * far from the limits, and to follow each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
 {

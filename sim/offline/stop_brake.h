@@ -2,9 +2,9 @@
 /*
  * A brake as the controller makes it (core/path_brake.h), followed along the path of a program beside its limits.
  *
- * A brake has three numbers: jerk of onset, deceleration, jerk of release, as codes of docs/reference/protocol.md 1.4. It is
- * followed tick by tick, but as soon as bounds of the rest of it, or of some ticks, show that the limits are kept, its
- * ticks are not looked at. mm, s. Main loop of a host.
+ * A brake has three numbers: jerk of onset, deceleration, jerk of release, as codes of docs/reference/protocol.md 1.4.
+ * It is followed tick by tick, but as soon as bounds of the rest of it, or of some ticks, show that the limits are
+ * kept, its ticks are not looked at. mm, s. Main loop of a host.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_BRAKE_H
 #define HODOGRAPH_OFFLINE_STOP_BRAKE_H
@@ -56,13 +56,14 @@ int stop_has_room(const struct stop_setting *setting, const struct stop_state *a
 int stop_may_wait(const struct stop_setting *setting, const struct stop_state *at,
                   const struct path_brake_numbers *numbers);
 
-/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`: all of `extent` but
- * its path. Returns the arc length that they do not pass. */
+/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`: all of
+ * `extent` but its path. Returns the arc length that they do not pass. */
 double stop_brake_extent(const struct stop_setting *setting,
                          const struct path_brake_numbers *numbers, const struct stop_state *most,
                          double fall, struct stop_extent *extent);
 
-/* 1 while a brake that has begun at arc length from_mm, behind `row`, keeps the limits all the way; looked at each step_s. */
+/* 1 while a brake that has begun at arc length from_mm, behind `row`, keeps the limits all the way; looked at each
+ * step_s. */
 int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                      const struct path_brake *brake, double from_mm, uint32_t row, double step_s);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The limits that a brake along a path keeps: those of the path file and the machine for a feed hold, those of the machine
- * for a fault stop. Data only; offline/stop_path.h and offline/stop_strain.h use them.
+ * The limits that a brake along a path keeps: those of the path file and the machine for a feed hold, those of the
+ * machine for a fault stop. Data only; offline/stop_path.h and offline/stop_strain.h use them.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_LIMITS_H
 #define HODOGRAPH_OFFLINE_STOP_LIMITS_H
@@ -10,8 +10,8 @@
 
 #include "core/program.h"
 
-#define STOP_MARGIN                                                                                \
-    0.003 /* share of each limit that is left for what lies between the instants that are looked at */
+/* share of each limit that is left for what lies between the instants that are looked at */
+#define STOP_MARGIN 0.003
 
 /* A greatest feed on a stretch of the path. */
 struct stop_cap {
@@ -34,10 +34,10 @@ struct stop_limits {
     double time_constant[PROGRAM_AXES]; /* s */
     const struct stop_cap *caps;
     uint32_t cap_count;
-    uint32_t
-        reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
-    uint32_t
-        rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+    /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
+    uint32_t reach_at_pace;
+    /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
+    uint32_t rise_is_cut;
     uint32_t quick; /* 1: few codes are tried, about 0.1 ms a piece, for long programs */
 };
 

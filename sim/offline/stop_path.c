@@ -98,7 +98,8 @@ static void by_arc_length(const double d[3], const double sigma[3], uint32_t axi
     bend->by_mm[2][axis] = rest / (sigma[0] * sigma[0] * sigma[0]);
 }
 
-/* The third derivative of the path across its tangent: along it, it is the square of the curvature with a minus sign. */
+/* The third derivative of the path across its tangent: along it, it is the square of the curvature with a minus sign.
+ * */
 static double across(const struct stop_bend *bend, double curvature)
 {
     double square = 0.0;

@@ -2,9 +2,9 @@
 /*
  * The path of a program as rows of its curve at places close to each other, for those who follow many brakes along it.
  *
- * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first three
- * derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ... rows have the
- * greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
+ * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first
+ * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ...
+ * rows have the greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
  *
  * stop_rows() fills the path once; stop_road_open() makes what the look-ups take. mm, s. No heap: the caller lends all
  * arrays. Main loop of a host.
@@ -47,8 +47,8 @@ struct stop_stretch {
 struct stop_path {
     struct stop_row *rows;
     struct stop_bend *bends; /* of a spatial program; not looked at of a planar one */
-    struct stop_stretch
-        *groups; /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    struct stop_stretch *groups;
 };
 
 /* The same with what look-ups need; borrows the path. */

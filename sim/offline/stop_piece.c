@@ -6,8 +6,8 @@
 #define EVEN_INSTANTS 129  /* of a piece, one as long after the other */
 #define ROWS_EACH     4    /* of the path, for an instant between them */
 #define LEAST_MM_S    1e-4 /* slower is rest */
-#define LEAST_TICKS                                                                                \
-    6.0 /* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+/* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+#define LEAST_TICKS 6.0
 
 /* Feed overrides at which brakes are followed, and the same shares of the piece's greatest. */
 static const double SHARES[STOP_SHARES] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
@@ -101,8 +101,8 @@ static int add_instants(const struct stop_setting *setting, const double c[8], u
     return fits;
 }
 
-/* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by the
- * reciprocals of their limits. They may turn by many degrees within a millimetre. */
+/* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by
+ * the reciprocals of their limits. They may turn by many degrees within a millimetre. */
 static double extra_axes_most(const struct stop_setting *setting, const struct stop_piece *piece,
                               const double inverse[PROGRAM_AXES])
 {
@@ -127,8 +127,8 @@ static double followed_most(const struct stop_setting *setting, const struct sto
                : most;
 }
 
-/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or over the path that is left
- * after it where that needs more; but no more than the extra axes can follow. */
+/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or over the path that is
+ * left after it where that needs more; but no more than the extra axes can follow. */
 static void piece_most(const struct stop_setting *setting, struct stop_piece *piece)
 {
     const double span_s = LEAST_TICKS * setting->period_s;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A feed piece as the instants at which a stop may begin, and the states in which the motion may be there: at the rate 1, and
- * at other feed overrides, constant or changing as fast as the piece allows. mm, s. Main loop of a host.
+ * A feed piece as the instants at which a stop may begin, and the states in which the motion may be there: at the rate
+ * 1, and at other feed overrides, constant or changing as fast as the piece allows. mm, s. Main loop of a host.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_PIECE_H
 #define HODOGRAPH_OFFLINE_STOP_PIECE_H
@@ -17,7 +17,8 @@
 #define STOP_BESIDE        1e-6   /* share of a piece: jerks jump at its ends */
 #define STOP_SHARES        11u    /* feed overrides, and as many shares of the piece's greatest */
 
-/* An instant of a piece at a feed override: `rate` is a number of stop_override_at(), `slope` the sign of the override's change. */
+/* An instant of a piece at a feed override: `rate` is a number of stop_override_at(), `slope` the sign of the
+ * override's change. */
 struct stop_overridden {
     uint32_t instant;
     uint32_t rate;
@@ -61,8 +62,8 @@ double stop_weight_s(const struct stop_piece *piece, uint32_t i);
 /* Greatest slope of the rate of program time. */
 double stop_greatest_slope(const struct stop_piece *piece);
 
-/* The state at an instant and override; a rise of the override adds `little` to the acceleration at most. Returns 0 for a state
- * that there is not. */
+/* The state at an instant and override; a rise of the override adds `little` to the acceleration at most. Returns 0 for
+ * a state that there is not. */
 int stop_overridden_state(const struct stop_piece *piece, const struct stop_overridden *which,
                           double little, struct stop_state *from);
 

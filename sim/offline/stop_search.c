@@ -151,7 +151,8 @@ static void search_piece(const struct stop_setting *setting, struct stop_piece *
     }
 }
 
-/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do not. */
+/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do
+ * not. */
 static int lower_by(const struct stop_setting *setting, struct stop_piece *piece, const int from[3],
                     const int quarters[3], double after_s, struct choice *best)
 {
@@ -162,8 +163,8 @@ static int lower_by(const struct stop_setting *setting, struct stop_piece *piece
     return better(setting, piece, codes, after_s, 1, best);
 }
 
-/* A search of few trials: the codes of the next piece, else lower ones of all, or of the onset first, down to the lowest; then
- * raised together as far as that goes. */
+/* A search of few trials: the codes of the next piece, else lower ones of all, or of the onset first, down to the
+ * lowest; then raised together as far as that goes. */
 static void search_quickly(const struct stop_setting *setting, struct stop_piece *piece,
                            const int warm[3], double after_s, struct choice *best)
 {
@@ -260,8 +261,8 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the same
- * override. They are looked at first; what is found does not depend on that. */
+/* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the
+ * same override. They are looked at first; what is found does not depend on that. */
 static void suspect_as_behind(struct stop_piece *piece, const struct stop_overridden behind[2])
 {
     piece->suspect = piece->count - 1u;

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The numbers of a stop: for each feed piece of a program the jerk, deceleration and jerk (codes of docs/reference/protocol.md
- * 1.4) with which a brake along the path may begin anywhere in the piece and keeps given limits all the way to rest.
+ * The numbers of a stop: for each feed piece of a program the jerk, deceleration and jerk (codes of
+ * docs/reference/protocol.md 1.4) with which a brake along the path may begin anywhere in the piece and keeps given
+ * limits all the way to rest.
  *
  * Each brake is followed in double arithmetic from a grid of instants of the piece; limits are kept less STOP_MARGIN,
- * for what lies between the instants. Derivation: docs/theory/numerics.md section 7. No heap: the caller lends all arrays.
- * Main loop of a host.
+ * for what lies between the instants. Derivation: docs/theory/numerics.md section 7. No heap: the caller lends all
+ * arrays. Main loop of a host.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_SEARCH_H
 #define HODOGRAPH_OFFLINE_STOP_SEARCH_H

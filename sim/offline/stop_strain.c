@@ -4,8 +4,8 @@
 #include <math.h>
 
 #define UNLIMITED_MM_S 1e12
-#define SPARE_SHARE                                                                                \
-    1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes */
+/* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes */
+#define SPARE_SHARE   1e-4
 #define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
 
 static double over(double limit)

@@ -55,8 +55,8 @@ double stop_strain(const struct stop_road *road, const struct stop_inverse *inve
 int stop_extent_keeps(const struct stop_road *road, const struct stop_inverse *inverse,
                       const struct stop_extent *extent);
 
-/* 1: no limit is passed on the path between a row and an arc length; `extent` has what the brake does there, and gets the
- * bounds of the path. */
+/* 1: no limit is passed on the path between a row and an arc length; `extent` has what the brake does there, and gets
+ * the bounds of the path. */
 int stop_keeps_up_to(const struct stop_road *road, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm);
 

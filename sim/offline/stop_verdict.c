@@ -30,8 +30,8 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
         double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
         double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
         double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
-        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
-         * or the worst numbers would be the best. */
+        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not
+         * counted, or the worst numbers would be the best. */
         int begins = stop_brake_begin(&brake, at, numbers, setting->period_s);
         double total_s = begins ? stop_brake_time(at, numbers, setting->period_s) : STOP_NEVER_S;
         if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&

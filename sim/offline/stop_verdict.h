@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Whether the codes of a stop are good for a feed piece: whether brakes with them keep the limits from all of its instants, and
- * how long they take.
+ * Whether the codes of a stop are good for a feed piece: whether brakes with them keep the limits from all of its
+ * instants, and how long they take.
  *
- * Two looks. The first one follows brakes at the rate 1 from few instants (stop_all_keep). The strict one, which decides,
- * follows them from instants close to each other, at all feed overrides, and out of the brake of another stop
+ * Two looks. The first one follows brakes at the rate 1 from few instants (stop_all_keep). The strict one, which
+ * decides, follows them from instants close to each other, at all feed overrides, and out of the brake of another stop
  * (stop_strictly). A look begins at the instant that broke a limit last: most codes that break one do so there.
  * mm, s. Main loop of a host.
  */
@@ -15,8 +15,8 @@
 #include "offline/stop_brake.h"
 #include "offline/stop_piece.h"
 
-#define STOP_FEWER                                                                                 \
-    24 /* codes below the greatest: a brake with less than an eighth of a limit is none */
+/* codes below the greatest: a brake with less than an eighth of a limit is none */
+#define STOP_FEWER   24
 #define STOP_NEVER_S 1e6
 
 /* Times to rest from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
@@ -27,8 +27,8 @@ struct stop_times {
     int brakes[STOP_MOST_INSTANTS]; /* 0: the plan goes on */
 };
 
-/* Fills the times; after_s: the time to rest from the end of the piece. Returns 0 where the controller would not begin a brake
- * although the program still has far to go. */
+/* Fills the times; after_s: the time to rest from the end of the piece. Returns 0 where the controller would not begin
+ * a brake although the program still has far to go. */
 int stop_times_of(const struct stop_setting *setting, const struct stop_piece *piece,
                   const struct path_brake_numbers *numbers, double after_s,
                   struct stop_times *times);

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A job in chunks without a bus: how the controller handles chunks, whenever they come (docs/reference/protocol.md 1.7).
- * Used by the host tools' native module and by tests. Chunks are opened, checked and taken over by the code of the
- * controller, one try before each tick; commands are those of the feed override. Dwells between chunks take their ticks,
- * program stops no time. Setpoints are those of the controller, bit for bit. Records exist only near the motion, as in the
- * controller (core/coefficient_cache.h); they are made before each tick.
+ * A job in chunks without a bus: how the controller handles chunks, whenever they come (docs/reference/protocol.md
+ * 1.7). Used by the host tools' native module and by tests. Chunks are opened, checked and taken over by the code of
+ * the controller, one try before each tick; commands are those of the feed override. Dwells between chunks take their
+ * ticks, program stops no time. Setpoints are those of the controller, bit for bit. Records exist only near the motion,
+ * as in the controller (core/coefficient_cache.h); they are made before each tick.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
- * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of
- * each chunk. They have to stay as long as the stream. Not reentrant: one thread for each stream.
+ * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes
+ * of each chunk. They have to stay as long as the stream. Not reentrant: one thread for each stream.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H
@@ -51,13 +51,13 @@ struct offline_stream {
 void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
                           const struct program_limits *limits, uint8_t *memory, uint32_t size);
 
-/* Opens and checks a chunk behind the newest accepted one. 0, or enum program_error with *fault the same: the stream has
- * not changed, and the chunk may be given again. */
+/* Opens and checks a chunk behind the newest accepted one. 0, or enum program_error with *fault the same: the stream
+ * has not changed, and the chunk may be given again. */
 int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
                          const uint8_t *bytes, uint32_t size, struct program_fault *fault);
 
-/* Accepts a chunk that has just passed offline_stream_check. The first one begins the motion. 0, or COEFFICIENTS_ERR_SIZE: the
- * cache is too small. */
+/* Accepts a chunk that has just passed offline_stream_check. The first one begins the motion. 0, or
+ * COEFFICIENTS_ERR_SIZE: the cache is too small. */
 int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 
 /* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind

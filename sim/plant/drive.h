@@ -57,10 +57,10 @@ struct drive {
     bool cubic; /* interpolation */
     bool steps; /* no interpolation */
     bool delayed;
-    double
-        speed_per_distance; /* rad/s for a mm of difference between two samples; 0: exact speed */
-    double
-        distance_counts; /* of the last period, and what the command does in a period at the speed it */
+    /* rad/s for a mm of difference between two samples; 0: exact speed */
+    double speed_per_distance;
+    /* of the last period, and what the command does in a period at the speed it */
+    double distance_counts;
     double end_distance_counts; /* had at the end of that; both for cubic interpolation */
     int32_t target_counts;
     uint32_t same_target_periods; /* up to DRIVE_PARK_PERIODS */

@@ -6,8 +6,8 @@
  *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
- * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward Euler).
- * It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
+ * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward
+ * Euler). It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H
@@ -18,8 +18,8 @@ struct pdff {
     double k_pp_rad_s_mm;
     double k_pf_rad_mm;
     double step_s;
-    double
-        volts_per_ref; /* V per rad/s: torque_to_volts k_pv (k_vf + k_iv step); forward Euler: without the step */
+    /* V per rad/s: torque_to_volts k_pv (k_vf + k_iv step); forward Euler: without the step */
+    double volts_per_ref;
     double volts_per_integral; /* V per rad:   torque_to_volts k_pv k_iv */
     double volts_per_speed;    /* V per rad/s: torque_to_volts k_pv (1 + k_iv step); likewise */
     double volts_limit;

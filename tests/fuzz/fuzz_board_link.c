@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A line that is decoded is
- * a frame, and its line gives the same frame again; a request is replied to within the time that it names.
+ * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A line that is
+ * decoded is a frame, and its line gives the same frame again; a request is replied to within the time that it names.
  *
  * Input: requests (one byte each says how), then characters.
  */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chunks of a job with changes, always with the CRCs that they should have. What chunk_check accepts is taken over and runs
- * under holds, resumes, overrides, stops and fault stops at any tick, each chunk in time, late or never: setpoints do not
- * jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes longer than
- * its deadline.
+ * Chunks of a job with changes, always with the CRCs that they should have. What chunk_check accepts is taken over and
+ * runs under holds, resumes, overrides, stops and fault stops at any tick, each chunk in time, late or never: setpoints
+ * do not jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes
+ * longer than its deadline.
  *
- * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk is there,
- * then changes.
+ * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk
+ * is there, then changes.
  */
 #include <math.h>
 #include <stdlib.h>

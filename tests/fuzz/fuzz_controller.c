@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The whole controller on the fake port, with two fake drives, a host, and another node that sends any frames; frames
- * are lost and refused, ticks are late, the power fails. Rules: those of port.h (the fake port checks them); no setpoint of
- * an axis on the path is farther from the one before than its velocity limit allows; a program that a block transfer has
- * brought, or taken, is the one that was sent, whatever came between its frames; and where the configuration is still the
- * first one, a sound bus and a reset lead out of everything.
+ * are lost and refused, ticks are late, the power fails. Rules: those of port.h (the fake port checks them); no
+ * setpoint of an axis on the path is farther from the one before than its velocity limit allows; a program that a block
+ * transfer has brought, or taken, is the one that was sent, whatever came between its frames; and where the
+ * configuration is still the first one, a sound bus and a reset lead out of everything.
  *
  * Input: one byte says what happens next.
  */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The SDO client and the boot of the drives on a bus where anything may happen to requests and answers, with any
- * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and with
- * drives that were switched on anew, it ends.
+ * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and
+ * with drives that were switched on anew, it ends.
  *
  * Input: writes to the configuration, then what becomes of each frame.
  */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the interpolator; for eva_override.c
- * (docs/theory/numerics.md sections 15.5 and 15.6).
+ * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the
+ * interpolator; for eva_override.c (docs/theory/numerics.md sections 15.5 and 15.6).
  */
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H
@@ -12,8 +12,8 @@
 #include "core/feed_override.h"
 #include "ramp_contracts.h"
 
-#define MOST_SLOPE       ((int64_t)1 << 57)
-#define MOST_ARC         (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
+#define MOST_SLOPE ((int64_t)1 << 57)
+#define MOST_ARC   (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
 #define MOST_FEED_AT     ((int64_t)1 << 60)
 #define LEAST_ARC        (-((int64_t)1 << 60))
 #define IS_ARC(q40_mm)   (LEAST_ARC <= (q40_mm) && (q40_mm) <= MOST_ARC)
@@ -111,16 +111,17 @@ int path_brake_rests(const struct path_brake *brake);
 
 /*@ assigns \result, *out, it->segment \from time_q42_s;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
-                    struct interpolator_point *out);
+int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece,
+                          uint64_t time_q42_s, struct interpolator_point *out);
 
 /*@ assigns \result, *out, it->segment \from arc_length_q40_mm;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm, struct interpolator_point *out);
+int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm,
+                               struct interpolator_point *out);
 
 /*@ assigns \result \from time_q42_s; */
-int64_t interpolator_acceleration_q40(const struct interpolator *it, const struct coefficients_piece *piece,
-                                uint64_t time_q42_s);
+int64_t interpolator_acceleration_q40(const struct interpolator *it,
+                                      const struct coefficients_piece *piece, uint64_t time_q42_s);
 
 /*@ requires index < 3;
     assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,

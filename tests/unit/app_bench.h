@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * app_bench: a whole controller on the fake port, with two fake drives, if wanted an I/O module, and an SDO client as host,
- * on a bus without delays.
+ * app_bench: a whole controller on the fake port, with two fake drives, if wanted an I/O module, and an SDO client as
+ * host, on a bus without delays.
  */
 #ifndef TESTS_UNIT_APP_BENCH_H
 #define TESTS_UNIT_APP_BENCH_H

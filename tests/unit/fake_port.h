@@ -46,8 +46,8 @@ void fake_port_hold_frames(bool hold);
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
-/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has gone;
- * 0: it takes all. Returns how many operations there were since the last call. */
+/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has
+ * gone; 0: it takes all. Returns how many operations there were since the last call. */
 uint32_t fake_port_cut_store(uint32_t operation);
 
 /* fake_port_reset, but what is in the store stays, as over a loss of power. */

@@ -66,8 +66,8 @@ struct override_differences {
 int override_trace_add(struct override_trace *trace, int64_t arc_q40_mm, double h,
                        struct override_differences *out);
 
-/* Distance in 2^-40 mm of a point from the exact curve at its arc length, over all axes. `exact` has the same program and stands at or
- * before that place. */
+/* Distance in 2^-40 mm of a point from the exact curve at its arc length, over all axes. `exact` has the same program
+ * and stands at or before that place. */
 double override_distance_q40(struct interpolator *exact, const struct interpolator_point *point);
 
 /* Uniform in [low, high). */

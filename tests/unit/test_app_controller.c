@@ -456,7 +456,8 @@ static void test_a_busy_main_loop_ends_no_transfer(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
 }
 
-/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of it. */
+/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of
+ * it. */
 static void test_a_check_tells_the_port_of_its_progress(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);

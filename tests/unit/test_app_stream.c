@@ -647,7 +647,8 @@ static uint32_t act_at_random(uint32_t next)
     }
 }
 
-/* Every setpoint is on the path, and no further from the one before than the feed allows; the path is not left backwards. */
+/* Every setpoint is on the path, and no further from the one before than the feed allows; the path is not left
+ * backwards. */
 static void expect_path(void)
 {
     for (uint32_t k = 1; k < bench.recorded; ++k) {
@@ -785,7 +786,8 @@ static void test_another_configuration_refuses_start_and_chunks(void)
     command(COMMAND_START);
 }
 
-/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job runs. */
+/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job runs.
+ * */
 static void test_a_main_loop_that_makes_no_records(void)
 {
     expect_sent(&parts[0]);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h). The
- * chunks are cut from golden programs (chunked.h), so that the whole program says which setpoints are right.
+ * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h).
+ * The chunks are cut from golden programs (chunked.h), so that the whole program says which setpoints are right.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -615,8 +615,8 @@ static void test_no_takeover_while_a_stop_or_a_search_is_under_way(void)
     TEST_ASSERT_FALSE(take_over(&m)); /* a window is evaluated */
 }
 
-/* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the joint.
- * Returns 0 where it is refused. */
+/* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the
+ * joint. Returns 0 where it is refused. */
 static int goes_on_in_ramp(const struct motion *m)
 {
     struct motion branch = *m;

@@ -146,7 +146,8 @@ static void test_quick_stop_codes(void)
     }
 }
 
-/* Way of a motor that is braked from `speed` mm/s with constant volts, mm: the solution of its equation (plant/motor.h). */
+/* Way of a motor that is braked from `speed` mm/s with constant volts, mm: the solution of its equation
+ * (plant/motor.h). */
 static double braking_way_mm(double speed_mm_s, double volts)
 {
     const struct drive_plant *plant = &drive_bench_config.plant;
@@ -385,7 +386,8 @@ static void test_error_behaviour(void)
     }
 }
 
-/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap late. */
+/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap late.
+ * */
 static void test_the_masters_heartbeat_is_not_missed_early(void)
 {
     struct can_msg beat;

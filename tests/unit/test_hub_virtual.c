@@ -205,7 +205,8 @@ static void test_an_answer_comes_behind_what_waits_already(void)
     TEST_ASSERT_EQUAL(0x302, got[3].id);
 }
 
-/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too long. */
+/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too
+ * long. */
 static int frames_in(int fd)
 {
     struct local_bus_frame packet[LOCAL_BUS_PACKET + 1u];

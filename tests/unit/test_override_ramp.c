@@ -68,8 +68,8 @@ static struct override_ramp ramp_of(const struct bounds *b, const struct overrid
     return ramp;
 }
 
-/* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it rises
- * to, and it rests where the ramp said. Gives the program time in ticks at override 1. */
+/* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it
+ * rises to, and it rests where the ramp said. Gives the program time in ticks at override 1. */
 static double run(struct override_ramp *ramp, struct override_state *rate, uint64_t cut)
 {
     const int64_t step = ramp->step_q56;
@@ -180,7 +180,8 @@ static void test_bounds_at_the_ends_of_the_format(void)
     }
 }
 
-/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick. */
+/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick.
+ * */
 static void test_limits_of_all_codes(void)
 {
     for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {

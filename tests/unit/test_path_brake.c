@@ -180,9 +180,9 @@ static void test_acceleration_goes_to_the_deceleration(void)
     expect_first_step(-most - 5 * jerk, jerk);
 }
 
-/* A state from which the way to rest just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration as it
- * is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise before
- * the way to rest. */
+/* A state from which the way to rest just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration as
+ * it is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise
+ * before the way to rest. */
 static void test_no_rise_before_the_way_to_rest(void)
 {
     const int64_t jerk = (int64_t)1 << 34;
@@ -228,8 +228,8 @@ static void test_first_tick(void)
     expect_first_tick(-jerk, 0);
 }
 
-/* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to the
- * state after. `slack`: what rounding may add to the last jerk. */
+/* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to
+ * the state after. `slack`: what rounding may add to the last jerk. */
 static void check_tick(const struct path_state *a, const struct path_state *b,
                        const struct path_brake_numbers *n, int64_t first_acceleration,
                        int64_t slack)
@@ -303,7 +303,8 @@ static int64_t way_of_stop(const struct path_state *from, const struct path_brak
     return way_from(from, &brake.at);
 }
 
-/* A brake out of a motion that comes to its end needs no more than is promised, and at most two ticks of its speed less. */
+/* A brake out of a motion that comes to its end needs no more than is promised, and at most two ticks of its speed
+ * less. */
 static void test_bound_near_the_end_of_a_program(void)
 {
     for (uint32_t i = 0; i < CASES / 10; i++) {
@@ -348,8 +349,8 @@ static void test_brakes_nearest_to_the_bound(void)
     }
 }
 
-/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and the
- * acceleration is below half the deceleration, there is one. No brake takes
+/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and
+ * the acceleration is below half the deceleration, there is one. No brake takes
  * MORE_TICKS more than the continuous one; a short one with a slow last jerk takes MORE_IN_SHORT.
  * path_brake_fits never promises less than a brake takes, with its first tick in place of a step or without. */
 static void test_random_brakes(void)
@@ -406,7 +407,8 @@ static void test_refused_states(void)
     refused(PATH_BRAKE_MOST_SPEED, 0);              /* too many ticks */
 }
 
-/* Whatever the state and the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at rest. */
+/* Whatever the state and the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at
+ * rest. */
 static void test_extreme_numbers(void)
 {
     for (uint32_t i = 0; i < CASES; i++) {

@@ -311,7 +311,8 @@ static void test_a_second_client_inside_a_block(void)
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
 }
 
-/* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the value. */
+/* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the
+ * value. */
 static void test_a_second_client_that_hits_the_next_number(void)
 {
     const uint8_t request[7] = {0x03, 0x20, 0x00, 1, 2, 3, 4};

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop and
- * fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside its
- * limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case ends with
- * a host that sends no more: then the motion comes to rest. In each tick as many events of the path have acted as are at or
- * before the farthest setpoint: none acts twice, is left out or is late. Records are those of a coefficient cache, from the least that
- * does to one for whole chunks; where it has room to spare, the main loop is late with them by a tick.
+ * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop
+ * and fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside
+ * its limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case
+ * ends with a host that sends no more: then the motion comes to rest. In each tick as many events of the path have
+ * acted as are at or before the farthest setpoint: none acts twice, is left out or is late. Records are those of a
+ * coefficient cache, from the least that does to one for whole chunks; where it has room to spare, the main loop is
+ * late with them by a tick.
  *
  * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
  */

@@ -3,8 +3,8 @@
  * drive_boot: finds the drives and the I/O module, configures them by SDO (drive_configuration) and starts them (NMT),
  * one after the other, and begins again from the first when one does not answer or refuses.
  *
- * A refused write is no error if the object already has the wanted value. So a drive with a fixed PDO mapping is accepted
- * if the mapping is the right one.
+ * A refused write is no error if the object already has the wanted value. So a drive with a fixed PDO mapping is
+ * accepted if the mapping is the right one.
  *
  * Called by app/controller.c. Frames in, frames out; main loop.
  */
@@ -46,8 +46,8 @@ struct drive_boot {
     struct config config;
     struct drive_configuration configuration;
     struct drive_op op;
-    struct drive_properties
-        properties[DRIVE_NODES]; /* of the drives configured so far, then the I/O module */
+    /* of the drives configured so far, then the I/O module */
+    struct drive_properties properties[DRIVE_NODES];
     struct drive_trouble trouble;
     enum drive_boot_phase phase;
     uint32_t pause_us;

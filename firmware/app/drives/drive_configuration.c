@@ -250,8 +250,8 @@ static const struct drive_row drive_rows[] = {
 
 #define ROWS (sizeof drive_rows / sizeof drive_rows[0])
 
-/* The same of the I/O module, CiA 401. Without heartbeats of the controller it switches its outputs off: 0x1029 leaves it
- * operational, so that its error values hold (0x6206, 0x6207; 0x6443, 0x6444). */
+/* The same of the I/O module, CiA 401. Without heartbeats of the controller it switches its outputs off: 0x1029 leaves
+ * it operational, so that its error values hold (0x6206, 0x6207; 0x6443, 0x6444). */
 static const struct drive_row module_rows[] = {
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_IO},
@@ -361,9 +361,9 @@ static bool after_entries(const struct drive_pdo *pdo, uint8_t node, uint16_t se
     }
 }
 
-/* The write number `item` (0, 1, ...) that makes a PDO of a drive as it shall be, in the order of CiA 301 (7.5.2.36): disable,
- * transmission type, no mapping, entries, their count, times, enable. False after the last one. setpoint_timeout_ms is for the
- * event timer. */
+/* The write number `item` (0, 1, ...) that makes a PDO of a drive as it shall be, in the order of CiA 301 (7.5.2.36):
+ * disable, transmission type, no mapping, entries, their count, times, enable. False after the last one.
+ * setpoint_timeout_ms is for the event timer. */
 static bool pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_timeout_ms,
                    uint8_t item, struct drive_op *op)
 {

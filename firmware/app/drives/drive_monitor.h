@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of the
- * host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
+ * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of
+ * the host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
  *
  * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS may have been switched off and on while its boot-up message was
  * lost. Its axis is then no longer homed, in every state.

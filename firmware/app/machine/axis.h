@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * axis: the state of one drive in the controller: its last reported values, its goal and target, and the setpoint that is
- * sent. Used by all files of app/machine and by the tick.
+ * axis: the state of one drive in the controller: its last reported values, its goal and target, and the setpoint that
+ * is sent. Used by all files of app/machine and by the tick.
  *
  * Guarded by the port's lock: written by the receive and timer interrupts, read by the main loop in a critical section.
  * Positions in counts.
@@ -29,8 +29,8 @@
 struct axis {
     uint8_t node;
     enum cia402_state state; /* as the statusword has it */
-    bool
-        statusword_ok; /* as of the last answer: Operation enabled, and no wrong bit in the statusword */
+    /* as of the last answer: Operation enabled, and no wrong bit in the statusword */
+    bool statusword_ok;
     struct tpdo_monitor tpdo1;
     struct statusword_monitor statusword_bits;
     uint16_t statusword;
@@ -45,11 +45,11 @@ struct axis {
     int32_t expected_counts;    /* where the drive should have been at the last SYNC */
     uint32_t deviation_syncs; /* answers in a row with a position outside the window around that */
     bool deviates;            /* for longer than the configuration permits */
-    struct can_msg
-        setpoint; /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
+    /* RPDO1 as axis_setpoint made it last: kept, so that only changes are written */
+    struct can_msg setpoint;
     enum cia402_goal goal;
-    bool
-        was_enabled; /* seen in Operation enabled since that became the goal: its target no longer follows the position */
+    /* seen in Operation enabled since that became the goal: its target no longer follows the position */
+    bool was_enabled;
     bool moves_by_drive; /* it homes: moves by its own motion, its target follows its position */
     int32_t velocity_offset_counts_s; /* put into its RPDO2 last */
     int16_t torque_offset_permille;   /* put into its RPDO1 last */
@@ -58,13 +58,13 @@ struct axis {
     uint32_t digital_inputs;          /* 0x60FD */
     int32_t following_error_counts;   /* 0x60F4, read a few times a second */
     bool homed;                       /* its drive has the zero that homing gave it */
-    int32_t
-        last_seen_counts; /* where it was when it was seen last before it was to be found again */
-    uint32_t rest_syncs;  /* with power on: for how long it has been, in this state, at */
+    /* where it was when it was seen last before it was to be found again */
+    int32_t last_seen_counts;
+    uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
     int32_t rest_counts;
     enum cia402_state rest_state;
-    uint32_t
-        standstill_syncs; /* for how long it has stood still, enabled, at an unchanged target */
+    /* for how long it has stood still, enabled, at an unchanged target */
+    uint32_t standstill_syncs;
 };
 
 void axis_init(struct axis *axis, uint8_t node);
@@ -73,8 +73,8 @@ void axis_init(struct axis *axis, uint8_t node);
  * that ends only by axis_reconnected, a boot-up message, or missing heartbeats. Under the lock. */
 void axis_forget(struct axis *axis, uint8_t node);
 
-/* The drive has been found again and has reported its position: one that is more than `tolerance_counts` from where it was seen
- * last does not have its zero any more. Under the lock. */
+/* The drive has been found again and has reported its position: one that is more than `tolerance_counts` from where it
+ * was seen last does not have its zero any more. Under the lock. */
 void axis_reconnected(struct axis *axis, int32_t position_counts, uint32_t tolerance_counts);
 
 /* A new goal, which ends homing: moves_by_drive and control_extra are cleared. Under the lock. */
@@ -105,7 +105,8 @@ static inline void axis_synced(struct axis *axis)
 }
 
 /* Compares the answer to the last SYNC with the position expected then, while the drive is to follow its target. It
- * deviates where they are more than window_counts apart in more than syncs_max answers in a row. Timer, before axis_synced. */
+ * deviates where they are more than window_counts apart in more than syncs_max answers in a row. Timer, before
+ * axis_synced. */
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max);
 
 /* All pure, under the lock. */

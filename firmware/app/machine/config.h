@@ -3,8 +3,8 @@
  * config: what the host has configured, as one value: objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2016, 0x2018 ...
  * 0x201A, 0x201D ... 0x2023, 0x2030 ... 0x2035, 0x2051 ... 0x2053.
  *
- * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy (machine.config),
- * which the main loop replaces under the port's lock at standstill.
+ * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy
+ * (machine.config), which the main loop replaces under the port's lock at standstill.
  */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
@@ -56,8 +56,8 @@ struct config_axis {
     uint32_t expected_vendor; /* 0x1018 subs 1 ... 3 of the drive; 0: any */
     uint32_t expected_product;
     uint32_t expected_revision;
-    uint32_t
-        counts_per_unit; /* of an axis that is not measured in mm but in degrees; 0: counts_per_mm */
+    /* of an axis that is not measured in mm but in degrees; 0: counts_per_mm */
+    uint32_t counts_per_unit;
 };
 
 /* Bits of struct config_outputs.behaviour: what becomes of the outputs of the path. */
@@ -103,8 +103,8 @@ struct config {
     uint32_t turn_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
-     * window and its time where they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, of an axis in degrees
-     * at its own velocity limit (without one: UINT32_MAX). */
+     * window and its time where they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, of an axis in
+     * degrees at its own velocity limit (without one: UINT32_MAX). */
     uint32_t deviation_counts[AXES_MAX];
     uint32_t deviation_syncs[AXES_MAX];
 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of machine. */
+/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of
+ * machine. */
 #ifndef APP_MACHINE_FAULT_H
 #define APP_MACHINE_FAULT_H
 
@@ -17,11 +18,11 @@
 #define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
-#define FAULT_POSITION_DEVIATION                                                                   \
-    (EMCY_MANUFACTURER | 0x08u)                    /* position and setpoint apart; counts */
+/* position and setpoint apart; counts */
+#define FAULT_POSITION_DEVIATION (EMCY_MANUFACTURER | 0x08u)
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
-#define FAULT_STOP_LATE                                                                            \
-    (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */
+/* a stop along the path beyond its deadline; setpoint */
+#define FAULT_STOP_LATE       (EMCY_MANUFACTURER | 0x0Au)
 #define FAULT_MAIN_LOOP_STALL (EMCY_MANUFACTURER | 0x0Bu) /* the main loop has stalled; us */
 
 /* Homing. */

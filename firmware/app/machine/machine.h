@@ -8,8 +8,8 @@
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
  * The state changes in three places: requests (main loop, under the lock; machine_requests.c), the timer's functions
- * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). The port's lock guards the whole struct. Files use
- * each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
+ * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). The port's lock guards the whole struct. Files
+ * use each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H
@@ -73,8 +73,8 @@ enum machine_refusal {
 #define MACHINE_QUICK_TICKS  2000u /* time for the drives to end a quick stop */
 #define MACHINE_RESET_TICKS  500u  /* time for the drives to leave their faults */
 #define MACHINE_ANSWER_TICKS 5000u /* time for configured drives to answer a SYNC */
-#define MACHINE_UNSENT_MAX                                                                         \
-    3u /* ticks in a row in which the port may refuse frames, or still have those of the tick before */
+/* ticks in a row in which the port may refuse frames, or still have those of the tick before */
+#define MACHINE_UNSENT_MAX 3u
 
 /* While the main loop stalls, no command is executed and no heartbeat is sent. The axes are stopped on the path before
  * the drives stop for missing heartbeats, or a watchdog restarts the processor. */
@@ -107,24 +107,24 @@ struct machine {
     uint32_t sync_us;            /* time of the last SYNC */
     uint32_t unsent_ticks;       /* in a row with a frame that the port refused */
     uint32_t sync_left_us;       /* time of the last SYNC that has left */
-    uint32_t
-        arriving_ticks; /* since the settling time of a motion was over, with an axis away from its target */
+    /* since the settling time of a motion was over, with an axis away from its target */
+    uint32_t arriving_ticks;
     bool sync_sent;      /* the last SYNC has left */
     bool sync_now;       /* and that of this tick */
     bool sync_waits;     /* this tick has none: the one before is not over */
     bool setpoints_sent; /* and all setpoints after it */
-    bool
-        clock_paused; /* no new setpoint in this tick: its SYNC, or a setpoint before it, has not left */
+    /* no new setpoint in this tick: its SYNC, or a setpoint before it, has not left */
+    bool clock_paused;
     bool simulated;  /* every drive is a simulated one: the port may let ticks wait for them */
     bool configured; /* drives are configured; BOOT then waits for their first answers */
-    uint8_t
-        unresponsive_node; /* state BOOT again: this node was started and did not answer; 0: none */
-    bool boot_due;         /* the main loop has to find and configure the drives */
-    bool
-        mode_left; /* homing was broken off: the drives have to be configured anew after the quick stop */
+    /* state BOOT again: this node was started and did not answer; 0: none */
+    uint8_t unresponsive_node;
+    bool boot_due; /* the main loop has to find and configure the drives */
+    /* homing was broken off: the drives have to be configured anew after the quick stop */
+    bool mode_left;
     bool unhomed_allowed; /* the next start is accepted though axes are not homed */
-    uint8_t
-        unhomed_axes; /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
+    /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
+    uint8_t unhomed_axes;
 };
 
 void machine_init(struct machine *machine, const struct config *config);
@@ -152,8 +152,8 @@ uint8_t machine_unhomed(const struct machine *machine);
 enum machine_refusal machine_start(struct machine *machine, const struct motion *prepared,
                                    const int32_t start_counts[AXES_MAX]);
 
-/* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be now. A path
- * that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
+/* Goes on with the next chunk of a job (motion_take_over): true when it has been taken over, false when it cannot be
+ * now. A path that is held stays so. After a stop, and in a fault, nothing is taken over any more. */
 bool machine_take_over(struct machine *machine, const struct chunk *next,
                        const struct coefficients_window *window);
 

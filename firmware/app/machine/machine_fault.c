@@ -123,8 +123,8 @@ static bool stays_in_fault(const struct axis *axis)
     return axis_in_fault(axis) && axis->error_code != EMCY_NO_ERROR;
 }
 
-/* A drive that does not answer at all, or not what it was asked, is left to BOOT, which looks for it, configures it anew and
- * reports what is wrong. */
+/* A drive that does not answer at all, or not what it was asked, is left to BOOT, which looks for it, configures it
+ * anew and reports what is wrong. */
 static void step_resetting(struct machine *machine)
 {
     const struct axis *late = machine_late_drive(machine);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * motion: one run of a program. In each tick it computes the point on the path, from the program and the commands (hold,
- * stop, override), and the targets of the axes that follow the path.
+ * motion: one run of a program. In each tick it computes the point on the path, from the program and the commands
+ * (hold, stop, override), and the targets of the axes that follow the path.
  *
  * The main loop prepares it (app/commands.c) and hands it to the machine. Then it belongs to the tick (machine_tick.c),
  * under the port's lock.
@@ -29,8 +29,8 @@ struct motion {
     bool joined;   /* the end of the program is a rest of the job, not that of a tail */
     bool precedes; /* that setpoint is still the end of the chunk before: a rest is under way */
     struct path_counts scale;
-    struct path_outputs
-        outputs; /* at the last setpoint; stepped by `outputs`, where there is an I/O module */
+    /* at the last setpoint; stepped by `outputs`, where there is an I/O module */
+    struct path_outputs outputs;
 };
 
 /* Sets up the first setpoint. The program must have passed program_check; it must stay while the
@@ -47,10 +47,10 @@ int motion_begin_at(struct motion *motion, const struct program *program,
 void motion_begin_job(struct motion *motion, const struct chunk *first,
                       const struct coefficients_window *window, const struct config *config);
 
-/* Takes the next chunk of the job over, with its coefficient records in `window`. This is possible while the motion is in
- * the part that both chunks share, or rests: then true, and the previous chunk is no longer needed. A chunk that begins
- * at rest starts chunk_rest_ticks after the end of its predecessor, or at once if it comes later. Ticks of a hold do not
- * count. Under the lock. */
+/* Takes the next chunk of the job over, with its coefficient records in `window`. This is possible while the motion is
+ * in the part that both chunks share, or rests: then true, and the previous chunk is no longer needed. A chunk that
+ * begins at rest starts chunk_rest_ticks after the end of its predecessor, or at once if it comes later. Ticks of a
+ * hold do not count. Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next,
                       const struct coefficients_window *window);
 
@@ -82,12 +82,12 @@ static inline uint32_t motion_axes_end(const struct motion *motion)
     return motion_first_axis(motion) + motion_axis_count(motion);
 }
 
-/* Counts the ticks of a rest between two chunks; call it before motion_step in each tick. True: this tick repeats the last
- * setpoint, and motion_step must not be called. Timer. */
+/* Counts the ticks of a rest between two chunks; call it before motion_step in each tick. True: this tick repeats the
+ * last setpoint, and motion_step must not be called. Timer. */
 bool motion_rests(struct motion *motion);
 
-/* Commands a path stop: motion_stop inside the limits of the program, motion_fault_stop inside those of the machine. Under
- * the lock. */
+/* Commands a path stop: motion_stop inside the limits of the program, motion_fault_stop inside those of the machine.
+ * Under the lock. */
 void motion_stop(struct motion *motion);
 void motion_fault_stop(struct motion *motion);
 

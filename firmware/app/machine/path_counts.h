@@ -18,8 +18,8 @@ struct path_counts {
 void path_counts_init(struct path_counts *scale, const struct program *program,
                       const struct config *config);
 
-/* First and last setpoint of a program with the configured kernel, by axis of the machine; unchanged where this image does
- * not have it. Main loop. */
+/* First and last setpoint of a program with the configured kernel, by axis of the machine; unchanged where this image
+ * does not have it. Main loop. */
 void path_counts_ends(const struct program *program, const struct config *config,
                       int32_t start_counts[AXES_MAX], int32_t end_counts[AXES_MAX]);
 

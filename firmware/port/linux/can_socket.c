@@ -244,7 +244,8 @@ static size_t frames_in_packet(const struct can_socket *socket)
     return socket->local && clock_is_virtual() ? LOCAL_BUS_PACKET : 1u;
 }
 
-/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
+/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`.
+ * */
 static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
                     const struct local_bus_frame *frames, struct can_msg *messages,
                     uint64_t *stamps_ns)

@@ -38,8 +38,8 @@ struct can_socket {
         [CAN_SOCKET_BATCH]; /* virtual time: when the frames that were received last had come */
 };
 
-/* Opens and binds: a network interface, or with a '/' in its name the local bus of hodograph-hub (sim/hub) at this path.
- * Returns 0, or a negative errno with one line in `reason`: what is wrong and what to do. */
+/* Opens and binds: a network interface, or with a '/' in its name the local bus of hodograph-hub (sim/hub) at this
+ * path. Returns 0, or a negative errno with one line in `reason`: what is wrong and what to do. */
 int can_socket_open(struct can_socket *socket, const char *interface, char *reason, size_t size);
 void can_socket_close(struct can_socket *socket);
 
@@ -54,8 +54,8 @@ int can_socket_defer(struct can_socket *socket, const struct can_match *frames, 
  * removed). */
 int can_socket_send(struct can_socket *socket, const struct can_msg *message);
 
-/* Tracks the next frame with this identifier; call it before the frame is sent. 0; -ENOSPC when too many are tracked, or another
- * negative errno: then it is not tracked. */
+/* Tracks the next frame with this identifier; call it before the frame is sent. 0; -ENOSPC when too many are tracked,
+ * or another negative errno: then it is not tracked. */
 int can_socket_track(struct can_socket *socket, uint16_t id);
 
 /* The frame was not sent after all. */
@@ -76,8 +76,8 @@ int can_socket_send_many(struct can_socket *socket, const struct can_msg *messag
 int can_socket_receive(struct can_socket *socket, struct can_msg messages[CAN_SOCKET_BATCH],
                        int *more);
 
-/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not report them. Where frames
- * come in packets: what it would keep about if each came by itself. */
+/* Bytes that the kernel keeps for this socket, its own bookkeeping included; 0 where it does not report them. Where
+ * frames come in packets: what it would keep about if each came by itself. */
 uint32_t can_socket_waiting_bytes(const struct can_socket *socket);
 
 #endif

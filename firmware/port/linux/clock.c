@@ -145,8 +145,8 @@ static int take_grant(void)
     return 1;
 }
 
-/* A signal, or a descriptor that is no bus, ends the wait at the present time: the hub is requested to grant it at once, which
- * changes nothing when one is on its way. */
+/* A signal, or a descriptor that is no bus, ends the wait at the present time: the hub is requested to grant it at
+ * once, which changes nothing when one is on its way. */
 static int await_grant(const struct pollfd *others, size_t count, bool *interrupted)
 {
     struct pollfd wait[1 + OTHERS_MAX];
@@ -184,8 +184,8 @@ static int begin_wait(uint64_t timeout_ns)
     return noted && error == 0 ? say_wait(0) : error;
 }
 
-/* A signal that comes between the word that we wait and the wait itself would be missed: so they are blocked from here to
- * ppoll(). */
+/* A signal that comes between the word that we wait and the wait itself would be missed: so they are blocked from here
+ * to ppoll(). */
 static int poll_virtually(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns)
 {
     bool interrupted = false;

@@ -20,8 +20,8 @@
 #define CLOCK_NEVER    UINT64_MAX
 
 /* Takes part in the time of this bus from now on, where its time is virtual; else changes nothing. Call it before
- * can_socket_open(). `name`: what others know the process by, unless LOCAL_BUS_NAME_VARIABLE of the environment has another name.
- * Returns 0 or a negative errno. */
+ * can_socket_open(). `name`: what others know the process by, unless LOCAL_BUS_NAME_VARIABLE of the environment has
+ * another name. Returns 0 or a negative errno. */
 int clock_join(const char *bus, const char *name);
 
 /* Ends the part in virtual time: nobody waits for this process any more. Harmless without one. */
@@ -45,9 +45,9 @@ void clock_note_signal(void);
 /* Monotonic. */
 uint64_t clock_ns(void);
 
-/* As ppoll(): until one of `fds` is ready, a signal comes or `timeout_ns` (CLOCK_NEVER: no limit) are over. The first `buses` of
- * `fds` are sockets of CAN buses. Returns how many are ready, or a negative errno: -EINTR in real time only, -ENETDOWN when the hub has
- * gone. */
+/* As ppoll(): until one of `fds` is ready, a signal comes or `timeout_ns` (CLOCK_NEVER: no limit) are over. The first
+ * `buses` of `fds` are sockets of CAN buses. Returns how many are ready, or a negative errno: -EINTR in real time only,
+ * -ENETDOWN when the hub has gone. */
 int clock_poll(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns);
 
 static inline struct timespec clock_timespec(uint64_t ns)

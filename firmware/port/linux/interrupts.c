@@ -117,8 +117,8 @@ static void receive_waiting(void)
     }
 }
 
-/* In virtual time answers of drives are taken when the next tick may start, at the earliest; those that are missing then end the wait
- * (clock_wake_for_all).
+/* In virtual time answers of drives are taken when the next tick may start, at the earliest; those that are missing
+ * then end the wait (clock_wake_for_all).
  *
  * The clock is a system call where the kernel itself is a process, and there the pace counts: so at
  * lock step the time of the last interrupt is near enough for a guard time. */

@@ -2,18 +2,18 @@
 /*
  * local_bus: what a process and hodograph-hub say to each other (docs/reference/virtual-time.md).
  *
- * A connection is a UNIX socket of type SOCK_SEQPACKET to the path of a bus; a message is one packet, in the byte order of
- * the machine. There are two kinds of connection:
+ * A connection is a UNIX socket of type SOCK_SEQPACKET to the path of a bus; a message is one packet, in the byte order
+ * of the machine. There are two kinds of connection:
  *
  *   member       sends and receives the frames of one bus. It sends struct can_frame of linux/can.h, and receives
  *                one to LOCAL_BUS_PACKET struct local_bus_frame in a packet: one in real time, in virtual time what its
  *                participant finds when it wakes. It may set filters at any time.
  *   participant  takes part in virtual time. One for each thread of control of a simulation.
  *
- * The first message on a connection is a hello, and the hub answers it with a welcome. In real time the hub passes frames on as
- * they come, and there are no participants. In virtual time the hub owns the clock: a participant computes in zero time
- * from a grant to its next wait; time goes on when all of them wait. They get their grants one after the other, so what they do is a
- * sequence that depends on their inputs alone.
+ * The first message on a connection is a hello, and the hub answers it with a welcome. In real time the hub passes
+ * frames on as they come, and there are no participants. In virtual time the hub owns the clock: a participant computes
+ * in zero time from a grant to its next wait; time goes on when all of them wait. They get their grants one after the
+ * other, so what they do is a sequence that depends on their inputs alone.
  */
 #ifndef PORT_LINUX_LOCAL_BUS_H
 #define PORT_LINUX_LOCAL_BUS_H
@@ -46,11 +46,11 @@ enum local_bus_kind {
     LOCAL_BUS_HELLO_MEMBER = 1,      /* number: the participant that its frames wake, 0: none */
     LOCAL_BUS_HELLO_PARTICIPANT = 2, /* name; flags: WATCHES */
     LOCAL_BUS_FILTER = 3,            /* of a member: frames that it wants (local_bus_filters) */
-    LOCAL_BUS_DEFER =
-        4, /* of a member: frames that do not wake its participant, unless it waits for ALL */
-    LOCAL_BUS_TRACK =
-        8, /* of a member: frames of its own that come back to it when their last bit is sent, in virtual
-                          * time; they do not wake its participant */
+    /* of a member: frames that do not wake its participant, unless it waits for ALL */
+    LOCAL_BUS_DEFER = 4,
+    /* of a member: frames of its own that come back to it when their last bit is sent, in virtual * time; they do not
+     * wake its participant */
+    LOCAL_BUS_TRACK = 8,
     LOCAL_BUS_WAIT = 5,     /* number: of the last grant; flags: SENT, ALL; time_ns: when to wake
                                   * it, or before it with a frame */
     LOCAL_BUS_SUSPEND = 6,  /* name: it gets no more grants, as if its processor stood still */

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 /* Once, before the functions port_store_... are called. `file` NULL: memory that ends with the process. Returns 0, or
- * PORT_ERR_SYSTEM, and one line on stderr has the reason: the file cannot be opened or has another size, or another controller
- * uses it. */
+ * PORT_ERR_SYSTEM, and one line on stderr has the reason: the file cannot be opened or has another size, or another
+ * controller uses it. */
 int store_open(const char *file);
 
 /* Once, before port_stream_memory is called: the bytes of the ring of streamed jobs, at most STORE_RING_MAX. */

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * exchange: what the emulated board and the bridge (sim/gateway) say to each other on the two FIFOs, in turns: a request of
- * the board, a reply of the bridge. Little-endian, as both are; a message is one write of at most 4096 bytes, which a pipe takes as a whole.
+ * exchange: what the emulated board and the bridge (sim/gateway) say to each other on the two FIFOs, in turns: a
+ * request of the board, a reply of the bridge. Little-endian, as both are; a message is one write of at most 4096
+ * bytes, which a pipe takes as a whole.
  *
  * docs/guides/target.md has the order of things.
  */
@@ -26,10 +27,10 @@ struct exchange_frame {
 
 enum exchange_request_flag {
     EXCHANGE_TICK = 1, /* the first request after a tick; it has the tick's frames */
-    EXCHANGE_AWAIT =
-        2, /* answers are awaited: the reply may come before the next tick is due, with frames */
-    EXCHANGE_HURRY =
-        4, /* with TICK: the next tick may come before its time, once nothing is awaited */
+    /* answers are awaited: the reply may come before the next tick is due, with frames */
+    EXCHANGE_AWAIT = 2,
+    /* with TICK: the next tick may come before its time, once nothing is awaited */
+    EXCHANGE_HURRY = 4,
     EXCHANGE_READY = 8,   /* nothing is awaited any more */
     EXCHANGE_FILTER = 16, /* the records are filters: id, and the mask in data[0] and data[1] */
     EXCHANGE_END = 32,    /* the last request */
@@ -46,8 +47,8 @@ struct exchange_header {
     uint16_t count;     /* frames that follow */
     uint16_t flags;     /* exchange_request_flag or exchange_reply_flag */
     uint32_t period_us; /* request: up to the next tick */
-    uint32_t
-        guard_us; /* request, with TICK and AWAIT: the next tick is due after this time at the latest */
+    /* request, with TICK and AWAIT: the next tick is due after this time at the latest */
+    uint32_t guard_us;
     uint32_t late_ns; /* reply, with DUE: how late it is */
 };
 

@@ -38,8 +38,8 @@ struct link {
     /* port_can_delivered(): in a tick. */
     bool (*delivered)(void);
 
-    /* In the tick's interrupt, after the tick. `request` changes when a frame that was received ends the waiting. Returns
-     * how late the next tick will be, in ns. */
+    /* In the tick's interrupt, after the tick. `request` changes when a frame that was received ends the waiting.
+     * Returns how late the next tick will be, in ns. */
     uint32_t (*after_tick)(const struct link_request *request);
 
     /* What was sent last leaves. Main loop, with the tick ended. */

@@ -2,8 +2,8 @@
 /*
  * uart: UART 0 of the board (Arm's CMSDK UART), both ways by interrupt.
  *
- * Its transmitter's interrupt takes characters from a ring, so that whoever sends does not wait. Flow is controlled by the other end: the
- * emulator gives a character when the last one has been read.
+ * Its transmitter's interrupt takes characters from a ring, so that whoever sends does not wait. Flow is controlled by
+ * the other end: the emulator gives a character when the last one has been read.
  */
 #ifndef PORT_MPS2_UART_H
 #define PORT_MPS2_UART_H

@@ -3,9 +3,9 @@
  * reg: how this port reaches the registers and memories of the chip; nothing else does.
  *
  * On the chip each access is one load or store. On any other machine the tests stand in for the chip: they define
- * reg_read, reg_write and reg_memory as a model of the peripherals (tests/unit/stm32g4_*.c). The reg_*.h headers hold what
- * this port uses of reference manual RM0440, named PERIPHERAL_REGISTER_FIELD; tools/check_registers.py compares them with
- * an independent table.
+ * reg_read, reg_write and reg_memory as a model of the peripherals (tests/unit/stm32g4_*.c). The reg_*.h headers hold
+ * what this port uses of reference manual RM0440, named PERIPHERAL_REGISTER_FIELD; tools/check_registers.py compares
+ * them with an independent table.
  */
 #ifndef PORT_STM32G4_REG_H
 #define PORT_STM32G4_REG_H

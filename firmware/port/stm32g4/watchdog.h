@@ -4,8 +4,8 @@
  * Cannot be stopped.
  *
  * It is fed from the main loop, in each round and at each step of longer work (port_progress), and only when ticks have
- * gone on since the last time: so it bites when either of them stands still. The drives detect missing frames of the controller much
- * sooner, by missing SYNCs and heartbeats; this is for the way back.
+ * gone on since the last time: so it bites when either of them stands still. The drives detect missing frames of the
+ * controller much sooner, by missing SYNCs and heartbeats; this is for the way back.
  */
 #ifndef PORT_STM32G4_WATCHDOG_H
 #define PORT_STM32G4_WATCHDOG_H
