@@ -184,7 +184,7 @@ bool command_urgent_request(const struct can_msg *frame, uint8_t node)
 {
     static const uint8_t request[4] = {0x2F, 0x01, 0x20, 0x00};
     static const uint8_t rest[3] = {0};
-    return frame->id == COB_SDO_ASK + node && frame->len == CAN_DATA_MAX &&
+    return frame->id == COB_SDO_REQUEST + node && frame->len == CAN_DATA_MAX &&
            memcmp(frame->data, request, sizeof request) == 0 && command_is_urgent(frame->data[4]) &&
            memcmp(frame->data + 5, rest, sizeof rest) == 0;
 }

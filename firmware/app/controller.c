@@ -205,9 +205,9 @@ static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 int controller_start(struct controller *controller)
 {
     const struct can_match filters[] = {
-        {COB_NMT, CAN_ID_MAX},    {COB_EMCY, 0x780u},
-        {COB_TPDO1, 0x780u},      {COB_TPDO3, 0x780u},
-        {COB_SDO_ANSWER, 0x780u}, {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},
+        {COB_NMT, CAN_ID_MAX},      {COB_EMCY, 0x780u},
+        {COB_TPDO1, 0x780u},        {COB_TPDO3, 0x780u},
+        {COB_SDO_RESPONSE, 0x780u}, {(uint16_t)(COB_SDO_REQUEST + controller->node), CAN_ID_MAX},
         {COB_HEARTBEAT, 0x780u},
     };
     const struct port_handlers handlers = {
@@ -331,12 +331,12 @@ static void note_properties(struct controller *controller, const struct can_msg 
     port_unlock();
 }
 
-static void note_silence(struct controller *controller)
+static void note_missing_heartbeats(struct controller *controller)
 {
     port_lock();
     const uint8_t node = controller->machine.unresponsive_node;
     port_unlock();
-    drive_boot_silent(&controller->boot, node);
+    drive_boot_unresponsive(&controller->boot, node);
 }
 
 static void poll_boot(struct controller *controller, uint32_t elapsed_us)
@@ -362,7 +362,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
         }
         port_unlock();
     }
-    note_silence(controller);
+    note_missing_heartbeats(controller);
 }
 
 static void poll_homing(struct controller *controller, uint32_t elapsed_us)

@@ -173,7 +173,7 @@ static void open_job(struct stream *stream, struct stream_chunk *first, const st
 }
 
 /* Time of the job at the start of a chunk behind the newest one. */
-static uint64_t job_time_behind_q32_s(const struct stream_chunk *newest, const struct chunk *chunk)
+static uint64_t job_time_after_q32_s(const struct stream_chunk *newest, const struct chunk *chunk)
 {
     if (!chunk_begins_at_rest(chunk)) {
         return newest->job_time_q32_s + chunk->time_shift_q32_s;
@@ -189,7 +189,7 @@ static void accept(struct stream *stream, struct stream_chunk *chunk, const stru
     if (opens_a_job(stream, &chunk->chunk)) {
         open_job(stream, chunk, config);
     } else {
-        chunk->job_time_q32_s = job_time_behind_q32_s(stream->newest, &chunk->chunk);
+        chunk->job_time_q32_s = job_time_after_q32_s(stream->newest, &chunk->chunk);
         stream->newest->next = chunk;
     }
     chunk->joint_time_q32_s =
@@ -257,8 +257,8 @@ void stream_started(struct stream *stream)
 /* ---- A round ---- */
 
 /* The chunk behind a rest, where the motion rests; NULL: none. */
-static const struct chunk *chunk_behind_rest(const struct stream *stream,
-                                             const struct machine *machine)
+static const struct chunk *chunk_after_rest(const struct stream *stream,
+                                            const struct machine *machine)
 {
     const struct stream_chunk *next = stream->executed->next;
     return next != NULL && chunk_begins_at_rest(&next->chunk) && machine_waits_for_chunk(machine)
@@ -268,7 +268,7 @@ static const struct chunk *chunk_behind_rest(const struct stream *stream,
 
 static enum stream_state state_on_path(const struct stream *stream, const struct machine *machine)
 {
-    const struct chunk *next = chunk_behind_rest(stream, machine);
+    const struct chunk *next = chunk_after_rest(stream, machine);
     if (next == NULL) {
         return machine_waits_for_chunk(machine) ? STREAM_UNDERRUN : STREAM_OPEN;
     }
@@ -307,7 +307,7 @@ static void note_state(struct stream *stream, const struct machine *machine)
 /* Holds the path before a chunk with a program stop, once. */
 static void stop_before_next(struct stream *stream, struct machine *machine)
 {
-    const struct chunk *next = chunk_behind_rest(stream, machine);
+    const struct chunk *next = chunk_after_rest(stream, machine);
     const uint32_t wanted = CHUNK_REST_STOP | (stream->optional_stop ? CHUNK_REST_OPTIONAL : 0u);
     if (next != NULL && (next->rest_flags & wanted) != 0u &&
         stream->stopped_for != next->sequence && machine->state == MACHINE_RUNNING) {

@@ -40,7 +40,7 @@ enum heartbeat_presence {
 /* Watches one node. */
 struct heartbeat_consumer {
     uint32_t time_us; /* of 0x1016; 0: not monitored, though states are still followed */
-    uint32_t silence_us;
+    uint32_t waited_us;
     enum heartbeat_presence presence;
     enum nmt_state state; /* last one received */
     uint8_t node;

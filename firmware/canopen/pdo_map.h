@@ -92,7 +92,7 @@ bool pdo_map_overdue(struct pdo_map *map, uint32_t elapsed_us);
 
 /* Stops the deadline until the next frame; the counting of SYNCs and the comparison with what was
  * sent begin anew (on leaving or entering OPERATIONAL). */
-void pdo_map_rest(struct pdo_map *map);
+void pdo_map_restart(struct pdo_map *map);
 
 /* Sent PDOs, at SYNC, fields up to date: returns true when *out is to be sent. */
 bool pdo_map_sync(struct pdo_map *map, struct can_msg *out);

@@ -42,7 +42,7 @@ struct sdo_client {
     uint32_t abort_code; /* of REFUSED and FAILED */
     uint32_t size;       /* bytes of the value; read: known when DONE */
     uint32_t timeout_us; /* for each answer */
-    uint32_t silence_us;
+    uint32_t waited_us;
     const uint8_t *source; /* write */
     uint8_t *target;       /* read */
     uint32_t capacity;

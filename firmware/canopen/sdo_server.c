@@ -30,17 +30,17 @@ enum client_command {
 #define LAST_IN_BLOCK 0x80u
 
 /* First bytes of the client: bits within a command. Those of a subcommand are 0 where a block transfer is initiated. */
-#define ASK_EXPEDITED             0x02u
-#define ASK_SIZE_GIVEN            0x01u
-#define EXPEDITED_BYTE            0x2Fu /* initiate download: expedited, one byte */
-#define CRC_SUPPORTED             0x04u
-#define ASK_BLOCK_SIZE_GIVEN      0x02u
-#define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
-#define ASK_DOWNLOAD_END          0x01u
-#define BLOCK_UPLOAD_SUBCOMMAND   0x03u
-#define ASK_UPLOAD_END            0x01u
-#define ASK_UPLOAD_ACKNOWLEDGE    0x02u
-#define ASK_UPLOAD_START          0x03u
+#define REQUEST_EXPEDITED          0x02u
+#define REQUEST_SIZE_GIVEN         0x01u
+#define EXPEDITED_BYTE             0x2Fu /* initiate download: expedited, one byte */
+#define CRC_SUPPORTED              0x04u
+#define REQUEST_BLOCK_SIZE_GIVEN   0x02u
+#define BLOCK_DOWNLOAD_SUBCOMMAND  0x01u
+#define REQUEST_DOWNLOAD_END       0x01u
+#define BLOCK_UPLOAD_SUBCOMMAND    0x03u
+#define REQUEST_UPLOAD_END         0x01u
+#define REQUEST_UPLOAD_ACKNOWLEDGE 0x02u
+#define REQUEST_UPLOAD_START       0x03u
 
 /* First bytes of the server. */
 #define ABORT_BYTE                0x80u
@@ -77,7 +77,7 @@ static uint32_t begin_read(struct sdo_server *s)
 
 static void frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
 {
-    cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);
+    cob_frame(out, COB_SDO_RESPONSE + s->node, SDO_BYTES);
     out->data[0] = command;
 }
 
@@ -107,7 +107,7 @@ static uint32_t download_expedited(struct sdo_server *s, const uint8_t *data)
     if (code != SDO_OK) {
         return code;
     }
-    if ((data[0] & ASK_SIZE_GIVEN) == 0) {
+    if ((data[0] & REQUEST_SIZE_GIVEN) == 0) {
         /* The client leaves it to the dictionary how many of the four bytes count. */
         size = s->object.entry->size > 0 && s->object.entry->size < EXPEDITED_BYTES
                    ? s->object.entry->size
@@ -119,13 +119,14 @@ static uint32_t download_expedited(struct sdo_server *s, const uint8_t *data)
 
 static bool download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
-    bool expedited = (data[0] & ASK_EXPEDITED) != 0;
+    bool expedited = (data[0] & REQUEST_EXPEDITED) != 0;
     uint32_t code;
 
     if (expedited) {
         code = download_expedited(s, data);
     } else {
-        code = begin_write(s, (data[0] & ASK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0);
+        code = begin_write(s, (data[0] & REQUEST_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4)
+                                                                  : 0);
     }
     if (code != SDO_OK) {
         return fail(s, code, out);
@@ -225,7 +226,7 @@ uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size)
 
 static bool block_download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
-    uint32_t size = (data[0] & ASK_BLOCK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0;
+    uint32_t size = (data[0] & REQUEST_BLOCK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0;
     uint32_t code = begin_write(s, size);
 
     if (code != SDO_OK) {
@@ -316,7 +317,7 @@ static bool block_download_late_segment(struct sdo_server *s, const uint8_t *dat
 static bool block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
     uint32_t unused = (data[0] >> 2) & 7u;
-    uint32_t code = (data[0] & ASK_DOWNLOAD_END) != 0 ? SDO_OK : SDO_ABORT_COMMAND;
+    uint32_t code = (data[0] & REQUEST_DOWNLOAD_END) != 0 ? SDO_OK : SDO_ABORT_COMMAND;
 
     if (code == SDO_OK) {
         code = release_held(s, SEGMENT_BYTES - unused);
@@ -432,16 +433,16 @@ static bool block_upload_command(struct sdo_server *s, const uint8_t *data, stru
 {
     uint8_t subcommand = data[0] & BLOCK_UPLOAD_SUBCOMMAND;
 
-    if (s->state == SDO_SERVER_BLOCK_UPLOAD_READY && subcommand == ASK_UPLOAD_START) {
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_READY && subcommand == REQUEST_UPLOAD_START) {
         s->state = SDO_SERVER_BLOCK_UPLOAD;
         return block_upload_send(s, out);
     }
     /* A client that sees a gap may answer before the block is complete. */
     if ((s->state == SDO_SERVER_BLOCK_UPLOAD_ACK || s->state == SDO_SERVER_BLOCK_UPLOAD) &&
-        subcommand == ASK_UPLOAD_ACKNOWLEDGE) {
+        subcommand == REQUEST_UPLOAD_ACKNOWLEDGE) {
         return block_upload_acknowledged(s, data, out);
     }
-    if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == ASK_UPLOAD_END) {
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == REQUEST_UPLOAD_END) {
         s->state = SDO_SERVER_IDLE;
         return false;
     }
@@ -469,7 +470,7 @@ void sdo_server_reset(struct sdo_server *server)
 
 bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
 {
-    return in->id == COB_SDO_ASK + server->node && in->len == SDO_BYTES;
+    return in->id == COB_SDO_REQUEST + server->node && in->len == SDO_BYTES;
 }
 
 /* Forgets a transfer under way and notes the object of the new one. */
@@ -550,7 +551,7 @@ static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
 
 /* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if
  * its bytes are those of a request.) */
-static bool is_strange(const struct sdo_server *s, const uint8_t *data)
+static bool is_foreign(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
     const bool doubled = sequence == s->sequence && sequence != 0u;
@@ -573,7 +574,7 @@ static bool begins_again(const struct sdo_server *s, const uint8_t *data)
 /* The same within a block, where a segment may look like it. */
 static bool restarts(const struct sdo_server *s, const uint8_t *data)
 {
-    return begins_again(s, data) && is_strange(s, data);
+    return begins_again(s, data) && is_foreign(s, data);
 }
 
 static bool refuse_other_client(const struct sdo_server *s, const uint8_t *data,
@@ -598,8 +599,8 @@ static const struct od_entry *urgent_entry(const struct sdo_server *s, const uin
 }
 
 /* Beside the transfer under way, which is not touched. */
-static bool write_beside(const struct sdo_server *s, const struct od_entry *entry,
-                         const uint8_t *data, struct can_msg *out)
+static bool write_meanwhile(const struct sdo_server *s, const struct od_entry *entry,
+                            const uint8_t *data, struct can_msg *out)
 {
     const uint32_t code = od_write(s->object.od, entry, data + 4, 1);
     frame(s, code == SDO_OK ? DOWNLOADED_BYTE : ABORT_BYTE, out);
@@ -616,7 +617,7 @@ static bool from_other_client(const struct sdo_server *s, const uint8_t *data)
     if (data[0] == ABORT_BYTE) {
         return false;
     }
-    return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_strange(s, data) : is_initiate(data);
+    return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_foreign(s, data) : is_initiate(data);
 }
 
 /* Another client that gives up its own transfer does not end this one. */
@@ -637,12 +638,12 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     const struct od_entry *urgent =
         server->state == SDO_SERVER_IDLE ? NULL : urgent_entry(server, in->data);
     if (urgent != NULL) {
-        return write_beside(server, urgent, in->data, out);
+        return write_meanwhile(server, urgent, in->data, out);
     }
     if (from_other_client(server, in->data)) {
         return refuse_other_client(server, in->data, out);
     }
-    server->silence_us = 0;
+    server->waited_us = 0;
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
     if (in->data[0] == ABORT_BYTE) {
         take_abort(server, in->data);
@@ -666,7 +667,7 @@ static bool acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
     const bool begun = s->sequence != 0 || (s->received != 0 && !s->acknowledged_early);
 
-    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->silence_us < s->timeout_us / 2) {
+    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->waited_us < s->timeout_us / 2) {
         return false;
     }
     s->acknowledged_early = true;
@@ -679,12 +680,12 @@ bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct c
         return false;
     }
     if (server->state == SDO_SERVER_BLOCK_UPLOAD) {
-        server->silence_us = 0; /* it is the server that talks */
+        server->waited_us = 0; /* it is the server that talks */
         return block_upload_send(server, out);
     }
-    server->silence_us =
-        elapsed_us > UINT32_MAX - server->silence_us ? UINT32_MAX : server->silence_us + elapsed_us;
-    if (server->silence_us >= server->timeout_us) {
+    server->waited_us =
+        elapsed_us > UINT32_MAX - server->waited_us ? UINT32_MAX : server->waited_us + elapsed_us;
+    if (server->waited_us >= server->timeout_us) {
         return fail(server, SDO_ABORT_TIMEOUT, out);
     }
     return acknowledge_early(server, out);

@@ -57,7 +57,7 @@ struct sdo_server {
     struct od_transfer object; /* of the transfer under way */
     enum sdo_server_state state;
     uint32_t timeout_us;
-    uint32_t silence_us;  /* since the last frame of this transfer */
+    uint32_t waited_us;   /* since the last frame of this transfer */
     uint32_t block_start; /* block upload: offset of the present block's first segment */
     uint16_t index;       /* of the transfer, for abort frames */
     uint16_t crc;

@@ -7,14 +7,14 @@
 
 #define STEPS 16 /* of a brake, about */
 /* of a brake, until the remaining states must be within the limits as a whole */
-#define MOST_STEPS      160
-#define MOST_HALVINGS   3     /* of a step */
-#define MOST_PARTS      14    /* of a piece at a time */
-#define MOST_LOOKS      3000  /* at a stretch of a brake, for a piece and kind, */
-#define LOOKS_PER_S     30000 /* and more for a long piece */
-#define LOW_RATES       4     /* halvings of the rate of the lowest level, each by itself */
-#define PIECE_SLACK_Q40 ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
-#define Q40_BITS        62
+#define MOST_STEPS        160
+#define MOST_HALVINGS     3     /* of a step */
+#define MOST_PARTS        14    /* of a piece at a time */
+#define MOST_EVALUATIONS  3000  /* at a stretch of a brake, for a piece and kind, */
+#define EVALUATIONS_PER_S 30000 /* and more for a long piece */
+#define LOW_RATES         4     /* halvings of the rate of the lowest level, each by itself */
+#define PIECE_SLACK_Q40   ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
+#define Q40_BITS          62
 
 static const struct real zero = {0, 0};
 
@@ -159,7 +159,7 @@ static int keeps_on(const struct brake_check *check, const struct path_stretch *
 
 static void path_of(struct brake_check *check, const struct states *at, struct path_stretch *path)
 {
-    check->looks++;
+    check->evaluations++;
     path_bounds_of(&check->bounds, check->hint, at->low_q40_mm, at->high_q40_mm, path);
 }
 
@@ -307,7 +307,7 @@ static int none_releases(const struct flow *flow, const struct states *swept)
 }
 
 /* By how much an acceleration may be above that of the onset, in the tick without jerk before the release phase. */
-static struct real still_tick(const struct flow *flow, const struct states *swept)
+static struct real jerkless_tick(const struct flow *flow, const struct states *swept)
 {
     return none_releases(flow, swept) != 0 ? zero : real_mul(flow->own->down, flow->period_s);
 }
@@ -337,7 +337,7 @@ static void flow_step(struct flow *flow, struct real step_s, struct states *swep
     swept->a.low =
         real_max(onset_low(flow, later_s), release(flow->own->up, real_root(swept->v.high)));
     swept->a.low = real_max(swept->a.low, flow->least);
-    swept->a.high = real_max(real_add(onset_high(flow, flow->time_s), still_tick(flow, swept)),
+    swept->a.high = real_max(real_add(onset_high(flow, flow->time_s), jerkless_tick(flow, swept)),
                              release(flow->slow, real_root(swept->v.low)));
     at->a.low = swept->a.low;
     flow->lowest = real_min(flow->lowest, swept->a.low);
@@ -412,7 +412,7 @@ static struct real greatest_speed(const struct flow *flow)
 }
 
 /* All that is left of the brakes at once. */
-static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
+static int remainder_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
 {
     struct states left = flow->at;
     struct path_stretch path;
@@ -444,7 +444,7 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
     if (to_rest(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
         return 0;
     }
-    if (rest_keeps(check, &flow, distance_q40) != 0) {
+    if (remainder_keeps(check, &flow, distance_q40) != 0) {
         return 1;
     }
     if (flow.slow.m == 0) {
@@ -471,7 +471,7 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
         if (real_less(flow.at.v.high, real_mul(tried, real_make(3, -2))) != 0) {
             tried = flow.at.v.high;
             kept = to_rest(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
-                   rest_keeps(check, &flow, distance_q40) != 0;
+                   remainder_keeps(check, &flow, distance_q40) != 0;
         }
     }
     return kept;
@@ -588,7 +588,7 @@ static int parts_keep(struct brake_check *check, const struct stops *stops,
         program_limits_attend(check->limits);
         if (brakes_keep(check, stops->own, &stops->numbers, &from) != 0) {
             count--;
-        } else if (count == MOST_PARTS || check->looks > check->most_looks) {
+        } else if (count == MOST_PARTS || check->evaluations > check->most_evaluations) {
             return 0;
         } else {
             split(poly, &from, &stops->numbers, last, last + 1);
@@ -649,7 +649,7 @@ void brake_check_begin(struct brake_check *check, const struct program *p,
     check->any = path_motion_limits(&check->limit, limits, p->header.axis_count);
     check->period_s = real_div(real_make((int64_t)p->header.period_us, 0), real_make(1000000, 0));
     check->hint = 0;
-    check->looks = 0;
+    check->evaluations = 0;
 }
 
 int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_stop_kind kind,
@@ -659,12 +659,13 @@ int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_st
     const int fault = kind == PROGRAM_STOP_FAULT;
     struct feed_polynomial poly;
     struct stops stops = {.own = stop, .poly = &poly};
-    check->looks = 0;
+    check->evaluations = 0;
     if (check->any == 0 || stop->deceleration == 0u) {
         return 1;
     }
     path_motion_read_piece(&poly, p, piece);
-    check->most_looks = MOST_LOOKS + (uint32_t)(piece_ms(p, piece) * LOOKS_PER_S / 1000u);
+    check->most_evaluations =
+        MOST_EVALUATIONS + (uint32_t)(piece_ms(p, piece) * EVALUATIONS_PER_S / 1000u);
     while (check->hint > 0u && program_segment_start(p, check->hint) > poly.start_q40_mm) {
         check->hint--;
     }

@@ -20,16 +20,16 @@
 #include "core/program.h"
 #include "core/program_rules.h"
 
-/* Contents private, but for `looks`. */
+/* Contents private, but for `evaluations`. */
 struct brake_check {
     struct path_bounds bounds;
     struct motion limit;
     const struct program_limits *limits;
     struct real period_s;
-    int any;             /* 1: an axis has a limit */
-    uint32_t hint;       /* segment at the begin of the piece */
-    uint32_t looks;      /* at a stretch of a brake, for the piece of the last call, */
-    uint32_t most_looks; /* and until it is refused */
+    int any;                   /* 1: an axis has a limit */
+    uint32_t hint;             /* segment at the begin of the piece */
+    uint32_t evaluations;      /* at a stretch of a brake, for the piece of the last call, */
+    uint32_t most_evaluations; /* and until it is refused */
 };
 
 /* For a program that keeps the other rules of program_check. */

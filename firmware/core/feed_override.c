@@ -120,7 +120,7 @@ static void read_numbers(struct feed_override *f)
 }
 
 /* A brake under way keeps the time that it had. */
-static void ask(struct feed_override *f, enum program_stop_kind kind)
+static void request_stop(struct feed_override *f, enum program_stop_kind kind)
 {
     const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
     f->kind = (uint32_t)kind;
@@ -132,7 +132,7 @@ void feed_override_hold(struct feed_override *f)
 {
     if (f->state == FEED_RUNNING || f->state == STATE_WAITING) {
         set_state(f, rests(f) ? FEED_HELD : FEED_HOLDING);
-        ask(f, PROGRAM_STOP_HOLD);
+        request_stop(f, PROGRAM_STOP_HOLD);
     }
 }
 
@@ -164,7 +164,7 @@ void feed_override_stop(struct feed_override *f)
         return;
     }
     if (f->state == FEED_RUNNING) {
-        ask(f, PROGRAM_STOP_HOLD);
+        request_stop(f, PROGRAM_STOP_HOLD);
     }
     set_state(f, FEED_STOPPING);
 }
@@ -178,7 +178,7 @@ void feed_override_fault_stop(struct feed_override *f)
         set_state(f, FEED_STOPPED);
         return;
     }
-    ask(f, PROGRAM_STOP_FAULT);
+    request_stop(f, PROGRAM_STOP_FAULT);
     f->replace = f->phase == PHASE_BRAKE ? 1u : 0u;
     set_state(f, FEED_STOPPING);
 }
@@ -319,7 +319,7 @@ static void wait_slowly(struct feed_override *f)
     if (f->plan.now.override_q57 < OVERRIDE_ONE / 2) {
         override_plan_hold(&f->plan);
     } else {
-        override_plan_rise_no_more(&f->plan);
+        override_plan_end_rise(&f->plan);
     }
 }
 
@@ -375,7 +375,7 @@ static void replace_brake(struct feed_override *f)
 }
 
 /* On from the place of rest when that is known, and wanted. */
-static void look_for_place(struct feed_override *f, const struct interpolator *it)
+static void search_place(struct feed_override *f, const struct interpolator *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
         if (interpolator_search_step(it, &f->place)) {
@@ -400,7 +400,7 @@ int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
         }
         return brake_tick(f, it);
     }
-    look_for_place(f, it);
+    search_place(f, it);
     return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERPOLATOR_OK;
 }
 
@@ -569,7 +569,7 @@ int feed_override_use(struct feed_override *f, struct interpolator *it,
         coefficients_window_segment(window, it->segment->number) == NULL) {
         return 0;
     }
-    override_plan_let_go(&f->plan);
+    override_plan_forget_records(&f->plan);
     f->clock.record = record;
     f->place.piece = record;
     interpolator_use(it, window);
@@ -624,5 +624,5 @@ uint32_t feed_override_actual_q30(const struct feed_override *f)
 int feed_override_saturated(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN &&
-           (f->plan.saturated != 0 || f->plan.asked_q57 > f->plan.most_q57);
+           (f->plan.saturated != 0 || f->plan.requested_q57 > f->plan.most_q57);
 }

@@ -137,8 +137,8 @@ void feed_override_fault_stop(struct feed_override *f);
 /* --- Tick --- */
 
 /* The next setpoint; *it is an interpolator of the same program that nobody else moves. After the end, or at rest, the
- * same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time, tick context.
- * */
+ * same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time, tick
+ * context. */
 int feed_override_next(struct feed_override *f, struct interpolator *it,
                        struct interpolator_point *out);
 

@@ -40,8 +40,8 @@ struct interpolator_point {
 };
 
 /* The positions of the axes after y, for the next function. */
-void interpolator_point_copy_rest(struct interpolator_point *out,
-                                  const struct interpolator_point *from, uint32_t axis_count);
+void interpolator_point_copy_others(struct interpolator_point *out,
+                                    const struct interpolator_point *from, uint32_t axis_count);
 
 /* Copies a point of a program with so many path axes. */
 static inline void interpolator_point_copy(struct interpolator_point *out,
@@ -54,7 +54,7 @@ static inline void interpolator_point_copy(struct interpolator_point *out,
         out->position_q40[axis] = from->position_q40[axis];
     }
     if (axis_count > PROGRAM_PLANE) {
-        interpolator_point_copy_rest(out, from, axis_count);
+        interpolator_point_copy_others(out, from, axis_count);
     }
 }
 

@@ -160,9 +160,9 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
 /* Where an arc length is on its segment. */
 struct place {
     int32_t z_q31;
-    int64_t rest_q48_mm;    /* the remainder of the arc length there, */
-    int32_t rest_q44_mm;    /* and the same in a word */
-    int32_t reciprocal_q15; /* 1 / (sigma / 2) nearby, normalised */
+    int64_t remainder_q48_mm; /* the remainder of the arc length there, */
+    int32_t remainder_q44_mm; /* and the same in a word */
+    int32_t reciprocal_q15;   /* 1 / (sigma / 2) nearby, normalised */
 };
 
 KERNEL_INLINE struct place find(const struct kernel_fixed_arc *k, int64_t arc_length_q40_mm)
@@ -177,15 +177,15 @@ KERNEL_INLINE struct place find(const struct kernel_fixed_arc *k, int64_t arc_le
         z = newton_step(k, s_q30, z, place.reciprocal_q15);
     }
     place.z_q31 = z;
-    place.rest_q48_mm = s_q48 - horner(k->c_q48_mm, z);
-    place.rest_q44_mm = qmath_clamp32(place.rest_q48_mm >> 4);
+    place.remainder_q48_mm = s_q48 - horner(k->c_q48_mm, z);
+    place.remainder_q44_mm = qmath_clamp32(place.remainder_q48_mm >> 4);
     return place;
 }
 
 KERNEL_INLINE int64_t coordinate_q40(const struct kernel_fixed_axis *k, const struct place *place,
                                      int32_t tangent_q25)
 {
-    int64_t along = qmath_product(place->rest_q44_mm, tangent_q25) >> 21;
+    int64_t along = qmath_product(place->remainder_q44_mm, tangent_q25) >> 21;
     int64_t local = horner(k->c_q48_mm, place->z_q31) + along;
     return k->origin_q40_mm + qmath_round(local, 8);
 }
@@ -237,10 +237,10 @@ static void tangent_in_space(const struct kernel_fixed_space *k, int32_t z, int3
 }
 
 /* How far the rest of the arc length is in z. */
-static int32_t rest_in_z_q44(const struct kernel_fixed_arc *k, const struct place *place)
+static int32_t remainder_in_z_q44(const struct kernel_fixed_arc *k, const struct place *place)
 {
-    int32_t rest_q44 = qmath_clamp32(qmath_shift(place->rest_q48_mm, -4 - k->exponent));
-    return qmath_clamp32(qmath_product(rest_q44, place->reciprocal_q15) >> 15);
+    int32_t remainder_q44 = qmath_clamp32(qmath_shift(place->remainder_q48_mm, -4 - k->exponent));
+    return qmath_clamp32(qmath_product(remainder_q44, place->reciprocal_q15) >> 15);
 }
 
 /* Not in the line of a tick without extra axes. */
@@ -262,7 +262,7 @@ void kernel_fixed_space_at(const void *segment, int64_t position_q40[], int64_t 
         position_q40[axis] = coordinate_q40(&k->axes[axis], &place, tangent_q25[axis]);
     }
     if (k->extras != 0) {
-        extras_at(k, position_q40, place.z_q31, rest_in_z_q44(&k->arc, &place));
+        extras_at(k, position_q40, place.z_q31, remainder_in_z_q44(&k->arc, &place));
     }
 }
 

@@ -47,8 +47,8 @@ static void set_inverses(struct kernel_float_arc *k)
     }
 }
 
-/* By how much polynomials in q48 are shifted down: what the sums of all powers but the linear one need beyond 31 bits.
- * */
+/* By how much polynomials in q48 are shifted down: what the sums of all powers but the linear one need beyond 31
+ * bits. */
 static int shift_of(const struct ph_segment *ph)
 {
     int64_t most = (int64_t)1 << 31; /* the linear one leaves less than that */
@@ -80,7 +80,7 @@ static void kernel_float_set_arc(struct kernel_float_arc *k, const struct ph_seg
     k->shift = 18 + n;
     set_polynomial(&k->p, ph->c_q48_mm[PH_S], shift);
     k->middle_q40_mm = ph->origin_q40_mm[PH_S] + (ph->c_q48_mm[PH_S][0] >> 8);
-    k->middle_rest_q48 = (int32_t)(ph->c_q48_mm[PH_S][0] & 255);
+    k->middle_remainder_q48 = (int32_t)(ph->c_q48_mm[PH_S][0] & 255);
     for (int i = 0; i < 6; i++) {
         k->s[i] = from_q30(qmath_shift(ph->c_q48_mm[PH_S][i], -18 - n));
     }
@@ -177,19 +177,19 @@ static void move_along(const struct kernel_float_segment *k, float z, float rest
 /* Where an arc length is on its segment. */
 struct place {
     float z;
-    int32_t z_q31;    /* the same, rounded */
-    int32_t rest_q44; /* the remainder of the arc length there */
+    int32_t z_q31;         /* the same, rounded */
+    int32_t remainder_q44; /* the remainder of the arc length there */
 };
 
 KERNEL_INLINE struct place find(const struct kernel_float_arc *k, int64_t arc_length_q40_mm)
 {
     struct place place;
-    int64_t s_q48 = (arc_length_q40_mm - k->middle_q40_mm) * 256 - k->middle_rest_q48;
+    int64_t s_q48 = (arc_length_q40_mm - k->middle_q40_mm) * 256 - k->middle_remainder_q48;
     float s = from_q30(k->shift > 0 ? s_q48 >> k->shift
                                     : qmath_clamp32(s_q48 * ((int64_t)1 << -k->shift)));
     place.z = newton_step(k->s, s, first_guess(k, s));
     place.z_q31 = quantise(place.z);
-    place.rest_q44 = qmath_clamp32((s_q48 - polynomial(&k->p, k->scale, place.z_q31)) >> 4);
+    place.remainder_q44 = qmath_clamp32((s_q48 - polynomial(&k->p, k->scale, place.z_q31)) >> 4);
     return place;
 }
 
@@ -206,7 +206,7 @@ void kernel_float_segment_at(const void *segment, int64_t position_q40[], int64_
     const struct kernel_float_segment *k = segment;
     const struct place place = find(&k->arc, arc_length_q40_mm);
     float move_q44[PROGRAM_PLANE];
-    move_along(k, place.z, (float)place.rest_q44, move_q44);
+    move_along(k, place.z, (float)place.remainder_q44, move_q44);
     for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
         position_q40[axis] =
             coordinate_q40(&k->axes[axis], k->arc.scale, place.z_q31, move_q44[axis]);
@@ -290,7 +290,7 @@ void kernel_float_space_at(const void *segment, int64_t position_q40[], int64_t 
     const struct kernel_float_space *k = segment;
     const struct place place = find(&k->arc, arc_length_q40_mm);
     float move_q44[PROGRAM_SPACE];
-    float scale = move_in_space(k, place.z, (float)place.rest_q44, move_q44);
+    float scale = move_in_space(k, place.z, (float)place.remainder_q44, move_q44);
     for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
         position_q40[axis] =
             coordinate_q40(&k->axes[axis], k->arc.scale, place.z_q31, move_q44[axis]);

@@ -33,10 +33,10 @@ struct kernel_float_inverse {
 
 /* Arc length and its inverse. */
 struct kernel_float_arc {
-    int64_t middle_q40_mm;   /* arc length at z = 0, rounded down, */
-    int32_t middle_rest_q48; /* the part below that rounding */
-    int32_t scale;           /* 2^(48 - q of the polynomials) */
-    int32_t shift;           /* arc length in q48 by this to q30 normalised */
+    int64_t middle_q40_mm;        /* arc length at z = 0, rounded down, */
+    int32_t middle_remainder_q48; /* the part below that rounding */
+    int32_t scale;                /* 2^(48 - q of the polynomials) */
+    int32_t shift;                /* arc length in q48 by this to q30 normalised */
     struct kernel_float_polynomial p;
     float s[6]; /* normalised arc length from the middle */
     struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];

@@ -37,7 +37,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
     memset(plan, 0, sizeof *plan);
     override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
     plan->guaranteed_q57 = override_of_factor(plan->guaranteed.factor_q14);
-    plan->asked_q57 = OVERRIDE_ONE;
+    plan->requested_q57 = OVERRIDE_ONE;
     plan->most_q57 = OVERRIDE_MOST;
     plan->commanded_q57 = OVERRIDE_ONE;
     come_to_rest(plan);
@@ -45,7 +45,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
 
 void override_plan_limit(struct override_plan *plan, int64_t most_q57)
 {
-    const int64_t counts_q57 = qmath_lesser(plan->asked_q57, most_q57);
+    const int64_t counts_q57 = qmath_lesser(plan->requested_q57, most_q57);
     plan->most_q57 = most_q57;
     if (plan->commanded_q57 != counts_q57) {
         plan->commanded_q57 = counts_q57;
@@ -73,7 +73,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->searched = NOWHERE;
 }
 
-void override_plan_let_go(struct override_plan *plan)
+void override_plan_forget_records(struct override_plan *plan)
 {
     if (plan->ahead.bounds != NULL) {
         plan->kept = *plan->ahead.bounds;
@@ -97,7 +97,7 @@ void override_plan_rest(struct override_plan *plan)
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
     const uint32_t used = percent < OVERRIDE_MOST_PERCENT ? percent : OVERRIDE_MOST_PERCENT;
-    plan->asked_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
+    plan->requested_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
     override_plan_limit(plan, plan->most_q57);
 }
 
@@ -113,7 +113,7 @@ void override_plan_release(struct override_plan *plan)
     plan->steady = 0;
 }
 
-void override_plan_rise_no_more(struct override_plan *plan)
+void override_plan_end_rise(struct override_plan *plan)
 {
     if (plan->ramp.step_q56 > 0) {
         override_ramp_cut(&plan->ramp);
@@ -158,12 +158,12 @@ static void begin_search(struct override_plan *plan, enum override_kind kind, in
     plan->kind = kind;
     plan->ends_q32_s = UINT64_MAX; /* until one is found that ends where the override may stay */
     plan->target_q57 = target_q57;
-    plan->step = OVERRIDE_LOOKS;
+    plan->step = OVERRIDE_EVALUATES;
     plan->window = 0;
 }
 
 /* The ramp back that was found before the override went up. */
-static void go_back(struct override_plan *plan)
+static void begin_return(struct override_plan *plan)
 {
     plan->ticks = plan->back;
     plan->kind = OVERRIDE_RETURN;
@@ -181,15 +181,15 @@ static void give_up(struct override_plan *plan)
         begin_search(plan, OVERRIDE_CLIMB, plan->wanted_q57);
     } else if (now_q57 > plan->guaranteed_q57) {
         if (plan->kind == OVERRIDE_RETURN || now_q57 > plan->wanted_q57 + OVERRIDE_SPARE) {
-            go_back(plan);
+            begin_return(plan);
         }
     } else if (now_q57 != plan->guaranteed_q57) {
         begin_search(plan, OVERRIDE_SETTLE, plan->guaranteed_q57);
     }
 }
 
-/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is it.
- * */
+/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is
+ * it. */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
@@ -210,7 +210,7 @@ static void check_factor(struct override_plan *plan)
         if (plan->kind == OVERRIDE_STAY) {
             give_up(plan);
         } else {
-            plan->step = OVERRIDE_LOOKS;
+            plan->step = OVERRIDE_EVALUATES;
         }
     }
 }
@@ -324,14 +324,14 @@ static void fit_above(struct override_plan *plan, const struct program_clock *cl
 
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
 {
-    if (plan->step == OVERRIDE_LOOKS) {
+    if (plan->step == OVERRIDE_EVALUATES) {
         look(plan, clock);
     } else if (plan->step == OVERRIDE_STAGES) {
         find_stage(plan);
     } else if (plan->step == OVERRIDE_MEASURES) {
         measure(plan, clock);
     } else {
-        plan->step = OVERRIDE_LOOKS;
+        plan->step = OVERRIDE_EVALUATES;
         if (plan->kind == OVERRIDE_STAY || plan->kind == OVERRIDE_CLIMB) {
             fit_above(plan, clock);
         } else if (fits(plan, clock)) {
@@ -395,7 +395,7 @@ static void tick_of_decision(struct override_plan *plan, const struct program_cl
 {
     if (plan->now.override_q57 > plan->guaranteed_q57 &&
         qmath_q32_of_q42(clock->time_q42_s) >= plan->return_q32_s) {
-        go_back(plan);
+        begin_return(plan);
     }
     if (plan->task == OVERRIDE_BEGINS) {
         const int64_t change_q57 = qmath_magnitude(plan->stage.end_q57 - plan->now.override_q57);

@@ -34,7 +34,7 @@ enum override_kind {
 
 /* The steps of a search, one in a tick. */
 enum override_search {
-    OVERRIDE_LOOKS, /* evaluates the next window of pieces: what it allows, and the levels of the change, */
+    OVERRIDE_EVALUATES, /* evaluates the next window of pieces: what it allows, and the levels of the change, */
     OVERRIDE_STAGES,   /* how far one ramp may go with that, */
     OVERRIDE_MEASURES, /* how long that ramp takes, */
     OVERRIDE_FITS,     /* and whether it ends inside the window */
@@ -53,8 +53,8 @@ struct override_plan {
     uint32_t started;   /* 0 until the first tick */
     uint32_t steady;    /* 1: at the commanded override, in which only a command changes anything */
     uint32_t held;      /* 1: the override goes to 0 */
-    int64_t asked_q57;  /* the commanded override, */
-    int64_t most_q57;   /* the largest value that counts, whatever is commanded, */
+    int64_t requested_q57; /* the commanded override, */
+    int64_t most_q57;      /* the largest value that counts, whatever is commanded, */
     int64_t commanded_q57;
     int64_t guaranteed_q57;             /* greatest override that all pieces allow, */
     struct program_override guaranteed; /* and their least bounds */
@@ -97,7 +97,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
                          uint64_t shift_q32_s);
 
 /* The records that the clock has had may go. */
-void override_plan_let_go(struct override_plan *plan);
+void override_plan_forget_records(struct override_plan *plan);
 
 /* The path came to rest otherwise: the override goes on from 0. */
 void override_plan_rest(struct override_plan *plan);
@@ -112,7 +112,7 @@ void override_plan_hold(struct override_plan *plan);
 void override_plan_release(struct override_plan *plan);
 
 /* Ends a rise of the override early: its slope falls to 0 as fast as it rose. */
-void override_plan_rise_no_more(struct override_plan *plan);
+void override_plan_end_rise(struct override_plan *plan);
 
 /* --- Tick --- */
 

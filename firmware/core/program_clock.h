@@ -21,8 +21,8 @@
 #include "core/qmath.h"
 
 /* 10^6 = 15625 * 2^6: periods in 2^-42 s are multiples of 1/15625. */
-#define PROGRAM_CLOCK_REST_UNIT 15625u
-#define PROGRAM_CLOCK_FINE_BITS 20
+#define PROGRAM_CLOCK_REMAINDER_UNIT 15625u
+#define PROGRAM_CLOCK_FINE_BITS      20
 /* Piece ends in a tick: docs/reference/protocol.md 1.3. */
 #define PROGRAM_CLOCK_MOST_ENDS 2u
 
@@ -31,10 +31,10 @@ struct program_clock {
     const struct program *program;
     uint64_t duration_q42_s;
     uint64_t time_q42_s;   /* of the last tick, rounded down; */
-    uint32_t rest;         /* what that leaves: in 1/15625 of 2^-42 s, by ticks at override 1, */
+    uint32_t remainder;    /* what that leaves: in 1/15625 of 2^-42 s, by ticks at override 1, */
     uint32_t fine;         /* and in 2^-62 s, by all others; each below 2^-42 s */
     uint64_t period_q42_s; /* rounded down */
-    uint32_t period_rest;
+    uint32_t period_remainder;
     uint32_t period_us;
     uint32_t period_log2;  /* of the period in ms */
     uint32_t period_q32_s; /* rounded up, for look-ahead */
@@ -73,15 +73,15 @@ uint64_t program_clock_step_q62_s(const struct program_clock *clock,
 static inline uint64_t program_clock_time_q42(const struct program_clock *clock)
 {
     if (clock->fine == 0) {
-        return clock->time_q42_s + (2u * clock->rest > PROGRAM_CLOCK_REST_UNIT ? 1u : 0u);
+        return clock->time_q42_s + (2u * clock->remainder > PROGRAM_CLOCK_REMAINDER_UNIT ? 1u : 0u);
     }
-    uint64_t rest = ((uint64_t)clock->rest << PROGRAM_CLOCK_FINE_BITS) +
-                    qmath_product_unsigned(clock->fine, PROGRAM_CLOCK_REST_UNIT);
-    uint64_t half = (uint64_t)PROGRAM_CLOCK_REST_UNIT << (PROGRAM_CLOCK_FINE_BITS - 1);
-    if (rest <= half) {
+    uint64_t remainder = ((uint64_t)clock->remainder << PROGRAM_CLOCK_FINE_BITS) +
+                         qmath_product_unsigned(clock->fine, PROGRAM_CLOCK_REMAINDER_UNIT);
+    uint64_t half = (uint64_t)PROGRAM_CLOCK_REMAINDER_UNIT << (PROGRAM_CLOCK_FINE_BITS - 1);
+    if (remainder <= half) {
         return clock->time_q42_s;
     }
-    return clock->time_q42_s + (rest > 3u * half ? 2u : 1u);
+    return clock->time_q42_s + (remainder > 3u * half ? 2u : 1u);
 }
 
 /* --- A tick: one of the two that advance, then program_clock_enter. --- */
@@ -102,13 +102,13 @@ static inline void program_clock_advance_even(struct program_clock *clock, int64
         return;
     }
     uint64_t time_q42_s = clock->time_q42_s + clock->period_q42_s;
-    uint32_t rest = clock->rest + clock->period_rest;
-    if (rest >= PROGRAM_CLOCK_REST_UNIT) {
-        rest -= PROGRAM_CLOCK_REST_UNIT;
+    uint32_t remainder = clock->remainder + clock->period_remainder;
+    if (remainder >= PROGRAM_CLOCK_REMAINDER_UNIT) {
+        remainder -= PROGRAM_CLOCK_REMAINDER_UNIT;
         time_q42_s++;
     }
     clock->time_q42_s = time_q42_s;
-    clock->rest = rest;
+    clock->remainder = remainder;
 }
 
 /* The time is not in the present piece, nor at the end of the program: goes to the piece that it is in, crossing `most`
@@ -132,7 +132,7 @@ static inline uint64_t program_clock_pass_end(struct program_clock *clock, uint6
 {
     if (time_q42_s >= clock->duration_q42_s) {
         clock->time_q42_s = clock->duration_q42_s;
-        clock->rest = 0;
+        clock->remainder = 0;
         clock->fine = 0;
         return clock->duration_q42_s;
     }

@@ -119,8 +119,8 @@ enum port_timing port_timing(void);
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical section.
- * */
+/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical
+ * section. */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
@@ -153,8 +153,8 @@ const uint8_t *port_store_data(unsigned bank);
  * Always the same. Main loop. */
 uint8_t *port_stream_memory(uint32_t *size);
 
-/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is streamed.
- * */
+/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is
+ * streamed. */
 uint8_t *port_cache_memory(uint32_t *size);
 
 /* --- Words for a human --- */

@@ -540,8 +540,8 @@ static void correct(struct solving *s, double target)
     }
 }
 
-/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes START_PRODUCT.
- * */
+/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes
+ * START_PRODUCT. */
 static void hard_start(struct side *one, double left)
 {
     const double least = fmax(LEAST_SLACK, START_SLACK * sqrt(dot(one->a, one->a)));

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* frame_bits: how long a frame of classic CAN is (ISO 11898-1; docs/reference/bus-time.md section 1). Pure functions.
- * */
+/* frame_bits: how long a frame of classic CAN is (ISO 11898-1; docs/reference/bus-time.md section 1). Pure
+ * functions. */
 #ifndef HUB_FRAME_BITS_H
 #define HUB_FRAME_BITS_H
 

@@ -225,7 +225,7 @@ static void notify(struct hub *hub, uint16_t kind, const struct participant *abo
     for (size_t i = 0; i < hub->time.count; ++i) {
         const struct participant *each = &hub->time.participants[i];
         const struct hub_connection *to = participant_connection(hub, each->number);
-        if (each->watches && each != about && to != NULL) {
+        if (each->wants_notices && each != about && to != NULL) {
             send_control(hub, to->fd, kind, about->number, about->name);
             if (kind == LOCAL_BUS_LEFT) {
                 virtual_time_wake(&hub->time, each->number);
@@ -520,15 +520,15 @@ static void grant(struct hub *hub, struct participant *next)
                                         .time_ns = hub->time.now_ns};
     granted.flags = next->frames ? LOCAL_BUS_FRAMES : 0;
     next->frames = flush_all(hub, next->number);
-    if (next->watches) {
+    if (next->wants_notices) {
         (void)flush_all(hub, 0);
     }
-    hub->granted = next->watches ? NULL : to;
+    hub->granted = next->wants_notices ? NULL : to;
     (void)send_packet(hub, to->fd, &granted, sizeof granted);
 }
 
-/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a limit.
- * */
+/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a
+ * limit. */
 static int go_on(struct hub *hub)
 {
     while (!virtual_time_is_held(&hub->time)) {

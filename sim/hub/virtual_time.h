@@ -28,7 +28,7 @@ struct participant {
     bool frames; /* some have come since its last grant */
     bool suspended;
     bool all; /* frames that it defers wake it, too */
-    bool watches;
+    bool wants_notices;
     uint64_t until_ns;
     uint32_t grant; /* number of the last one */
 };
@@ -43,7 +43,7 @@ struct virtual_time {
 void virtual_time_init(struct virtual_time *time);
 
 /* A new participant, active. Its number; 0 when there is no room. */
-uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool watches);
+uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool wants_notices);
 
 void virtual_time_leave(struct virtual_time *time, uint32_t number);
 

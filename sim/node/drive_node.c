@@ -49,7 +49,7 @@ static void reset_communication(void *context)
 static void change_state(void *context, enum nmt_state state)
 {
     struct drive_node *node = context;
-    drive_pdos_rest(&node->pdos);
+    drive_pdos_restart(&node->pdos);
     if (state != NMT_OPERATIONAL) {
         servo_disconnect(&node->servo, EMCY_COMMUNICATION);
         sync_clock_reset_counter(&node->clock, node->values.synchronous_counter_overflow_value);

@@ -67,11 +67,11 @@ void drive_pdos_init(struct drive_pdos *pdos, struct od *od, struct servo *servo
     evaluate_mapping(pdos);
 }
 
-void drive_pdos_rest(struct drive_pdos *pdos)
+void drive_pdos_restart(struct drive_pdos *pdos)
 {
     for (int i = 0; i < DRIVE_PDOS; i++) {
-        pdo_map_rest(&pdos->rpdos[i]);
-        pdo_map_rest(&pdos->tpdos[i]);
+        pdo_map_restart(&pdos->rpdos[i]);
+        pdo_map_restart(&pdos->tpdos[i]);
     }
 }
 

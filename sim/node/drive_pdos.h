@@ -38,7 +38,7 @@ void drive_pdos_init(struct drive_pdos *pdos, struct od *od, struct servo *servo
                      struct drive_node_port port);
 
 /* The NMT state changes: deadlines and counters restart. */
-void drive_pdos_rest(struct drive_pdos *pdos);
+void drive_pdos_restart(struct drive_pdos *pdos);
 
 /* The od's hooks, for 0x1400 ... 0x1BFF: whether a write is permitted (SDO_OK or an abort code); it has happened. */
 uint32_t drive_pdos_write(const struct drive_pdos *pdos, const struct od_entry *entry,

@@ -68,7 +68,7 @@ static size_t module_filters(struct io_module *module, struct can_match filters[
     if (module->id == 0) {
         return 0;
     }
-    filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + module->id), CAN_ID_MAX};
+    filters[n++] = (struct can_match){(uint16_t)(COB_SDO_REQUEST + module->id), CAN_ID_MAX};
     for (int k = 0; k < IO_MODULE_RPDOS; k++) {
         if (module->rpdos[k].valid) {
             filters[n++] = (struct can_match){module->rpdos[k].cob_id, CAN_ID_MAX};
@@ -104,7 +104,7 @@ int drives_filter(struct drives *drives)
     }
     for (size_t i = 0; i < drives->count; i++) {
         struct drive_node *node = &drives->nodes[i];
-        filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
+        filters[n++] = (struct can_match){(uint16_t)(COB_SDO_REQUEST + node->id), CAN_ID_MAX};
         for (int k = 0; k < DRIVE_PDOS; k++) {
             if (node->pdos.rpdos[k].valid) {
                 filters[n++] = (struct can_match){node->pdos.rpdos[k].cob_id, CAN_ID_MAX};

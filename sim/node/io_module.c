@@ -64,7 +64,7 @@ static void change_state(void *context, enum nmt_state state)
 {
     struct io_module *module = context;
     for (int i = 0; i < IO_MODULE_RPDOS; i++) {
-        pdo_map_rest(&module->rpdos[i]);
+        pdo_map_restart(&module->rpdos[i]);
     }
     if (state == NMT_STOPPED) {
         take_error_values(module);

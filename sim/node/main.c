@@ -65,8 +65,8 @@ static bool run(struct drives *drives, int signals)
     return false;
 }
 
-/* Real drives answer within a fraction of the period; where a priority is not permitted, the host's scheduler decides.
- * */
+/* Real drives answer within a fraction of the period; where a priority is not permitted, the host's scheduler
+ * decides. */
 static void ask_for_priority(void)
 {
     const struct sched_param priority = {.sched_priority = PRIORITY};

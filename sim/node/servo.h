@@ -20,8 +20,8 @@
 #include "node/supervision.h"
 #include "od_drive.h"
 
-/* Tests may read all of it; the PDOs set `setpoint_fresh`, injected faults change `axis.influence` and `supervision`.
- * */
+/* Tests may read all of it; the PDOs set `setpoint_fresh`, injected faults change `axis.influence` and
+ * `supervision`. */
 struct servo {
     struct od_drive *values; /* borrowed: the object dictionary */
     struct cia402_device device;

@@ -21,7 +21,7 @@ struct foot {
 };
 
 /* Distance of the point from the tangent. In the plane without the square and the root of one number. */
-static double contour_beside(const struct contour *c, const struct view *v, double square)
+static double contour_off_tangent(const struct contour *c, const struct view *v, double square)
 {
     const double z = v->offset[0] * v->first[1] - v->offset[1] * v->first[0];
     if (c->axes == PROGRAM_PLANE) {
@@ -46,7 +46,7 @@ static struct foot contour_newton(const struct contour *c, struct place start,
         const double full = square - contour_dot(v.offset, v.second);
         const double step = along / (full > 0.25 * square ? full : square);
         if (step * step * square < CONTOUR_STEP_MM * CONTOUR_STEP_MM) {
-            foot.distance_mm = contour_beside(c, &v, square);
+            foot.distance_mm = contour_off_tangent(c, &v, square);
             foot.found = true;
             return foot;
         }

@@ -55,8 +55,8 @@ double stop_brake_time(const struct stop_state *from, const struct path_brake_nu
     return fabs(from->a + depth) / down + even_s + depth / up + TICKS_MORE * period_s;
 }
 
-int stop_has_room(const struct stop_setting *setting, const struct stop_state *at,
-                  const struct path_brake_numbers *numbers)
+int stop_fits_before_end(const struct stop_setting *setting, const struct stop_state *at,
+                         const struct path_brake_numbers *numbers)
 {
     const struct path_state state = {
         .speed_q56 = (int64_t)(at->v * setting->period_s * 0x1p56),
@@ -102,8 +102,8 @@ static int tick_keeps(const struct stop_setting *setting, const struct stop_inve
     double j = (to->a - from->a) / setting->period_s;
     for (int k = 0; k < parts; k++) {
         struct stop_state at = moved(from, j, setting->period_s * k / parts);
-        stop_pass_rows(&setting->road, at.s, row);
-        if (stop_strain(&setting->road, inverse, &setting->road.rows[*row], &at, j) > 1.0) {
+        stop_pass_rows(&setting->lookup, at.s, row);
+        if (stop_usage(&setting->lookup, inverse, &setting->lookup.rows[*row], &at, j) > 1.0) {
             return 0;
         }
     }
@@ -137,7 +137,7 @@ static int surely_keeps(const struct stop_setting *setting, const struct stop_in
     struct stop_extent extent;
     most.a = stop_greater(most.a, 0.0);
     const double to_mm = stop_brake_extent(setting, &brake->numbers, &most, fall, &extent);
-    return stop_keeps_up_to(&setting->road, inverse, &extent, row, to_mm);
+    return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, to_mm);
 }
 
 /* 1: some ticks of a brake, at[0 ... count], surely keep the limits, by bounds of all of them; 0: that is open. */
@@ -152,7 +152,7 @@ static int ticks_surely_keep(const struct stop_setting *setting, const struct st
         extent.acceleration = stop_greater(extent.acceleration, fabs(at[k + 1].a));
         extent.jerk = stop_greater(extent.jerk, fabs(at[k + 1].a - at[k].a) / period_s);
     }
-    return stop_keeps_up_to(&setting->road, inverse, &extent, row, at[count].s);
+    return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, at[count].s);
 }
 
 int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
@@ -187,7 +187,7 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
         }
         done += count;
         at[0] = at[count];
-        stop_pass_rows(&setting->road, at[0].s, &row);
+        stop_pass_rows(&setting->lookup, at[0].s, &row);
     }
     return 1;
 }
@@ -195,24 +195,24 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
 void stop_setting_open(struct stop_setting *setting, const struct program *p,
                        const struct stop_limits *limits, const struct stop_path *path)
 {
-    stop_road_open(&setting->road, p, path);
+    stop_lookup_open(&setting->lookup, p, path);
     setting->period_us = p->header.period_us;
     setting->period_s = 1e-6 * p->header.period_us;
     setting->length_mm = ldexp((double)p->header.length_q40_mm, -40);
     setting->rise_is_cut = limits->rise_is_cut;
     setting->quick = limits->quick;
     setting->deceleration = limits->acceleration;
-    stop_invert(&setting->inverse, limits, setting->road.axis_count);
+    stop_invert(&setting->inverse, limits, setting->lookup.axis_count);
     setting->at_any_rate = setting->inverse;
     setting->at_any_rate.feed /= 1.0 + FASTER;
-    for (uint32_t k = 0; k < setting->road.axis_count; k++) {
+    for (uint32_t k = 0; k < setting->lookup.axis_count; k++) {
         setting->at_any_rate.velocity[k] /= 1.0 + FASTER;
-        setting->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
+        setting->at_any_rate.reach[k] *= limits->reach_at_rate_1 != 0u ? 0.0 : 1.0;
     }
     for (int k = 0; k < 3; k++) {
         const double *axis = k == 1 ? limits->axis_acceleration : limits->axis_jerk;
         double all = hypot(axis[0], axis[1]);
-        all = setting->road.axis_count > PROGRAM_PLANE ? hypot(all, axis[2]) : all;
+        all = setting->lookup.axis_count > PROGRAM_PLANE ? hypot(all, axis[2]) : all;
         double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, all);
         setting->most[k] = 0;
         for (int c = 1; c <= GREATEST_CODE; c++) {

@@ -13,11 +13,11 @@
 
 #include "core/path_brake.h"
 #include "core/program.h"
-#include "offline/stop_strain.h"
+#include "offline/stop_usage.h"
 
 /* What stays while the stops of a program are searched. */
 struct stop_setting {
-    struct stop_road road;
+    struct stop_lookup lookup;
     struct stop_inverse inverse;     /* at the rate 1, */
     struct stop_inverse at_any_rate; /* and at others */
     uint32_t rise_is_cut;
@@ -49,8 +49,8 @@ double stop_brake_time(const struct stop_state *from, const struct path_brake_nu
                        double period_s);
 
 /* Whether the controller would find room for the brake before the end of the program. */
-int stop_has_room(const struct stop_setting *setting, const struct stop_state *at,
-                  const struct path_brake_numbers *numbers);
+int stop_fits_before_end(const struct stop_setting *setting, const struct stop_state *at,
+                         const struct path_brake_numbers *numbers);
 
 /* Whether the state has so little speed left, for its deceleration, that no brake need fit: the plan may go on. */
 int stop_may_wait(const struct stop_setting *setting, const struct stop_state *at,

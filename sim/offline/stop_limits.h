@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The limits that a brake along a path keeps: those of the path file and the machine for a feed hold, those of the
- * machine for a fault stop. Data only; offline/stop_path.h and offline/stop_strain.h use them.
+ * machine for a fault stop. Data only; offline/stop_path.h and offline/stop_usage.h use them.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_LIMITS_H
 #define HODOGRAPH_OFFLINE_STOP_LIMITS_H
@@ -14,7 +14,7 @@
 #define STOP_MARGIN 0.003
 
 /* A greatest feed on a stretch of the path. */
-struct stop_cap {
+struct stop_feed_zone {
     double from_mm;
     double to_mm;
     double feed_mm_s;
@@ -32,10 +32,10 @@ struct stop_limits {
     double reach
         [PROGRAM_AXES]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
     double time_constant[PROGRAM_AXES]; /* s */
-    const struct stop_cap *caps;
-    uint32_t cap_count;
+    const struct stop_feed_zone *zones;
+    uint32_t zone_count;
     /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
-    uint32_t reach_at_pace;
+    uint32_t reach_at_rate_1;
     /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
     uint32_t rise_is_cut;
     uint32_t quick; /* 1: few codes are tried, about 0.1 ms a piece, for long programs */

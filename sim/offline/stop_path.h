@@ -6,7 +6,7 @@
  * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ...
  * rows have the greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
  *
- * stop_rows() fills the path once; stop_road_open() makes what the look-ups take. mm, s. No heap: the caller lends all
+ * stop_rows() fills the path once; stop_lookup_open() makes what the look-ups take. mm, s. No heap: the caller lends all
  * arrays. Main loop of a host.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_PATH_H
@@ -26,7 +26,7 @@ struct stop_row {
     double tangent[2]; /* of a planar program */
     double curvature;  /* 1/mm; of a spatial program without sign */
     double slope; /* of the curvature, 1/mm^2; in space the third derivative across the tangent */
-    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
+    double feed_mm_s; /* greatest feed here: zones and centripetal acceleration */
 };
 
 /* How the axes of a spatial program move there: first to third derivative by arc length. */
@@ -52,7 +52,7 @@ struct stop_path {
 };
 
 /* The same with what look-ups need; borrows the path. */
-struct stop_road {
+struct stop_lookup {
     uint32_t axis_count;
     uint32_t row_count;
     const struct stop_row *rows;
@@ -68,20 +68,22 @@ uint32_t stop_groups(uint32_t segment_count);
 void stop_rows(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path);
 
-/* Makes a road of a path that stop_rows() has filled. */
-void stop_road_open(struct stop_road *road, const struct program *p, const struct stop_path *path);
+/* Makes a lookup of a path that stop_rows() has filled. */
+void stop_lookup_open(struct stop_lookup *lookup, const struct program *p,
+                      const struct stop_path *path);
 
 /* The last row at or before an arc length. */
-uint32_t stop_row_at(const struct stop_road *road, double s);
+uint32_t stop_row_at(const struct stop_lookup *lookup, double s);
 
 /* Raises `row` to the last row at or before an arc length. */
-void stop_pass_rows(const struct stop_road *road, double s, uint32_t *row);
+void stop_pass_rows(const struct stop_lookup *lookup, double s, uint32_t *row);
 
 /* Fills the bounds of a single row, */
-void stop_stretch_of_row(const struct stop_road *road, uint32_t row, struct stop_stretch *stretch);
+void stop_stretch_of_row(const struct stop_lookup *lookup, uint32_t row,
+                         struct stop_stretch *stretch);
 
 /* and those of the path from a row up to an arc length. */
-void stop_stretch_from(const struct stop_road *road, uint32_t row, double to_mm,
+void stop_stretch_from(const struct stop_lookup *lookup, uint32_t row, double to_mm,
                        struct stop_stretch *stretch);
 
 /* --- Small numbers, inline: the innermost loops --- */

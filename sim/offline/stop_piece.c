@@ -52,7 +52,7 @@ static int add_instant(const struct stop_setting *setting, const double c[8], do
     at->v = stop_greater(stop_piece_value(c, u, 1) / piece->seconds, 0.0);
     at->a = stop_piece_value(c, u, 2) / (piece->seconds * piece->seconds);
     piece->at_s[piece->count] = u * piece->seconds;
-    piece->row[piece->count] = stop_row_at(&setting->road, at->s);
+    piece->row[piece->count] = stop_row_at(&setting->lookup, at->s);
     piece->fastest.v = stop_greater(piece->fastest.v, at->v);
     piece->fastest.a = stop_greater(piece->fastest.a, at->a);
     piece->extreme.v = stop_greater(piece->extreme.v, at->v);
@@ -70,10 +70,10 @@ static int add_rows(const struct stop_setting *setting, const double c[8], doubl
     const double from = piece->at[piece->count - 1u].s;
     const double way = stop_piece_value(c, high, 0) - from;
     uint32_t row = piece->row[piece->count - 1u] + 1u;
-    for (; row < setting->road.row_count && setting->road.rows[row].s_mm < from + way;
+    for (; row < setting->lookup.row_count && setting->lookup.rows[row].s_mm < from + way;
          row += each) {
         const double u =
-            low + (high - low) * stop_greater(setting->road.rows[row].s_mm - from, 0.0) / way;
+            low + (high - low) * stop_greater(setting->lookup.rows[row].s_mm - from, 0.0) / way;
         const double last_s = piece->at_s[piece->count - 1u];
         if (u * piece->seconds >= last_s + step_s &&
             high * piece->seconds >= last_s + 2.0 * step_s && !add_instant(setting, c, u, piece)) {
@@ -108,9 +108,9 @@ static double extra_axes_most(const struct stop_setting *setting, const struct s
 {
     double most = 0.0;
     for (uint32_t i = 0; i < piece->count; i++) {
-        const double *by_mm = setting->road.bends[piece->row[i]].by_mm[0];
+        const double *by_mm = setting->lookup.bends[piece->row[i]].by_mm[0];
         double used = 0.0; /* share of a limit, for 1 along the path */
-        for (uint32_t k = PROGRAM_SPACE; k < setting->road.axis_count; k++) {
+        for (uint32_t k = PROGRAM_SPACE; k < setting->lookup.axis_count; k++) {
             used = stop_greater(used, fabs(by_mm[k]) * inverse[k]);
         }
         most = stop_greater(most, used > 0.0 ? 1.0 / used : HUGE_VAL);
@@ -122,7 +122,7 @@ static double extra_axes_most(const struct stop_setting *setting, const struct s
 static double followed_most(const struct stop_setting *setting, const struct stop_piece *piece,
                             const double inverse[PROGRAM_AXES], double most)
 {
-    return setting->road.axis_count > PROGRAM_SPACE
+    return setting->lookup.axis_count > PROGRAM_SPACE
                ? fmin(most, extra_axes_most(setting, piece, inverse))
                : most;
 }
@@ -148,7 +148,7 @@ static void piece_most(const struct stop_setting *setting, struct stop_piece *pi
     }
 }
 
-void stop_piece_look(const struct stop_setting *setting, const struct program *p, uint32_t i,
+void stop_piece_fill(const struct stop_setting *setting, const struct program *p, uint32_t i,
                      double left_s, double step_s, struct stop_piece *piece)
 {
     struct program_piece from;

@@ -14,7 +14,7 @@
 #define STOP_MOST_INSTANTS 1025   /* of a piece */
 #define STOP_INSTANT_S     0.004  /* between two of them at most, where these are enough, */
 #define STOP_CLOSE_S       0.0005 /* and in the last look at what was found */
-#define STOP_BESIDE        1e-6   /* share of a piece: jerks jump at its ends */
+#define STOP_END_MARGIN    1e-6   /* share of a piece: jerks jump at its ends */
 #define STOP_SHARES        11u    /* feed overrides, and as many shares of the piece's greatest */
 
 /* An instant of a piece at a feed override: `rate` is a number of stop_override_at(), `slope` the sign of the
@@ -53,7 +53,7 @@ double stop_piece_powers(const struct program_piece *from, double c[8]);
 double stop_piece_value(const double c[8], double u, int order);
 
 /* Fills piece i of a program, with instants step_s apart or less; left_s: duration of the program behind it. */
-void stop_piece_look(const struct stop_setting *setting, const struct program *p, uint32_t i,
+void stop_piece_fill(const struct stop_setting *setting, const struct program *p, uint32_t i,
                      double left_s, double step_s, struct stop_piece *piece);
 
 /* Half the time from the instant before to the one behind. */

@@ -263,7 +263,7 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
 
 /* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the
  * same override. They are looked at first; what is found does not depend on that. */
-static void suspect_as_behind(struct stop_piece *piece, const struct stop_overridden behind[2])
+static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden behind[2])
 {
     piece->suspect = piece->count - 1u;
     piece->close->suspect = piece->close->count - 1u;
@@ -286,16 +286,16 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     struct stop_overridden behind[2] = {{0, 0, -1}, {0, 0, 0}};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
-        stop_piece_look(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
+        stop_piece_fill(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
         if (found[i - 1u].known != 0u) {
             known_choice(&setting, &piece, &found[i - 1u], after_s, &best);
         } else {
-            stop_piece_look(&setting, p, i - 1u, left_s, STOP_CLOSE_S, &close);
+            stop_piece_fill(&setting, p, i - 1u, left_s, STOP_CLOSE_S, &close);
             for (int k = 0; k < 3; k++) {
                 piece.before[k] = found[i - 1u].before[k];
             }
             piece.close = &close;
-            suspect_as_behind(&piece, behind);
+            suspect_as_next(&piece, behind);
             search_or_keep(&setting, &piece, &found[i - 1u], warm, after_s, &best);
             behind[0] = piece.suspect_override;
             behind[1] = piece.suspect_before;
@@ -329,19 +329,19 @@ void stop_used(const struct program *p, const struct stop_limits *limits,
         double seconds = stop_piece_powers(&from, c);
         int parts = (int)fmin(stop_greater(ceil(seconds / STOP_INSTANT_S), 4.0), 256.0);
         for (int k = 0; k <= parts; k++) {
-            double u =
-                STOP_BESIDE + (1.0 - 2.0 * STOP_BESIDE) * k / parts; /* jerks jump at joints */
+            double u = STOP_END_MARGIN +
+                       (1.0 - 2.0 * STOP_END_MARGIN) * k / parts; /* jerks jump at joints */
             struct stop_state at = {stop_piece_value(c, u, 0), stop_piece_value(c, u, 1) / seconds,
                                     stop_piece_value(c, u, 2) / (seconds * seconds)};
             double j = stop_piece_value(c, u, 3) / (seconds * seconds * seconds);
-            const struct stop_row *row = &setting.road.rows[stop_row_at(&setting.road, at.s)];
+            const struct stop_row *row = &setting.lookup.rows[stop_row_at(&setting.lookup, at.s)];
             struct stop_axes axes;
-            stop_axes_of(&setting.road, row, stop_share_of(row, at.s), &at, j, &axes);
+            stop_axes_of(&setting.lookup, row, stop_share_of(row, at.s), &at, j, &axes);
             most_of(&used->feed, at.v);
             most_of(&used->acceleration, at.a);
             most_of(&used->jerk, j);
             most_of(&used->centripetal, row->curvature * at.v * at.v);
-            for (uint32_t axis = 0; axis < setting.road.axis_count; axis++) {
+            for (uint32_t axis = 0; axis < setting.lookup.axis_count; axis++) {
                 most_of(&used->axis_velocity[axis], axes.velocity[axis]);
                 most_of(&used->axis_acceleration[axis], axes.acceleration[axis]);
                 most_of(&used->axis_jerk[axis], axes.jerk[axis]);

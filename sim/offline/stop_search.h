@@ -30,7 +30,7 @@ struct stop_found {
 };
 
 /* How far the program itself uses the limits at the rate 1: greatest value of each, limit by limit, in `used`
- * (same fields; caps and time constants as in limits). */
+ * (same fields; zones and time constants as in limits). */
 void stop_used(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path, struct stop_limits *used);
 

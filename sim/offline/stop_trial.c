@@ -73,8 +73,8 @@ static void look_at_axes(const struct course *course, double period_s,
 
 /* Differences reach back: a brake's own jerk is that from its fourth tick on. The acceleration that a changing rate has
  * left it with may be above the program's limit; the difference before it lags two ticks behind. */
-static void look_along(struct course *course, double period_s, const struct stop_trial *trial,
-                       const struct stop_limits *limits, struct stop_use *use)
+static void evaluate_along(struct course *course, double period_s, const struct stop_trial *trial,
+                           const struct stop_limits *limits, struct stop_use *use)
 {
     double d[3];
     differences(course, ARC, period_s, d);
@@ -121,8 +121,8 @@ static int step(struct course *course, struct stop_trial *trial)
     if (course->count > HISTORY) {
         look_at_axes(course, period_s, course->machine ? &trial->fault : &trial->hold,
                      course->machine ? &trial->of_fault : &trial->of_hold);
-        look_along(course, period_s, trial, course->machine ? &trial->fault : &trial->hold,
-                   course->machine ? &trial->of_fault : &trial->of_hold);
+        evaluate_along(course, period_s, trial, course->machine ? &trial->fault : &trial->hold,
+                       course->machine ? &trial->of_fault : &trial->of_hold);
     }
     return 0;
 }

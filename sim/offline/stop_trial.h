@@ -15,8 +15,8 @@
 #include "core/program.h"
 #include "offline/stop_search.h"
 
-/* Greatest shares of limits: of the axes' velocity, acceleration and jerk, and of acceleration and jerk along the path.
- * */
+/* Greatest shares of limits: of the axes' velocity, acceleration and jerk, and of acceleration and jerk along the
+ * path. */
 struct stop_use {
     double velocity, acceleration, jerk, path_acceleration, path_jerk;
 };

@@ -36,7 +36,7 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
         double total_s = begins ? stop_brake_time(at, numbers, setting->period_s) : STOP_NEVER_S;
         if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
             left > 2.0 * total_s + FAR_TICKS * setting->period_s &&
-            !stop_has_room(setting, at, numbers)) {
+            !stop_fits_before_end(setting, at, numbers)) {
             return 0;
         }
         times->brakes[i - 1u] = total_s < left;
@@ -64,7 +64,7 @@ static double begun_extent(const struct stop_setting *setting, const struct stop
 {
     const struct stop_state most = {piece->at[piece->count - 1u].s, begun->speed, begun->rise};
     const double to_mm = stop_brake_extent(setting, numbers, &most, begun->fall, extent);
-    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent->path);
+    stop_stretch_from(&setting->lookup, piece->row[0], to_mm, &extent->path);
     return to_mm;
 }
 
@@ -89,7 +89,7 @@ static int begun_keep(const struct stop_setting *setting, const struct stop_inve
 {
     struct stop_extent extent;
     (void)begun_extent(setting, piece, numbers, begun, &extent);
-    return stop_extent_keeps(&setting->road, inverse, &extent);
+    return stop_extent_keeps(&setting->lookup, inverse, &extent);
 }
 
 int stop_all_keep(const struct stop_setting *setting, struct stop_piece *piece,
@@ -144,8 +144,8 @@ static int overridden_keeps(const struct stop_setting *setting, const struct sto
     if (!stop_overridden_state(piece, which, little, &from)) {
         return 1;
     }
-    return (!keeping->surely && stop_strain(&setting->road, keeping->inverse,
-                                            &setting->road.rows[row], &from, 0.0) > 1.0) ||
+    return (!keeping->surely && stop_usage(&setting->lookup, keeping->inverse,
+                                           &setting->lookup.rows[row], &from, 0.0) > 1.0) ||
            state_keeps(setting, keeping, &from, row, numbers);
 }
 
@@ -252,8 +252,8 @@ static int out_of_brakes_surely_keep(const struct stop_setting *setting,
     const struct stop_state most = {from_mm, extent.speed, begun.rise};
     const double fall = extent.acceleration;
     const double to_mm = stop_brake_extent(setting, numbers, &most, fall, &extent);
-    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent.path);
-    return stop_extent_keeps(&setting->road, &setting->at_any_rate, &extent);
+    stop_stretch_from(&setting->lookup, piece->row[0], to_mm, &extent.path);
+    return stop_extent_keeps(&setting->lookup, &setting->at_any_rate, &extent);
 }
 
 /* From some instants at a feed override, also while it changes. */
@@ -326,8 +326,8 @@ int stop_strictly(const struct stop_setting *setting, struct stop_piece *piece, 
     const struct begun begun = begun_at_any_rate(setting, piece);
     struct stop_extent extent;
     (void)begun_extent(setting, piece, &numbers, &begun, &extent);
-    const struct keeping keeping = {inverse, stop_extent_keeps(&setting->road, inverse, &extent)};
-    const int surely = stop_extent_keeps(&setting->road, &setting->inverse, &extent);
+    const struct keeping keeping = {inverse, stop_extent_keeps(&setting->lookup, inverse, &extent)};
+    const int surely = stop_extent_keeps(&setting->lookup, &setting->inverse, &extent);
     return close_keep(setting, piece->close, &numbers, surely) &&
            overrides_keep(setting, piece, &keeping, &numbers) &&
            stop_out_of_brakes_keeps(setting, piece, codes);

@@ -84,7 +84,7 @@ static void check_sent(const struct can_msg *frame)
     bool to_a_drive = false;
     for (unsigned i = 0; i < self.config.axis_count; ++i) {
         const uint8_t node = self.config.node[i];
-        to_a_drive = to_a_drive || (frame->id == COB_SDO_ASK + node && frame->len == 8u) ||
+        to_a_drive = to_a_drive || (frame->id == COB_SDO_REQUEST + node && frame->len == 8u) ||
                      (frame->id == COB_NMT && frame->len == 2u && frame->data[1] == node);
     }
     FUZZ_CHECK(to_a_drive);
@@ -234,7 +234,7 @@ static void harness(struct fuzz_input *in)
             round_of_bus(in, what < 0xC0u ? 1000u : (what - 0xBFu) * 20000u);
         } else if (what < 0xF8u) {
             fuzz_frame(in, &frame);
-            frame.id = COB_SDO_ANSWER + self.config.node[what & 1u];
+            frame.id = COB_SDO_RESPONSE + self.config.node[what & 1u];
             queue(&frame);
         } else {
             switch_drives_on();

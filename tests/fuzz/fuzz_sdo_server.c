@@ -21,7 +21,7 @@ static void pass_time(uint32_t us)
 {
     int answers = 0;
     while (sdo_server_process(&talk.server, us, &talk.answer) != 0) {
-        FUZZ_CHECK(talk.answer.id == COB_SDO_ANSWER + TALK_NODE && talk.answer.len == 8u);
+        FUZZ_CHECK(talk.answer.id == COB_SDO_RESPONSE + TALK_NODE && talk.answer.len == 8u);
         FUZZ_CHECK(++answers < ANSWERS_MAX);
         us = 0;
     }

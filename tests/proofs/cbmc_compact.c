@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins
- * where it has its whole length before the end of an image of up to 8 KiB that program_open accepts.
+ * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins where
+ * it has its whole length before the end of an image of up to 8 KiB that program_open accepts.
  *
  * prover: cbmc
  * options: --unwind 40
@@ -11,9 +11,9 @@
  * mutant: core/program.c: ? PROGRAM_COMPACT_PIECE_SIZE : PROGRAM_PIECE_SIZE => ? 68u : PROGRAM_PIECE_SIZE
  * mutant: core/program.c: ? PROGRAM_COMPACT_STOP_SIZE : PROGRAM_STOP_SIZE => ? 11u : PROGRAM_STOP_SIZE
  */
-#include "any_header.h"
 #include "core/program.c"
 #include "proof.h"
+#include "any_header.h"
 
 uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 {

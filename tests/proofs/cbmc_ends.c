@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces of which any first ones have records, from
- * any of these and at any time: it never asks for a record after the last, stops at the first piece that ends after the
- * time, and is at the duration in no other than the last state of the program.
+ * The program clock looks for its piece, in a program of any three pieces of which any first ones have records, from any of
+ * these and at any time: it never asks for a record after the last, stops at the first piece that ends after the time, and
+ * is at the duration in no other than the last state of the program.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check
@@ -10,8 +10,7 @@
  * mutant: core/program_clock.h: clock->piece = record->number => clock->piece = record->number + 1u
  * mutant: core/program_clock.h: record = coefficients_piece_next(record); => record++;
  * mutant: core/program_clock.h: if (time_q42_s >= clock->duration_q42_s) { => if (time_q42_s > clock->duration_q42_s) {
- * mutant: core/program_clock.h: while (time_q42_s >= record->end_q42_s && left > 0) => while (time_q42_s <=
- * record->end_q42_s && left > 0)
+ * mutant: core/program_clock.h: while (time_q42_s >= record->end_q42_s && left > 0) => while (time_q42_s <= record->end_q42_s && left > 0)
  */
 #include "proof.h"
 
@@ -28,7 +27,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->program = &program;
     clock->duration_q42_s = qmath_q42_of_q32(program.header.duration_q32_s);
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = i;
     clock->record = &records[i];
@@ -44,8 +43,9 @@ void harness(void)
     for (uint32_t k = 0; k < COUNT; k++) {
         records[k].number = k;
         records[k].next = k < last ? (int32_t)sizeof records[0] : 0;
-        records[k].end_q42_s =
-            k + 1u == COUNT ? qmath_q42_of_q32(program.header.duration_q32_s) : nondet_uint64();
+        records[k].end_q42_s = k + 1u == COUNT
+                                   ? qmath_q42_of_q32(program.header.duration_q32_s)
+                                   : nondet_uint64();
     }
     uint32_t i = nondet_uint32();
     __CPROVER_assume(i <= last);
@@ -55,7 +55,7 @@ void harness(void)
         const uint64_t passed_q42_s = program_clock_pass_end(&clock, time_q42_s);
         prove(passed_q42_s <= clock.duration_q42_s);
         prove(passed_q42_s < clock.duration_q42_s ||
-              (clock.time_q42_s == passed_q42_s && clock.rest == 0u && clock.fine == 0u));
+              (clock.time_q42_s == passed_q42_s && clock.remainder == 0u && clock.fine == 0u));
         prove(passed_q42_s == clock.duration_q42_s || i == last ||
               time_q42_s >= records[i + 1u].end_q42_s || clock.piece == i + 1u);
     }

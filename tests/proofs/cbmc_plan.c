@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The override at rest: a tick that looks for a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does
- * a reset.
+ * The override at rest: a tick that looks for a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
+ * reset.
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check
- * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span
- * override_window_get:some_window override_change_of:some_change override_stage_of:some_stage
- * override_limits_of:some_limits shows: tick_of_decision come_to_rest comes_steady mutant: core/override_plan.c: down ?
- * -step_q56 : step_q56 => step_q56 mutant: core/override_plan.c: above ? OVERRIDE_STAY : OVERRIDE_CLIMB =>
- * OVERRIDE_STAY mutant: core/override_plan.c: magnitude(change_q57) / 2 => magnitude(change_q57)
+ * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span override_window_get:some_window override_change_of:some_change override_stage_of:some_stage override_limits_of:some_limits
+ * shows: tick_of_decision come_to_rest comes_steady
+ * mutant: core/override_plan.c: down ? -step_q56 : step_q56 => step_q56
+ * mutant: core/override_plan.c: above ? OVERRIDE_STAY : OVERRIDE_CLIMB => OVERRIDE_STAY
+ * mutant: core/override_plan.c: magnitude(change_q57) / 2 => magnitude(change_q57)
  * mutant: core/override_plan.c: plan->back = plan->ticks; =>
  * mutant: core/override_plan.c: plan->window < OVERRIDE_WINDOWS => plan->window <= OVERRIDE_WINDOWS
  * mutant: core/override_plan.c: plan->step = OVERRIDE_MEASURES; => plan->step = OVERRIDE_FITS;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The numbers of core/real.h, from any normal ones or 0: nothing overflows, every shift is in range, and what comes out
- * is normal or 0, with an exponent as real_contracts.h says. Quotients of mantissas are left open; none is by 0.
+ * The numbers of core/real.h, from any normal ones or 0: nothing overflows, every shift is in range, and what comes out is
+ * normal or 0, with an exponent as real_contracts.h says. Quotients of mantissas are left open; none is by 0.
  *
  * prover: cbmc
  * options: --unwind 4

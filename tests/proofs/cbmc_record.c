@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of
- * an image of up to 16 KiB that program_open accepts, and its readers stay inside the record.
+ * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of an
+ * image of up to 16 KiB that program_open accepts, and its readers stay inside the record.
  * (For any size: h + s i + s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.)
  *
  * prover: cbmc
@@ -17,9 +17,9 @@
  * mutant: core/program.c: b + COMPACT_POWERS + 6 * k => b + COMPACT_POWERS + 11 * k
  * mutant: core/program.c: need != h->image_size => need < h->image_size
  */
-#include "any_header.h"
 #include "core/program.c"
 #include "proof.h"
+#include "any_header.h"
 
 uint32_t crc32_update(uint32_t crc, const uint8_t *bytes, uint32_t size)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The way of a brake to rest (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed
- * does not rise in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
+ * The way of a brake to rest (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
+ * in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
  *
  * prover: cbmc
  * options: --unwind 11 --unwinding-assertions --signed-overflow-check
@@ -36,8 +36,8 @@ uint64_t some_quotient(uint64_t a, uint64_t b)
     return quotients[asked++];
 }
 
-/* Rests exactly. The remainder at the end is linear in p and in q, and of the third degree in n: 0 for both, one by
- * one, and for more than four n, it is 0 for all. */
+/* Rests exactly. The remainder at the end is linear in p and in q, and of the third degree in n: 0 for both, one by one, and
+ * for more than four n, it is 0 for all. */
 static void rest(uint64_t n, uint64_t p, uint64_t q)
 {
     struct path_brake brake = {.at = {.speed_q56 = 1, .acceleration_q56 = -1}, .phase = READY};

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Segments, pieces, stops and events stand one behind the other, with and without compact records: each begins where
- * cbmc_record.c and cbmc_compact.c say. Shown of the first ones, since a place is linear in the number of its record
- * and in the counts. The reader of stops stays inside its record: the last one, in an image that ends behind it.
+ * cbmc_record.c and cbmc_compact.c say. Shown of the first ones, since a place is linear in the number of its record and in the
+ * counts. The reader of stops stays inside its record: the last one, in an image that ends behind it.
  *
  * prover: cbmc
  * options: --unwind 40
  * shows: segment_bytes piece_bytes stop_bytes event_bytes program_stop_get read_u24
- * mutant: core/program.c: (size_t)i * segment_size(&p->header) => (size_t)i *
- * program_segment_size(p->header.axis_count) mutant: core/program.c: (size_t)i * piece_size(&p->header) => (size_t)i *
- * PROGRAM_PIECE_SIZE mutant: core/program.c: (size_t)i * stop_size(&p->header) => (size_t)i * PROGRAM_STOP_SIZE
+ * mutant: core/program.c: (size_t)i * segment_size(&p->header) => (size_t)i * program_segment_size(p->header.axis_count)
+ * mutant: core/program.c: (size_t)i * piece_size(&p->header) => (size_t)i * PROGRAM_PIECE_SIZE
+ * mutant: core/program.c: (size_t)i * stop_size(&p->header) => (size_t)i * PROGRAM_STOP_SIZE
  * mutant: core/program.c: (size_t)i * PROGRAM_EVENT_SIZE => (size_t)i * PROGRAM_STOP_SIZE + i
  * mutant: core/program.c: b + COMPACT_BOUNDS; => b + 8;
  * mutant: core/program.c: b + 12 : b + 8 => b + 14 : b + 8

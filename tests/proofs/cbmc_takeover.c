@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The takeover of the next chunk (docs/theory/numerics.md section 15.7): whatever the state of the motion, after any
- * tick, command, takeover or other records the program under way is one of the two, at one of its pieces, with what its
- * end means and, where the plan goes on, with the record of that piece. A stop and a hold are never lost, a job that
- * goes on never counts as ended, a takeover in motion keeps time and piece, and other records change nothing else.
+ * The takeover of the next chunk (docs/theory/numerics.md section 15.7): whatever the state of the motion, after any tick,
+ * command, takeover or other records the program under way is one of the two, at one of its pieces, with what its end means
+ * and, where the plan goes on, with the record of that piece. A stop and a hold are never lost, a job that goes on never
+ * counts as ended, a takeover in motion keeps time and piece, and other records change nothing else.
  *
  * The functions that the motion calls do anything that their headers allow.
  *
@@ -17,17 +17,16 @@
  * mutant: core/feed_override.c: f->clock.time_q42_s < qmath_q42_of_q32(next->time_shift_q32_s)) => 0)
  * mutant: core/feed_override.c: return !is_over(f) && f->point => return f->point
  * mutant: core/feed_override.c: f->state == STATE_WAITING ? FEED_RUNNING : f->state; => FEED_RUNNING;
- * mutant: core/feed_override.c: f->at_end = f->goes_on != 0u ? state_at_tail_end(state) : FEED_ENDED; => f->at_end =
- * FEED_ENDED; mutant: core/feed_override.c: return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD :
- * FEED_STOPPED; => return FEED_STOPPED; mutant: core/feed_override.c: 0u : f->clock.piece - next->piece_shift; => 0u :
- * f->clock.piece; mutant: core/feed_override.c: segment == NULL || (at.by_arc == 0u && record == NULL)) { => segment ==
- * NULL) { mutant: core/feed_override.c: || segment == NULL || => ||
- * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((bisects && record ==
- * NULL) || mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if
- * ((clock_is_here(f) && record == NULL) || mutant: core/feed_override.c: override_plan_let_go(&f->plan); =>
- * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase ==
- * PHASE_PLAN; mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return
- * f->state == FEED_HELD || f->state == STATE_WAITING;
+ * mutant: core/feed_override.c: f->at_end = f->goes_on != 0u ? state_at_tail_end(state) : FEED_ENDED; => f->at_end = FEED_ENDED;
+ * mutant: core/feed_override.c: return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED; => return FEED_STOPPED;
+ * mutant: core/feed_override.c: 0u : f->clock.piece - next->piece_shift; => 0u : f->clock.piece;
+ * mutant: core/feed_override.c: segment == NULL || (at.by_arc == 0u && record == NULL)) { => segment == NULL) {
+ * mutant: core/feed_override.c: || segment == NULL || => ||
+ * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((bisects && record == NULL) ||
+ * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((clock_is_here(f) && record == NULL) ||
+ * mutant: core/feed_override.c: override_plan_forget_records(&f->plan); =>
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase == PHASE_PLAN;
+ * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->state == FEED_HELD || f->state == STATE_WAITING;
  */
 #include <stddef.h>
 
@@ -46,8 +45,8 @@ static struct coefficients_piece records[2][PIECES]; /* in order, without gaps *
 static int64_t starts[2][PIECES];
 static struct coefficients_segment segments[2]; /* one for all of each */
 static struct coefficients_window window;       /* new records, or the next chunk's */
-static const struct kernel kernel = {.piece_size = sizeof(struct coefficients_piece) -
-                                                   offsetof(struct coefficients_piece, feed)};
+static const struct kernel kernel = {
+    .piece_size = sizeof(struct coefficients_piece) - offsetof(struct coefficients_piece, feed)};
 
 static uint32_t number_of(const struct program *p)
 {
@@ -147,7 +146,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     carried++;
 }
 
-void override_plan_let_go(struct override_plan *plan)
+void override_plan_forget_records(struct override_plan *plan)
 {
     (void)plan;
     let_go++;
@@ -180,7 +179,7 @@ void override_plan_rest(struct override_plan *plan)
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
     (void)percent;
-    plan->asked_q57 = any_between(0, OVERRIDE_MOST);
+    plan->requested_q57 = any_between(0, OVERRIDE_MOST);
 }
 
 void override_plan_hold(struct override_plan *plan)
@@ -193,7 +192,7 @@ void override_plan_release(struct override_plan *plan)
     plan->held = 0;
 }
 
-void override_plan_rise_no_more(struct override_plan *plan)
+void override_plan_end_rise(struct override_plan *plan)
 {
     (void)plan;
 }
@@ -256,7 +255,7 @@ int64_t interpolator_acceleration_q40(const struct interpolator *it,
     return any_between(-POWER(40), POWER(40));
 }
 
-void interpolator_point_copy_rest(struct interpolator_point *out,
+void interpolator_point_copy_others(struct interpolator_point *out,
                                   const struct interpolator_point *from, uint32_t axis_count)
 {
     (void)out;
@@ -273,8 +272,7 @@ void interpolator_begin_window(struct interpolator *at, const struct program *p,
 }
 
 const struct coefficients_segment *interpolator_segment_in(const struct coefficients_window *w,
-                                                           int64_t number,
-                                                           int64_t arc_length_q40_mm)
+                                                           int64_t number, int64_t arc_length_q40_mm)
 {
     prove(w == &window && number >= 0 && arc_length_q40_mm <= LENGTH);
     return nondet_int() != 0 ? &segments[1] : NULL;
@@ -443,11 +441,11 @@ static int is_sound(uint32_t n)
     return f.clock.program == p && it.program == p && f.clock.piece < p->header.piece_count &&
            (f.phase != PHASE_REST || f.found != 0u ||
             f.place.piece_index < p->header.piece_count) &&
-           records_are_right(n) && it.segment == &segments[n] &&
+           records_are_right(n) &&
+           it.segment == &segments[n] &&
            f.clock.duration_q42_s == p->header.duration_q32_s << 10 &&
            it.duration_q42_s == f.clock.duration_q42_s &&
-           it.length_q40_mm == p->header.length_q40_mm &&
-           f.clock.time_q42_s <= f.clock.duration_q42_s &&
+           it.length_q40_mm == p->header.length_q40_mm && f.clock.time_q42_s <= f.clock.duration_q42_s &&
            f.goes_on == (chunk_goes_on(&chunks[n]) ? 1u : 0u) && f.phase <= PHASE_REST &&
            f.point.arc_length_q40_mm >= 0 && f.point.arc_length_q40_mm <= LENGTH &&
            end_is_known() && state_fits_phase();
@@ -463,7 +461,7 @@ static void any_motion(uint32_t n)
     segments[1].number = nondet_uint32() & 15u;
     f.clock.period_us = 1000;
     f.clock.period_log2 = 0;
-    f.clock.rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1u);
+    f.clock.remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1u);
     f.clock.fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     f.clock.duration_q42_s = f.clock.program->header.duration_q32_s << 10;
     it.duration_q42_s = f.clock.duration_q42_s;
@@ -506,8 +504,7 @@ static int holds(uint32_t state)
     return state == FEED_HOLDING || state == FEED_HELD;
 }
 
-/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program behind which nothing goes on
- * ends. */
+/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program behind which nothing goes on ends. */
 static void kept(const struct feed_override *before, int commanded)
 {
     const int ended = f.state == FEED_ENDED;
@@ -577,7 +574,7 @@ static void begun_at_rest(const struct feed_override *before)
 {
     prove(before->phase == PHASE_PLAN && before->state == STATE_WAITING);
     prove(f.phase == PHASE_PLAN && f.state == FEED_RUNNING && f.plan.started == 0);
-    prove(f.clock.piece == 0u && f.clock.time_q42_s == 0u && f.clock.rest == 0u &&
+    prove(f.clock.piece == 0u && f.clock.time_q42_s == 0u && f.clock.remainder == 0u &&
           f.clock.fine == 0u && f.point.arc_length_q40_mm == 0);
 }
 
@@ -590,8 +587,8 @@ static void take_over(void)
     if (feed_override_take_over(&f, &it, &chunks[1], &window) == 0) {
         prove(is_sound(0) && carried == 0u);
         prove(f.state == before.state && f.phase == before.phase && f.at_end == before.at_end &&
-              f.clock.time_q42_s == before.clock.time_q42_s &&
-              f.clock.piece == before.clock.piece && f.found == before.found &&
+              f.clock.time_q42_s == before.clock.time_q42_s && f.clock.piece == before.clock.piece &&
+              f.found == before.found &&
               f.point.arc_length_q40_mm == before.point.arc_length_q40_mm);
         return;
     }
@@ -603,8 +600,9 @@ static void take_over(void)
         kept(&before, 0);
         return;
     }
-    prove(f.clock.rest == before.clock.rest && f.clock.fine == before.clock.fine);
-    prove(before.point.arc_length_q40_mm == f.point.arc_length_q40_mm + chunks[1].arc_shift_q40_mm);
+    prove(f.clock.remainder == before.clock.remainder && f.clock.fine == before.clock.fine);
+    prove(before.point.arc_length_q40_mm ==
+          f.point.arc_length_q40_mm + chunks[1].arc_shift_q40_mm);
     if (resting) {
         kept_at_rest(&before);
     } else {

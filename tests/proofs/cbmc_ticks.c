@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A ramp has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not
- * negative; and a step is a half of its change at most.
+ * A ramp has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not negative; and
+ * a step is a half of its change at most.
  *
  * prover: cbmc
  * replaces: qmath_product_unsigned:some_product qmath_div_u64:some_quotient
@@ -29,8 +29,8 @@ uint64_t some_quotient(uint64_t a, uint64_t b)
     return quotient;
 }
 
-#include "core/override_ramp.c"
 #include "core/qmath.c"
+#include "core/override_ramp.c"
 
 void harness(void)
 {

@@ -4,8 +4,8 @@
  * nothing overflows, every index and shift is in range, and the results are as piece_bounds.h says.
  *
  * prover: eva
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; options: -eva-slevel 40
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * options: -eva-slevel 40
  * assumes: qmath_clz64 qmath_shift_clamp qmath_div_u64 bernstein_within
  * shows: feed_bounds_start feed_bounds_end feed_bounds_contained feed_bounds_within feed_bounds_parts
  * mutant: core/feed_bounds.c: a[k] >>= 4; => a[k] >>= 2;

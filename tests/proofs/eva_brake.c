@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The brake along the path, for every code of the stop table, every state that it may be asked to begin from, and every
- * state of a tick: nothing overflows, no shift is out of range, no division by 0. What comes out of the table and of
- * the begin is in the ranges that the ticks start from. The way to rest by ranges of its number of ticks.
+ * state of a tick: nothing overflows, no shift is out of range, no division by 0. What comes out of the table and of the
+ * begin is in the ranges that the ticks start from. The way to rest by ranges of its number of ticks.
  *
  * prover: eva
  * options: -eva-slevel 5000
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/path_brake.c: (uint32_t)((uint64_t)a
- * << zeros >> 33), 33 - zeros => some_mantissa(a), (int)any_between(0 * zeros - 30, 32) instead: core/path_brake.c:
- * rough_of(speed_q56 - fall_q56) => rough_of(any_between(1, speed_q56)) instead: core/path_brake.c: rise <= MOST_Q56 &&
- * => from->acceleration_q56 <= MOST_Q56 && rise <= MOST_Q56 && instead: core/path_brake.c: a >> FITS_BITS > 0 || -a >>
- * FITS_BITS > 0 => a >= (int64_t)1 << FITS_BITS || a <= -((int64_t)1 << FITS_BITS) instead: core/path_brake.c: (early |
- * late) >> 60 != 0 => early < 0 || early >= MOST_Q56 || late < 0 || late >= MOST_Q56 instead: core/path_brake.c:
- * qmath_shift_clamp(ratio_q15, a.exponent => some_shift(ratio_q15, a.exponent instead: core/path_brake.c:
- * qmath_div_up_u64(2u * speed, fall) => ticks_of(2u * speed, fall) instead: core/path_brake.c: n * fall - 2u * speed =>
- * (uint64_t)any_between(0, (int64_t)fall - 1) assumes: qmath_clz64 qmath_div_u64 qmath_third depth
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/path_brake.c: (uint32_t)((uint64_t)a << zeros >> 33), 33 - zeros => some_mantissa(a), (int)any_between(0 * zeros - 30, 32)
+ * instead: core/path_brake.c: rough_of(speed_q56 - fall_q56) => rough_of(any_between(1, speed_q56))
+ * instead: core/path_brake.c: rise <= MOST_Q56 && => from->acceleration_q56 <= MOST_Q56 && rise <= MOST_Q56 &&
+ * instead: core/path_brake.c: a >> FITS_BITS > 0 || -a >> FITS_BITS > 0 => a >= (int64_t)1 << FITS_BITS || a <= -((int64_t)1 << FITS_BITS)
+ * instead: core/path_brake.c: (early | late) >> 60 != 0 => early < 0 || early >= MOST_Q56 || late < 0 || late >= MOST_Q56
+ * instead: core/path_brake.c: qmath_shift_clamp(ratio_q15, a.exponent => some_shift(ratio_q15, a.exponent
+ * instead: core/path_brake.c: qmath_div_up_u64(2u * speed, fall) => ticks_of(2u * speed, fall)
+ * instead: core/path_brake.c: n * fall - 2u * speed => (uint64_t)any_between(0, (int64_t)fall - 1)
+ * assumes: qmath_clz64 qmath_div_u64 qmath_third depth
  * shows: path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step within
  * mutant: core/path_brake.c: up > 12 ? => up > 14 ?
  * mutant: core/path_brake.c: mantissa[code & 7u] => mantissa[code & 15u]
@@ -28,9 +28,9 @@
  * mutant: core/path_brake.c: 3u * n * n) => 3u * n * (n - 2u))
  * mutant: core/path_brake.c: n * (n * n - 1u) => n * (n * n - 4u)
  */
+#include "proof.h"
 #include "brake_contracts.h"
 #include "clz_contract.h"
-#include "proof.h"
 #include "thirds_contract.h"
 
 /*@ requires b != 0;

@@ -6,19 +6,18 @@
  *
  * prover: eva
  * options: -eva-slevel 10
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/program_clock.h:
- * program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece; assumes:
- * qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady shows: override_window_get
- * override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick
- * program_clock_set mutant: core/override_plan.c: clock->record->ahead[window] => clock->record->ahead[window + 1u]
- * mutant: core/override_plan.c: qmath_lesser(plan->asked_q57, most_q57) => plan->asked_q57 + most_q57 mutant:
- * core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/program_clock.h: program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece;
+ * assumes: qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
+ * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
+ * mutant: core/override_plan.c: clock->record->ahead[window] => clock->record->ahead[window + 1u]
+ * mutant: core/override_plan.c: qmath_lesser(plan->requested_q57, most_q57) => plan->requested_q57 + most_q57
+ * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"
+#include "ramp_contracts.h"
 #include "proof.h"
 #include "qmath_contracts.h"
-#include "ramp_contracts.h"
 
 /*@ predicate is_plan(struct override_plan *plan) =
       IS_OVERRIDE(plan->now.override_q57) && -OVERRIDE_MOST <= plan->now.slope_q56 <= OVERRIDE_MOST &&
@@ -90,7 +89,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->piece = i;
     clock->record = coefficients_piece_at(p, p->coefficients_for, i);
-    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
 }
 
@@ -148,8 +147,7 @@ int main(void)
         struct coefficients_piece *record = (void *)coefficients_piece_at(&p, &any_kernel, i);
         record->next = i + 1 == COUNT ? 0 : (int32_t)sizeof *record;
         record->number = i;
-        record->end_q42_s =
-            i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(INT64_MIN, INT64_MAX);
+        record->end_q42_s = i + 1 == COUNT ? UINT64_MAX : (uint64_t)any_between(INT64_MIN, INT64_MAX);
         for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
             record->ahead[k] = any_bounds();
         }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The CRC of any bytes: nothing outside of them and of its table is read. Their value: test_program.c and the golden
- * files.
+ * The CRC of any bytes: nothing outside of them and of its table is read. Their value: test_program.c and the golden files.
  *
  * prover: eva
  * options: -eva-slevel 0

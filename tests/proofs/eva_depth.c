@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * How deep a tick of a brake may go, for any jerk of the stop table and any speed that is above two ticks of it and
- * below 2^31 of them: no number wraps or overflows, no shift is out of range, no division by 0, the root is above 3/2,
- * and what comes out is at most 2^62. By octaves. Rough numbers have 31 bits.
+ * How deep a tick of a brake may go, for any jerk of the stop table and any speed that is above two ticks of it and below
+ * 2^31 of them: no number wraps or overflows, no shift is out of range, no division by 0, the root is above 3/2, and what
+ * comes out is at most 2^62. By octaves. Rough numbers have 31 bits.
  *
  * prover: eva
  * options: -eva-slevel 20000 -warn-unsigned-overflow
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/qmath.h: return high != 0 ?
- * qmath_clz32(high) : 32 + qmath_clz32((uint32_t)a); => return zeros_of(a, high); instead: core/path_brake.c: const int
- * even = qmath_clz64(square_q32) & ~1; => const int even = even_zeros(&square_q32); instead: core/path_brake.c: const
- * uint64_t square_q32 => uint64_t square_q32 assumes: qmath_root_above
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/qmath.h: return high != 0 ? qmath_clz32(high) : 32 + qmath_clz32((uint32_t)a); => return zeros_of(a, high);
+ * instead: core/path_brake.c: const int even = qmath_clz64(square_q32) & ~1; => const int even = even_zeros(&square_q32);
+ * instead: core/path_brake.c: const uint64_t square_q32 => uint64_t square_q32
+ * assumes: qmath_root_above
  * shows: depth rough_of
  * mutant: core/path_brake.c: w.exponent - j.exponent + 18 => w.exponent - j.exponent + 20
  * mutant: core/path_brake.c: (j.mantissa >> 15) + 1u => j.mantissa

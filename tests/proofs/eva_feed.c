@@ -5,9 +5,9 @@
  *
  * prover: eva
  * options: -eva-slevel 100
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/feed_piece.c: slope = 2 *
- * qmath_mul_hi(slope, tau_q31) + f->slope[k] => slope = (int32_t)any_between(INT32_MIN, INT32_MAX) assumes: qmath_clz64
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/feed_piece.c: slope = 2 * qmath_mul_hi(slope, tau_q31) + f->slope[k] => slope = (int32_t)any_between(INT32_MIN, INT32_MAX)
+ * assumes: qmath_clz64
  * shows: feed_piece_set feed_piece_at
  * mutant: core/feed_piece.c: int shift = 22 - exponent => int shift = 62 - exponent
  * mutant: core/feed_piece.c: from->c_q40_mm[k] * 16 => from->c_q40_mm[k] * 256

@@ -1,24 +1,23 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The fixed kernel on any segment that passes the checks, at any arc length on it or 2^-33 mm outside: nothing
- * overflows, no conversion changes a number, no division by 0. A segment is given by the power of four above its sigma,
- * of which all 22 are gone through, and the least Bernstein coefficient, in seven ranges; the greatest is at most twice
- * that.
+ * The fixed kernel on any segment that passes the checks, at any arc length on it or 2^-33 mm outside: nothing overflows,
+ * no conversion changes a number, no division by 0. A segment is given by the power of four above its sigma, of which all
+ * 22 are gone through, and the least Bernstein coefficient, in seven ranges; the greatest is at most twice that.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/qmath.h: (int64_t)((uint64_t)a <<
- * (shift & 63)) => a * ((int64_t)1 << shift) instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a <
- * INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0; instead: core/kernel_fixed.c:
- * end_q48[PH_S] - ph->c_q48_mm[PH_S][0] => behind_q48 instead: core/kernel_fixed.c: s_q48 - k->c_q48_mm[0] =>
- * from_middle_q48 instead: core/kernel_fixed.c: (1 << 25) - qmath_mul_hi(sigma_q30, inverse_q27) => small((1 << 25) -
- * qmath_mul_hi(sigma_q30, inverse_q27)) instead: core/kernel_fixed.c: value = qmath_mul_hi(value, z) - s_q30 => value =
- * half(qmath_mul_hi(value, z), z) - s_q30 assumes: slope_reciprocal_q15 quadratic first_guess qmath_third qmath_fifth
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/qmath.h: (int64_t)((uint64_t)a << (shift & 63)) => a * ((int64_t)1 << shift)
+ * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0;
+ * instead: core/kernel_fixed.c: end_q48[PH_S] - ph->c_q48_mm[PH_S][0] => behind_q48
+ * instead: core/kernel_fixed.c: s_q48 - k->c_q48_mm[0] => from_middle_q48
+ * instead: core/kernel_fixed.c: (1 << 25) - qmath_mul_hi(sigma_q30, inverse_q27) => small((1 << 25) - qmath_mul_hi(sigma_q30, inverse_q27))
+ * instead: core/kernel_fixed.c: value = qmath_mul_hi(value, z) - s_q30 => value = half(qmath_mul_hi(value, z), z) - s_q30
+ * assumes: slope_reciprocal_q15 quadratic first_guess qmath_third qmath_fifth
  * mutant: core/kernel_fixed.c: qmath_shift(i * c, i - 20 - n) => qmath_shift(i * c, i - 18 - n)
  * mutant: core/kernel_fixed.c: quadratic(k->v_q28, z) * 8 => quadratic(k->v_q28, z) * 16
  * mutant: core/kernel_fixed.c: reciprocal_q15 * (1 << 11) => reciprocal_q15 * (1 << 13)
- * mutant: core/kernel_fixed.c: qmath_clamp32(place.rest_q48_mm >> 4) => (place.rest_q48_mm >> 4)
+ * mutant: core/kernel_fixed.c: qmath_clamp32(place.remainder_q48_mm >> 4) => (place.remainder_q48_mm >> 4)
  * mutant: core/kernel_fixed.c: (uint32_t)(a_q30 >> 14) => (uint32_t)(a_q30 >> 28)
  */
 #include "kernel_bounds.h"
@@ -63,9 +62,9 @@ static int32_t half(int32_t value_q30, int32_t z)
     return (int32_t)any_between(-HALF_MOST_Q30, z <= -FAR_Z_Q31 ? -1 : 0);
 }
 
-#include "core/kernel_fixed.c"
 #include "core/ph_segment.c"
 #include "core/qmath.c"
+#include "core/kernel_fixed.c"
 
 /* What the reciprocal is taken of: the sums stay in range. */
 static void add_up_slope(const struct kernel_fixed_arc *k, int32_t z)
@@ -83,8 +82,7 @@ static void at(const struct kernel_fixed_segment *k, int64_t from, int64_t to)
     kernel_fixed_segment_at(k, point, any_between(-POWER(7), POWER(45) + POWER(7)));
 }
 
-/* In the segment and outside: up to a normalised arc length of 1.25, and beyond, which only the shortest segments know.
- * */
+/* In the segment and outside: up to a normalised arc length of 1.25, and beyond, which only the shortest segments know. */
 static void evaluate(const struct ph_segment *ph, int64_t most_q48)
 {
     struct kernel_fixed_segment k;
@@ -109,8 +107,7 @@ static void set_origin(struct ph_segment *ph)
     ph->axis_count = PROGRAM_PLANE;
 }
 
-/* Bernstein coefficients of sigma in [least, most], those of x and y as |w0|^2, |w2|^2 <= most and |w1|^2 <= 2 most
- * say. */
+/* Bernstein coefficients of sigma in [least, most], those of x and y as |w0|^2, |w2|^2 <= most and |w1|^2 <= 2 most say. */
 static void expand(struct ph_segment *ph, int64_t least, int64_t most)
 {
     int64_t e[5][PH_AXES];

@@ -5,11 +5,11 @@
  *
  * prover: eva
  * options: -eva-slevel 10
- * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ?
- * INT32_MAX : (int32_t)a; int32_t low = 0; instead: core/kernel_fixed.c: int32_t first = (int32_t)((half *
- * (int64_t)reciprocal_q16(sigma_middle_q30)) >> 19); => int32_t first = first_q26; (void)half; instead:
- * core/kernel_fixed.c: int32_t last = (int32_t)((half * (int64_t)reciprocal_q16(sigma_end_q30)) >> 19); => int32_t last
- * = last_q26; shows: first_guess mutant: core/kernel_fixed.c: t_q30 < 0x3FFFFFFF ? t_q30 : 0x3FFFFFFF => t_q30
+ * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0;
+ * instead: core/kernel_fixed.c: int32_t first = (int32_t)((half * (int64_t)reciprocal_q16(sigma_middle_q30)) >> 19); => int32_t first = first_q26; (void)half;
+ * instead: core/kernel_fixed.c: int32_t last = (int32_t)((half * (int64_t)reciprocal_q16(sigma_end_q30)) >> 19); => int32_t last = last_q26;
+ * shows: first_guess
+ * mutant: core/kernel_fixed.c: t_q30 < 0x3FFFFFFF ? t_q30 : 0x3FFFFFFF => t_q30
  * mutant: core/kernel_fixed.c: t_q25 < 0x1FFFFFF ? t_q25 * 64 => t_q25 < 0x2FFFFFF ? t_q25 * 64
  * mutant: core/kernel_fixed.c: 3 * one_q26 - 2 * first - last => 2 * one_q26 - 2 * first - last
  */

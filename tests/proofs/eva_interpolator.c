@@ -1,20 +1,18 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to
- * six path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record
- * is requested that there is not, nothing overflows.
+ * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to six
+ * path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is requested that there is not, nothing overflows.
  *
  * prover: eva
  * options: -eva-slevel 60
  * instead: core/interpolator.c: } else { => } else if (arc_length_q40_mm < segment->from_q40_mm) {
- * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override
- * program_piece_start ph_segment_expand ph_segment_end shows: interpolator_at_q42 interpolator_at_piece
- * interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step
- * interpolator_seek interpolator_ends coefficients_make mutant: core/coefficients.c: i + 1u < p->header.piece_count ?
- * (int32_t)piece_size => i < p->header.piece_count ? (int32_t)piece_size mutant: core/interpolator.c: if (next <
- * p->header.piece_count && => if (next <= p->header.piece_count && mutant: core/coefficients.c: i + 1u ==
- * p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX mutant: core/coefficients.c: i == 0 ?
- * INT64_MIN => i == 1 ? INT64_MIN mutant: core/override_ramp.c: first + least(count, left) => first + count
+ * assumes: program_segment_get program_segment_start program_piece_get program_piece_duration program_piece_override program_piece_start ph_segment_expand ph_segment_end
+ * shows: interpolator_at_q42 interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step interpolator_seek interpolator_ends coefficients_make
+ * mutant: core/coefficients.c: i + 1u < p->header.piece_count ? (int32_t)piece_size => i < p->header.piece_count ? (int32_t)piece_size
+ * mutant: core/interpolator.c: if (next < p->header.piece_count && => if (next <= p->header.piece_count &&
+ * mutant: core/coefficients.c: i + 1u == p->header.segment_count ? INT64_MAX => i == p->header.segment_count ? INT64_MAX
+ * mutant: core/coefficients.c: i == 0 ? INT64_MIN => i == 1 ? INT64_MIN
+ * mutant: core/override_ramp.c: first + least(count, left) => first + count
  */
 #include "core/ph_segment.h"
 #include "core/program.h"
@@ -65,9 +63,9 @@ void ph_segment_expand(struct ph_segment *ph, const struct program_segment *segm
     ensures -(1 << 60) < end_q48_mm[3] < (1 << 60); */
 void ph_segment_end(const struct ph_segment *ph, int64_t end_q48_mm[PH_AXES]);
 
-#include "core/coefficients.c"
 #include "core/interpolator.c"
 #include "core/kernel.c"
+#include "core/coefficients.c"
 #include "core/override_ramp.c"
 
 #define COUNT 3u
@@ -146,7 +144,7 @@ const struct kernel *const kernels_linked[KERNELS] = {&any_kernel, NULL, NULL};
 
 static uint64_t
     records[COUNT * (sizeof(struct coefficients_piece) + sizeof(struct coefficients_segment)) / 8 +
-            1];
+                        1];
 static uint32_t filled;
 
 static int take(void *context, const uint8_t *bytes, uint32_t size)
@@ -161,8 +159,8 @@ static uint64_t any_time(void)
     return (uint64_t)any_between(INT64_MIN, INT64_MAX);
 }
 
-/* Wherever the cursor is: after begin, and after any call before. Pieces are looked for without regard to the segment,
- * and segments to the piece. */
+/* Wherever the cursor is: after begin, and after any call before. Pieces are looked for without regard to the segment, and
+ * segments to the piece. */
 static void place(struct interpolator *it, uint32_t i)
 {
     it->piece = coefficients_piece_at(it->program, it->kernel, i);

@@ -4,8 +4,7 @@
  *
  * prover: eva
  * mutant: core/qmath.h: int32_t b0 = (int32_t)((uint32_t)b & 0xFFFFu) => int32_t b0 = (int32_t)((uint32_t)b & 0x1FFFFu)
- * mutant: core/qmath.h: int32_t other = a0 * b1 + (int32_t)((uint32_t)middle & 0xFFFFu) => int32_t other = a0 * b1 +
- * middle
+ * mutant: core/qmath.h: int32_t other = a0 * b1 + (int32_t)((uint32_t)middle & 0xFFFFu) => int32_t other = a0 * b1 + middle
  */
 #include "proof.h"
 

@@ -4,8 +4,8 @@
  * state; and the ranges of the results that other proofs rely on.
  *
  * prover: eva
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; assumes: qmath_clz64
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * assumes: qmath_clz64
  * shows: qmath_shift_clamp
  * mutant: core/qmath.h: a1 * b1 * 4096 => a1 * b1 * 16384
  * mutant: core/qmath.h: return a < 0 ? -a : a => return -a

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a tick computes of a ramp of the override, for any override bounds above 0, any period and any change: nothing
- * overflows, no shift is out of range, no division by 0, no product of ticks passes 64 bits; and what
- * override_contracts.h promises.
+ * What a tick computes of a ramp of the override, for any override bounds above 0, any period and any change: nothing overflows, no
+ * shift is out of range, no division by 0, no product of ticks passes 64 bits; and what override_contracts.h promises.
  *
  * prover: eva
  * assumes: qmath_div_u64 program_piece_override
- * shows: override_bounds_of override_limits_of override_change_of override_stage_of override_ticks_of override_step_of
- * override_span_q32 mutant: core/override_ramp.c: down < 32u ? => down < 64u ?
+ * shows: override_bounds_of override_limits_of override_change_of override_stage_of override_ticks_of override_step_of override_span_q32
+ * mutant: core/override_ramp.c: down < 32u ? => down < 64u ?
  * mutant: core/override_ramp.c: k < PROGRAM_LEVEL_FULL => k <= PROGRAM_LEVEL_FULL
  * mutant: core/override_ramp.c: (uint32_t)(change_q57 >> 27) + 1u => (uint32_t)(change_q57 >> 27)
  * mutant: core/override_ramp.c: half > ticks->rise ? half => half > ticks->rise ? 0
@@ -22,9 +21,8 @@
 /* Any limits, ticks, change and mean that the contracts allow. */
 static void ramp(void)
 {
-    struct ramp_limits limits = {(uint32_t)any_between(1, UINT32_MAX),
-                                 (uint32_t)any_between(0, 0x80000001),
-                                 (uint32_t)any_between(0, 0x80040000)};
+    struct ramp_limits limits = {
+        (uint32_t)any_between(1, UINT32_MAX), (uint32_t)any_between(0, 0x80000001), (uint32_t)any_between(0, 0x80040000)};
     struct ramp_ticks ticks;
     override_ticks_of(&ticks, &limits, any_between(0, OVERRIDE_MOST));
     ticks.rise = (uint32_t)any_between(1, MOST_HALF);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The checks of segments and their joints, and the expansion that they use, for every image of four segments and of two
- * to six path axes: nothing overflows, every index and shift is in range. Four are as good as any number: the third and
- * all later ones are met in the same state.
+ * The checks of segments and their joints, and the expansion that they use, for every image of four segments and of two to
+ * six path axes: nothing overflows, every index and shift is in range. Four are as good as any number: the third and all
+ * later ones are met in the same state.
  *
  * prover: eva
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; options: -eva-domains equality,symbolic-locations
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * options: -eva-domains equality,symbolic-locations
  * assumes: check_speed five_per_speed qmath_clz64 real_make real_add real_mul
  * shows: segment_check_all program_segment_get program_segment_start ph_segment_expand ph_segment_end
  * mutant: core/segment_check.c: target_q40 * 256 => target_q40 * 1024

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The check of the stop table, for every image of ten pieces whose pieces have passed their own check (more than the
- * walk remembers; all later ones are met in the same state) and any limits: it reads the table inside the image,
- * nothing overflows, also no unsigned number, so that no bound is shortened by a wrap, no division by 0, and it ends.
+ * The check of the stop table, for every image of ten pieces whose pieces have passed their own check (more than the walk
+ * remembers; all later ones are met in the same state) and any limits: it reads the table inside the image, nothing
+ * overflows, also no unsigned number, so that no bound is shortened by a wrap, no division by 0, and it ends.
  *
  * prover: eva
  * options: -eva-slevel 0 -warn-unsigned-overflow
- * assumes: qmath_clz64 qmath_div_u64 qmath_root stop_curve feed_bounds_parts program_piece_get program_piece_duration
- * program_piece_start program_piece_override shows: stop_check_all
+ * assumes: qmath_clz64 qmath_div_u64 qmath_root stop_curve feed_bounds_parts program_piece_get program_piece_duration program_piece_start program_piece_override
+ * shows: stop_check_all
  * mutant: core/program.c: (size_t)i * stop_size => (size_t)(i + 1u) * stop_size
  * mutant: core/stop_check.c: stop_walk_back(&walk, i - 1u) => stop_walk_back(&walk, i)
  * mutant: core/stop_check.c: walk->count < STOP_WINDOW ? 1u => walk->count <= STOP_WINDOW ? 1u

@@ -5,19 +5,18 @@
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast
- * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b +
- * (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0; instead: core/qmath.h: (int64_t)((uint64_t)a <<
- * (shift & 63)) => a * ((int64_t)1 << shift) instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a <
- * INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0; mutant: core/ph_segment.c: (48 +
- * PH_LEAST_EXPONENT - 1) => (48 + PH_LEAST_EXPONENT - 4) mutant: core/ph_segment.c: ph->sigma_q50_mm[k] = sigma_q48 *
- * 4; => ph->sigma_q50_mm[k] = 0; mutant: core/ph_segment.c: ph->exponent = PH_LEAST_EXPONENT; => ph->exponent =
- * PH_LEAST_EXPONENT - 4;
+ * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
+ * instead: core/qmath.h: (int64_t)((uint64_t)a << (shift & 63)) => a * ((int64_t)1 << shift)
+ * instead: core/qmath.h: int32_t low = (int32_t)a; => if (1) return a < INT32_MIN ? INT32_MIN : a > INT32_MAX ? INT32_MAX : (int32_t)a; int32_t low = 0;
+ * mutant: core/ph_segment.c: (48 + PH_LEAST_EXPONENT - 1) => (48 + PH_LEAST_EXPONENT - 4)
+ * mutant: core/ph_segment.c: ph->sigma_q50_mm[k] = sigma_q48 * 4; => ph->sigma_q50_mm[k] = 0;
+ * mutant: core/ph_segment.c: ph->exponent = PH_LEAST_EXPONENT; => ph->exponent = PH_LEAST_EXPONENT - 4;
  */
 #include "proof.h"
 
-#include "core/kernel_fixed.c"
 #include "core/ph_segment.c"
 #include "core/qmath.c"
+#include "core/kernel_fixed.c"
 
 int main(void)
 {

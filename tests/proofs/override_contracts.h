@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the
- * interpolator; for eva_override.c (docs/theory/numerics.md sections 15.5 and 15.6).
+ * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the interpolator; for eva_override.c
+ * (docs/theory/numerics.md sections 15.5 and 15.6).
  */
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H
@@ -12,8 +12,8 @@
 #include "core/feed_override.h"
 #include "ramp_contracts.h"
 
-#define MOST_SLOPE ((int64_t)1 << 57)
-#define MOST_ARC   (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
+#define MOST_SLOPE       ((int64_t)1 << 57)
+#define MOST_ARC         (((int64_t)1 << 62) + ((int64_t)1 << 60)) /* length and a piece's coefficients */
 #define MOST_FEED_AT     ((int64_t)1 << 60)
 #define LEAST_ARC        (-((int64_t)1 << 60))
 #define IS_ARC(q40_mm)   (LEAST_ARC <= (q40_mm) && (q40_mm) <= MOST_ARC)
@@ -34,7 +34,7 @@
 /* --- core/program_clock.h, core/override_plan.h: eva_clock.c --- */
 
 /*@ requires piece < clock->program->header.piece_count;
-    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
+    assigns clock->time_q42_s, clock->remainder, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
@@ -62,10 +62,10 @@ void override_plan_set(struct override_plan *plan, uint32_t percent);
 
 /*@ requires is_plan(plan);
     assigns plan->ramp \from plan->ramp; */
-void override_plan_rise_no_more(struct override_plan *plan);
+void override_plan_end_rise(struct override_plan *plan);
 
 /*@ requires is_plan(plan) && is_clock(clock);
-    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s
+    assigns \result, *plan, clock->time_q42_s, clock->remainder, clock->fine, clock->piece, clock->even_q62_s
             \from *plan, clock->time_q42_s;
     ensures \initialized(plan) && is_plan(plan) && is_clock(clock); */
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
@@ -111,17 +111,16 @@ int path_brake_rests(const struct path_brake *brake);
 
 /*@ assigns \result, *out, it->segment \from time_q42_s;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece,
-                          uint64_t time_q42_s, struct interpolator_point *out);
+int interpolator_at_piece(struct interpolator *it, const struct coefficients_piece *piece, uint64_t time_q42_s,
+                    struct interpolator_point *out);
 
 /*@ assigns \result, *out, it->segment \from arc_length_q40_mm;
     ensures IS_RESULT(\result) && \initialized(out) && is_point(out); */
-int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm,
-                               struct interpolator_point *out);
+int interpolator_at_arc_length(struct interpolator *it, int64_t arc_length_q40_mm, struct interpolator_point *out);
 
 /*@ assigns \result \from time_q42_s; */
-int64_t interpolator_acceleration_q40(const struct interpolator *it,
-                                      const struct coefficients_piece *piece, uint64_t time_q42_s);
+int64_t interpolator_acceleration_q40(const struct interpolator *it, const struct coefficients_piece *piece,
+                                uint64_t time_q42_s);
 
 /*@ requires index < 3;
     assigns search->arc_length_q40_mm, search->time_q42_s, search->piece_index, search->bisecting \from index,

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What holds of the plan of the override before and after every tick, `is_sound`: the override is in [0, 2], so is
- * where a ramp ends, no slope is greater than a way, and what is looked for or about to begin can be. cbmc_plan.c shows
- * it for ticks at rest, with every command, and from the first tick on; docs/theory/numerics.md section 15.4 argues it
- * for ticks of a ramp.
+ * What holds of the plan of the override before and after every tick, `is_sound`: the override is in [0, 2], so is where a
+ * ramp ends, no slope is greater than a way, and what is looked for or about to begin can be. cbmc_plan.c shows it for ticks at
+ * rest, with every command, and from the first tick on; docs/theory/numerics.md section 15.4 argues it for ticks of a ramp.
  *
- * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut
- * would raise the override by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e
- * (f + r) more: three numbers of their own here.
+ * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut would
+ * raise the override by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e (f + r) more:
+ * three numbers of their own here.
  */
 #ifndef HODOGRAPH_PLAN_IS_SOUND_H
 #define HODOGRAPH_PLAN_IS_SOUND_H
@@ -15,12 +14,12 @@
 #include "proof.h"
 #include "ramp_contracts.h"
 
-#include "core/override_plan.c"
 #include "core/override_ramp.c"
+#include "core/override_plan.c"
 
 /* --- What the plan stands on: override_contracts.h --- */
 
-static int64_t begun_q57;             /* the way that a step was made for */
+static int64_t begun_q57; /* the way that a step was made for */
 static struct program_override ahead; /* bounds of the window that is looked at */
 
 void some_ticks(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
@@ -71,13 +70,12 @@ void some_stage(struct ramp_stage *out, const struct program_override *bounds,
     out->level = nondet_uint32();
     out->end_q57 = nondet_int64();
     assume(out->end_q57 == to_q57 || out->end_q57 < OVERRIDE_ONE);
-    assume(IS_STAGE(out) &&
-           (from_q57 < to_q57 ? from_q57 <= out->end_q57 && out->end_q57 <= to_q57
-                              : to_q57 <= out->end_q57 && out->end_q57 <= from_q57));
+    assume(IS_STAGE(out) && (from_q57 < to_q57 ? from_q57 <= out->end_q57 && out->end_q57 <= to_q57
+                                               : to_q57 <= out->end_q57 && out->end_q57 <= from_q57));
 }
 
 void some_limits(struct ramp_limits *out, const struct program_override *bounds, uint32_t level,
-                 uint32_t period_log2)
+               uint32_t period_log2)
 {
     (void)bounds;
     (void)period_log2;
@@ -150,14 +148,16 @@ static int search_is_sound(const struct override_plan *plan)
         return 0;
     }
     if (plan->step >= OVERRIDE_MEASURES &&
-        (plan->stage.level >= PROGRAM_LEVELS || !IS_OVERRIDE(plan->stage.end_q57) ||
+        (plan->stage.level >= PROGRAM_LEVELS ||
+         !IS_OVERRIDE(plan->stage.end_q57) ||
          (climbs && plan->stage.end_q57 != plan->target_q57) ||
          ((plan->kind == OVERRIDE_RETURN || plan->kind == OVERRIDE_SETTLE) &&
           plan->stage.end_q57 > plan->guaranteed_q57))) {
         return 0;
     }
     return plan->step <= OVERRIDE_FITS &&
-           (plan->step < OVERRIDE_FITS || (IS_TICKS(&plan->ticks) && IS_OVERRIDE(plan->high_q57)));
+           (plan->step < OVERRIDE_FITS ||
+            (IS_TICKS(&plan->ticks) && IS_OVERRIDE(plan->high_q57)));
 }
 
 static int task_is_sound(const struct override_plan *plan)
@@ -186,8 +186,8 @@ static int task_is_sound(const struct override_plan *plan)
 /* Above guaranteed_q57 the ramp back is known. */
 static int is_sound(const struct override_plan *plan, const struct way *way)
 {
-    const int above =
-        plan->now.override_q57 > plan->guaranteed_q57 || end_of(plan, way) > plan->guaranteed_q57;
+    const int above = plan->now.override_q57 > plan->guaranteed_q57 ||
+                      end_of(plan, way) > plan->guaranteed_q57;
     return is_way(plan, way) && task_is_sound(plan) && plan->task <= OVERRIDE_BEGINS &&
            plan->kind <= OVERRIDE_CLIMB && plan->window <= OVERRIDE_WINDOWS &&
            plan->wanted_q57 >= -1 && plan->wanted_q57 <= OVERRIDE_MOST &&

@@ -108,7 +108,7 @@ static void test_times_heartbeats_and_reactions(void)
     uint32_t counter = 0;
     boot();
     const struct od_drive *values = &drive(1)->values;
-    TEST_ASSERT_EQUAL_HEX32(0x00010000u + DRIVE_CONTROLLER_SILENT_MS,
+    TEST_ASSERT_EQUAL_HEX32(0x00010000u + DRIVE_CONTROLLER_TIMEOUT_MS,
                             values->consumer_heartbeat_time[0]);
     TEST_ASSERT_EQUAL_INT(3, values->abort_connection_option_code);
     TEST_ASSERT_EQUAL_INT(2, values->quick_stop_option_code);

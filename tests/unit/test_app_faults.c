@@ -486,7 +486,7 @@ static void test_quick_stop_without_end_is_a_fault(void)
     drive(1)->position_counts += 2 * (int32_t)bench.controller.config.start_tolerance_counts;
     app_bench_periods(&bench, 2);
     refused(COMMAND_RESET, MACHINE_MOVING);
-    app_bench_periods(&bench, AXIS_REST_SYNCS);
+    app_bench_periods(&bench, AXIS_UNMOVED_SYNCS);
     recover();
 }
 

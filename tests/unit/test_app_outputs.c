@@ -115,8 +115,8 @@ void tearDown(void)
 {
 }
 
-/* The outputs are those of the place where the axes are, at this very SYNC; the valve's places are no counts exactly.
- * */
+/* The outputs are those of the place where the axes are, at this very SYNC; the valve's places are no counts
+ * exactly. */
 static void check_place(void)
 {
     const int32_t at = place_counts();

@@ -478,7 +478,7 @@ static void test_a_stored_node_number_holds_from_the_next_power_on(void)
     TEST_ASSERT_EQUAL_HEX32(0x605, read_u32(0x1200, 1));
     TEST_ASSERT_EQUAL_HEX32(0x85, read_u32(0x1014, 0));
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    TEST_ASSERT_EQUAL_HEX32(0x00050000u + DRIVE_CONTROLLER_SILENT_MS,
+    TEST_ASSERT_EQUAL_HEX32(0x00050000u + DRIVE_CONTROLLER_TIMEOUT_MS,
                             bench.drives[0].values.consumer_heartbeat_time[0]);
     write(0x2054, 0, 0, 1);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());

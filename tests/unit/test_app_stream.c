@@ -786,8 +786,8 @@ static void test_another_configuration_refuses_start_and_chunks(void)
     command(COMMAND_START);
 }
 
-/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job runs.
- * */
+/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job
+ * runs. */
 static void test_a_main_loop_that_makes_no_records(void)
 {
     expect_sent(&parts[0]);

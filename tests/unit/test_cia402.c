@@ -328,8 +328,8 @@ static void test_master_leaves_a_fault_only_when_told(void)
     }
 }
 
-/* Transitions of CiA 402-2 by goal, one letter a state: 6, 7, F are the commands, 0 and Q off and quick stop, R reset.
- * */
+/* Transitions of CiA 402-2 by goal, one letter a state: 6, 7, F are the commands, 0 and Q off and quick stop, R
+ * reset. */
 static void test_master_commands_are_those_of_the_standard(void)
 {
     static const char *const letters[CIA402_GOALS] = {"00000000", "06666000", "06777000",

@@ -386,8 +386,8 @@ static void test_error_behaviour(void)
     }
 }
 
-/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap late.
- * */
+/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap
+ * late. */
 static void test_the_masters_heartbeat_is_not_missed_early(void)
 {
     struct can_msg beat;

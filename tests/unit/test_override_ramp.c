@@ -180,8 +180,8 @@ static void test_bounds_at_the_ends_of_the_format(void)
     }
 }
 
-/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick.
- * */
+/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a
+ * tick. */
 static void test_limits_of_all_codes(void)
 {
     for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {

@@ -46,7 +46,7 @@ static bool hear(const uint8_t data[8])
 {
     struct can_msg in;
 
-    cob_frame(&in, COB_SDO_ANSWER + TALK_NODE, 8);
+    cob_frame(&in, COB_SDO_RESPONSE + TALK_NODE, 8);
     memcpy(in.data, data, 8);
     return sdo_client_receive(&client, &in, &frame);
 }
@@ -117,7 +117,7 @@ static void test_timeout(void)
     TEST_ASSERT_FALSE(sdo_client_process(&client, CLIENT_TIMEOUT_US - 1, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
     TEST_ASSERT_TRUE(sdo_client_process(&client, 1, &frame));
-    TEST_ASSERT_EQUAL_HEX32(COB_SDO_ASK + TALK_NODE, frame.id);
+    TEST_ASSERT_EQUAL_HEX32(COB_SDO_REQUEST + TALK_NODE, frame.id);
     TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, cob_get(frame.data + 4, 4));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
@@ -156,7 +156,7 @@ static void test_ignores_late_and_foreign_frames(void)
     TEST_ASSERT_FALSE(hear(about_another));
     TEST_ASSERT_FALSE(hear(abort_of_another));
     TEST_ASSERT_FALSE(hear(abort_of_0x6000));
-    cob_frame(&foreign, COB_SDO_ANSWER + TALK_NODE + 1, 8);
+    cob_frame(&foreign, COB_SDO_RESPONSE + TALK_NODE + 1, 8);
     foreign.data[0] = 0x80;
     TEST_ASSERT_FALSE(sdo_client_receive(&client, &foreign, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);

@@ -166,7 +166,7 @@ static void random_answer(const struct sdo_client *client, struct can_msg *answe
 {
     static const uint8_t kinds[] = {0x60, 0x20, 0x41, 0x43, 0x4F, 0x42, 0x00, 0x10, 0x01, 0x80};
 
-    cob_frame(answer, COB_SDO_ANSWER + TALK_NODE, 8);
+    cob_frame(answer, COB_SDO_RESPONSE + TALK_NODE, 8);
     random_bytes(answer->data, 8);
     if (random_below(10) != 0) {
         answer->data[0] = kinds[random_below(sizeof kinds)];

@@ -152,10 +152,10 @@ static void test_ignores_what_is_not_for_it(void)
 {
     struct can_msg in;
 
-    cob_frame(&in, COB_SDO_ASK + TALK_NODE + 1, 8);
+    cob_frame(&in, COB_SDO_REQUEST + TALK_NODE + 1, 8);
     in.data[0] = 0x40;
     TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
-    cob_frame(&in, COB_SDO_ASK + TALK_NODE, 7);
+    cob_frame(&in, COB_SDO_REQUEST + TALK_NODE, 7);
     in.data[0] = 0x40;
     TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
     TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 0, SDO_ABORT_GENERAL));

@@ -254,9 +254,9 @@ static void test_the_watchdog_is_fed_while_ticks_go_on(void)
 
 static void test_a_bite_is_told_once_and_forgotten(void)
 {
-    TEST_ASSERT_FALSE(watchdog_has_bitten());
+    TEST_ASSERT_FALSE(watchdog_has_reset());
     chip_poke(RCC + 0x94u, 1u << 29);
-    TEST_ASSERT_TRUE(watchdog_has_bitten());
+    TEST_ASSERT_TRUE(watchdog_has_reset());
     TEST_ASSERT_BITS_HIGH(1u << 23, chip_peek(RCC + 0x94u));
 }
 

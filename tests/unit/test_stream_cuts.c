@@ -351,7 +351,7 @@ static int rests(void)
     return over() || feed_override_state(&now.m.feed) == FEED_HELD ||
            feed_override_waits(&now.m.feed) ||
            (feed_override_state(&now.m.feed) == FEED_RUNNING && now.m.feed.plan.started != 0 &&
-            now.m.feed.plan.asked_q57 == 0 && now.m.feed.plan.now.override_q57 == 0);
+            now.m.feed.plan.requested_q57 == 0 && now.m.feed.plan.now.override_q57 == 0);
 }
 
 /* --- A case --- */
@@ -460,7 +460,7 @@ static void begin(uint64_t *random, uint32_t first, uint32_t count)
 /* The host sends no more: to rest, unless the override is nothing or it has been held there. */
 static void end(uint64_t *random)
 {
-    if (now.m.feed.plan.asked_q57 < OVERRIDE_ONE / 2) {
+    if (now.m.feed.plan.requested_q57 < OVERRIDE_ONE / 2) {
         feed_override_set(&now.m.feed, 60u + (uint32_t)(golden_random(random) % 100u));
     }
     for (uint32_t i = 0; i < LONGEST && !rests(); i++) {

@@ -254,7 +254,7 @@ bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can
     return boot->phase == DRIVE_BOOT_START && start_next(boot, out);
 }
 
-void drive_boot_silent(struct drive_boot *boot, uint8_t node)
+void drive_boot_unresponsive(struct drive_boot *boot, uint8_t node)
 {
     if (boot->phase == DRIVE_BOOT_IDLE) {
         boot->trouble = (struct drive_trouble){

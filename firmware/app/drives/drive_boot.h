@@ -71,7 +71,7 @@ bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can
 
 /* Names a drive that was configured and started but gives no process data: trouble of object 0 until
  * the next attempt begins; node 0: no trouble. Only between attempts; else nothing happens. */
-void drive_boot_silent(struct drive_boot *boot, uint8_t node);
+void drive_boot_unresponsive(struct drive_boot *boot, uint8_t node);
 
 /* True once after an attempt that reached every drive. */
 bool drive_boot_finished(struct drive_boot *boot);

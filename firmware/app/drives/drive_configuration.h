@@ -20,8 +20,8 @@
 
 /* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
  * long program can keep the main loop from it for a second). */
-#define DRIVE_HEARTBEAT_MS         100u
-#define DRIVE_CONTROLLER_SILENT_MS 2000u
+#define DRIVE_HEARTBEAT_MS          100u
+#define DRIVE_CONTROLLER_TIMEOUT_MS 2000u
 
 /* Drives, and the I/O module, where there is one. Pure. */
 static inline uint8_t drive_configuration_nodes(const struct config *config)

@@ -21,7 +21,7 @@
 #define AXIS_STANDSTILL_SYNCS 250u
 
 /* A drive with power on moves until it has been in one place for so long. */
-#define AXIS_REST_SYNCS 50u
+#define AXIS_UNMOVED_SYNCS 50u
 
 /* With power off a drive that is lost may still come back by itself within this time. */
 #define AXIS_LOST_FOR_LONG_US 1000000u
@@ -60,9 +60,9 @@ struct axis {
     bool homed;                       /* its drive has the zero that homing gave it */
     /* where it was when it was seen last before it was to be found again */
     int32_t last_seen_counts;
-    uint32_t rest_syncs; /* with power on: for how long it has been, in this state, at */
-    int32_t rest_counts;
-    enum cia402_state rest_state;
+    uint32_t unmoved_syncs; /* with power on: for how long it has been, in this state, at */
+    int32_t unmoved_counts;
+    enum cia402_state unmoved_state;
     /* for how long it has stood still, enabled, at an unchanged target */
     uint32_t standstill_syncs;
 };
@@ -130,7 +130,7 @@ bool axis_follows(const struct axis *axis); /* enabled, answers, follows its tar
 bool axis_has_stopped(const struct axis *axis);
 bool axis_moves(const struct axis *axis);   /* power is on, and its position has changed lately */
 bool axis_reached(const struct axis *axis); /* at its goal; enabled: it follows its target too */
-bool axis_still(const struct axis *axis);
+bool axis_stands(const struct axis *axis);
 
 /* Distance between the position and where it should have been at the same SYNC. */
 uint32_t axis_deviation_counts(const struct axis *axis);

@@ -160,7 +160,7 @@ static uint32_t window_counts(const struct config *config, uint8_t axis)
     return at_most_u32(qmath_div_u64(lag_nm * config_counts_per_unit(config, axis), 1000000u));
 }
 
-static uint32_t turn_tolerance_counts(const struct config *config, uint8_t axis)
+static uint32_t rotary_tolerance_counts(const struct config *config, uint8_t axis)
 {
     const uint64_t scaled =
         (uint64_t)config->start_tolerance_counts * config->axis[axis].counts_per_unit;
@@ -212,7 +212,7 @@ void config_read(struct config *config, const struct od *od)
         config->travel_max_counts[i] = (int32_t)number(od, TRAVEL_MAX, sub);
         read_axis(&config->axis[i], od, sub);
         read_window(config, i);
-        config->turn_tolerance_counts[i] = turn_tolerance_counts(config, i);
+        config->rotary_tolerance_counts[i] = rotary_tolerance_counts(config, i);
     }
     read_outputs(&config->outputs, od);
     config->crc32 = crc_of(od, config->axis_count);

@@ -100,7 +100,7 @@ struct config {
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
     struct config_outputs outputs;
     uint32_t crc32; /* of the objects; docs/reference/protocol.md section 3.4 */
-    uint32_t turn_tolerance_counts
+    uint32_t rotary_tolerance_counts
         [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
     /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
      * window and its time where they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, of an axis in
@@ -135,7 +135,7 @@ static inline uint32_t config_counts_per_unit(const struct config *config, uint3
 static inline uint32_t config_tolerance_counts(const struct config *config, uint32_t axis)
 {
     const bool turns = config->axis[axis].counts_per_unit != 0u;
-    return turns ? config->turn_tolerance_counts[axis] : config->start_tolerance_counts;
+    return turns ? config->rotary_tolerance_counts[axis] : config->start_tolerance_counts;
 }
 
 /* Whether positions of an axis mean the same in both: the zero that homing found under one still holds under the

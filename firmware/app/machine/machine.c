@@ -100,7 +100,7 @@ bool machine_busy(const struct machine *machine)
         return machine->state == MACHINE_ENABLING || machine_moving(machine);
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_still(&machine->axes[i])) {
+        if (!axis_stands(&machine->axes[i])) {
             return true;
         }
     }

@@ -182,7 +182,7 @@ static enum machine_refusal start_refusal(const struct machine *machine,
         }
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_still(&machine->axes[i])) {
+        if (!axis_stands(&machine->axes[i])) {
             return MACHINE_MOVING;
         }
     }

@@ -51,25 +51,25 @@ static enum outputs_mode mode_of(const struct machine *machine)
 static void put(struct outputs *outputs, const struct path_outputs_values *values)
 {
     outputs->newest = (outputs->newest + 1u) % CONFIG_OUTPUTS_DELAY_MAX;
-    outputs->held_back[outputs->newest] = *values;
+    outputs->delayed[outputs->newest] = *values;
 }
 
 /* Makes the outputs of `delay_ticks` SYNCs ago the present ones. */
-static void hold_back(struct outputs *outputs, const struct path_outputs_values *values,
-                      uint32_t delay_ticks)
+static void delay(struct outputs *outputs, const struct path_outputs_values *values,
+                  uint32_t delay_ticks)
 {
     if (delay_ticks == 0u) {
         outputs->present = *values;
         return;
     }
     const uint32_t from = outputs->newest + CONFIG_OUTPUTS_DELAY_MAX + 1u - delay_ticks;
-    outputs->present = outputs->held_back[from % CONFIG_OUTPUTS_DELAY_MAX];
+    outputs->present = outputs->delayed[from % CONFIG_OUTPUTS_DELAY_MAX];
     put(outputs, values);
 }
 
 static void switch_off(struct outputs *outputs)
 {
-    memset(outputs->held_back, 0, sizeof outputs->held_back);
+    memset(outputs->delayed, 0, sizeof outputs->delayed);
     memset(&outputs->present, 0, sizeof outputs->present);
 }
 
@@ -92,7 +92,7 @@ void outputs_step(struct outputs *outputs, struct machine *machine, bool synced)
     if (mode != OUTPUTS_FOLLOW) {
         switch_off(outputs);
     } else if (synced) {
-        hold_back(outputs, &machine->motion.outputs.values, machine->config.outputs.delay_ticks);
+        delay(outputs, &machine->motion.outputs.values, machine->config.outputs.delay_ticks);
     }
     if (mode == OUTPUTS_CLEARED) {
         path_outputs_clear(&machine->motion.outputs);

@@ -21,16 +21,16 @@ struct statusword_monitor {
     uint8_t in_row; /* answers with wrong bits */
 };
 
-void statusword_monitor_init(struct statusword_monitor *watch);
+void statusword_monitor_init(struct statusword_monitor *monitor);
 
 /* A statusword in Operation enabled; csp: bits 12 and 13 have their meaning of that mode. Receive. */
-void statusword_monitor_take(struct statusword_monitor *watch, uint16_t statusword, bool csp);
+void statusword_monitor_take(struct statusword_monitor *monitor, uint16_t statusword, bool csp);
 
 /* What is wrong, as an error code of app/machine/fault.h or canopen/emcy.h; 0: nothing. Pure. */
-uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch);
+uint16_t statusword_monitor_trouble(const struct statusword_monitor *monitor);
 
 /* Whether the drive, by these bits, follows its controlword and its target. A following error alone does not count.
  * Pure. */
-bool statusword_monitor_follows(const struct statusword_monitor *watch);
+bool statusword_monitor_follows(const struct statusword_monitor *monitor);
 
 #endif

@@ -37,8 +37,8 @@ static inline void core_sleep(void)
     __asm__ volatile("dsb\n\twfi" ::: "memory");
 }
 
-/* Enables a board's interrupt (0 ... 239) with a priority, 0 the highest; in the upper bits, as many as the core has.
- * */
+/* Enables a board's interrupt (0 ... 239) with a priority, 0 the highest; in the upper bits, as many as the core
+ * has. */
 static inline void core_enable(uint32_t number, uint8_t priority)
 {
     const uint32_t shift = 8u * (number % 4u);

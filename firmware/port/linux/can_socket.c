@@ -47,7 +47,7 @@ static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct
 }
 
 /* Frames of ours that are tracked pass as well; with no filter all do. */
-static int tell_kernel(const struct can_socket *socket)
+static int set_kernel_filters(const struct can_socket *socket)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS + CAN_SOCKET_TRACKED];
     size_t count = socket->filter_count;
@@ -71,7 +71,8 @@ int can_socket_filter(struct can_socket *socket, const struct can_match *filters
     }
     memcpy(socket->filters, filters, count * sizeof filters[0]);
     socket->filter_count = count;
-    return socket->local ? tell_hub(socket, LOCAL_BUS_FILTER, filters, count) : tell_kernel(socket);
+    return socket->local ? tell_hub(socket, LOCAL_BUS_FILTER, filters, count)
+                         : set_kernel_filters(socket);
 }
 
 int can_socket_defer(struct can_socket *socket, const struct can_match *frames, size_t count)
@@ -96,7 +97,7 @@ static int ask_back(const struct can_socket *socket)
     const int error =
         setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) == 0 ? 0
                                                                                         : -errno;
-    return error == 0 ? tell_kernel(socket) : error;
+    return error == 0 ? set_kernel_filters(socket) : error;
 }
 
 static bool is_among(const uint16_t *ids, size_t count, uint16_t id)
@@ -244,8 +245,8 @@ static size_t frames_in_packet(const struct can_socket *socket)
     return socket->local && clock_is_virtual() ? LOCAL_BUS_PACKET : 1u;
 }
 
-/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`.
- * */
+/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in
+ * `messages`. */
 static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
                     const struct local_bus_frame *frames, struct can_msg *messages,
                     uint64_t *stamps_ns)

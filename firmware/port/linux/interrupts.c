@@ -146,7 +146,7 @@ static uint64_t main_loop_had_ns(void)
 }
 
 /* At lock step no thread here is a real-time one, and the scheduler is fair. */
-static bool gives_way(void)
+static bool may_yield(void)
 {
     const uint32_t turns = __atomic_load_n(&self.main_loop_turns, __ATOMIC_RELAXED);
     return !self.lock_step && !clock_is_virtual() &&
@@ -171,7 +171,7 @@ static void step(uint64_t longest_ns)
         clock_leave(); /* the shutdown needs a clock that goes on */
     }
     schedule_wait(&self.schedule, self.now_ns);
-    if (self.now_ns >= self.schedule.due_ns && !gives_way()) {
+    if (self.now_ns >= self.schedule.due_ns && !may_yield()) {
         run_tick();
     }
 }

@@ -124,8 +124,8 @@ uint8_t port_node_id(void)
     return self.options.node;
 }
 
-/* What drives answer to a SYNC (TPDO1) is needed by the next tick: in virtual time the process does not wake for each.
- * */
+/* What drives answer to a SYNC (TPDO1) is needed by the next tick: in virtual time the process does not wake for
+ * each. */
 int port_can_accept(const struct can_match *filters, size_t count)
 {
     static const struct can_match answers = {0x180u, 0x780u};

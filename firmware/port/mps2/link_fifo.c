@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right after the tick.
- * */
+/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right after the
+ * tick. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"
@@ -111,8 +111,8 @@ static uint16_t tick_flags(const struct link_request *request)
     return (uint16_t)(EXCHANGE_TICK | await | hurry);
 }
 
-/* Until the next tick is due; at lock step that is when all have answered, which need not be said, and no tick is late.
- * */
+/* Until the next tick is due; at lock step that is when all have answered, which need not be said, and no tick is
+ * late. */
 static uint32_t after_tick(const struct link_request *request)
 {
     const uint16_t flags = tick_flags(request);

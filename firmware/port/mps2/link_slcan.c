@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* link_slcan: SLCAN on the UART, in real time. The board behaves as a host does towards an adapter: it opens the bus.
- * */
+/* link_slcan: SLCAN on the UART, in real time. The board behaves as a host does towards an adapter: it opens the
+ * bus. */
 #include "can/slcan.h"
 #include "port/cortex_m/core.h"
 #include "port/mps2/interrupts.h"

@@ -23,8 +23,8 @@ int semihost_open(const char *path, enum semihost_mode mode);
 int semihost_read(int handle, void *data, size_t size);
 int semihost_write(int handle, const void *data, size_t size);
 
-/* What is there, at least one byte: it waits for that. Returns how many bytes, or -1 when the file has ended or failed.
- * */
+/* What is there, at least one byte: it waits for that. Returns how many bytes, or -1 when the file has ended or
+ * failed. */
 int semihost_read_some(int handle, void *data, size_t size);
 
 /* Closes it. 0, or -1 when the host could not write what was left. */

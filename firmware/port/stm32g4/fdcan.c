@@ -22,7 +22,7 @@
 #define SPARE_BITS    25u
 #define COUNTS_PER_S  10000000u
 #define GUARD_MAX     2500u
-#define ANSWER_LOOKS  10000u /* at a bit that takes some cycles of the slower clock */
+#define ANSWER_POLLS  10000u /* at a bit that takes some cycles of the slower clock */
 #define INTERRUPTS_ON (FDCAN_IE_RF0NE | FDCAN_IE_RF0LE | FDCAN_IE_TCE | FDCAN_IE_EPE | FDCAN_IE_BOE)
 
 static uint32_t get(uint32_t offset)
@@ -55,7 +55,7 @@ static uint32_t bit_timing(uint32_t bits_s)
 static bool set_control(uint32_t value)
 {
     put(FDCAN_CCCR, value);
-    for (uint32_t i = 0; i < ANSWER_LOOKS; ++i) {
+    for (uint32_t i = 0; i < ANSWER_POLLS; ++i) {
         if ((get(FDCAN_CCCR) & (FDCAN_CCCR_INIT | FDCAN_CCCR_CCE)) == value) {
             return true;
         }

@@ -13,7 +13,7 @@
 #define ERASED 0xFFu
 
 /* The chip gives up after 25 ms at the latest; this many looks take longer. */
-#define LOOKS 2000000u
+#define POLLS 2000000u
 
 static uint32_t get(uint32_t offset)
 {
@@ -32,7 +32,7 @@ bool flash_is_dual(void)
 
 static bool is_idle(void)
 {
-    for (uint32_t i = 0; i < LOOKS; ++i) {
+    for (uint32_t i = 0; i < POLLS; ++i) {
         if ((get(FLASH_SR) & FLASH_SR_BSY) == 0u) {
             return true;
         }

@@ -57,7 +57,7 @@ int port_begin(int argc, char **argv)
     pins_begin();
     const bool clocked = clock_begin();
     console_begin();
-    if (watchdog_has_bitten()) {
+    if (watchdog_has_reset()) {
         port_log(PORT_WARNING, "restarted by the watchdog", 0);
     }
     if (!clocked) {

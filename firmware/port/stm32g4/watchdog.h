@@ -20,6 +20,6 @@ void watchdog_start(void);
 void watchdog_feed(uint32_t ticks);
 
 /* Whether it was the watchdog that restarted the chip; forgets it. */
-bool watchdog_has_bitten(void);
+bool watchdog_has_reset(void);
 
 #endif

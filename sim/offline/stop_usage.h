@@ -2,12 +2,12 @@
 /*
  * What a motion along a path asks of limits, as a share of them: above 1 a limit is passed.
  *
- * Two ways: the exact share in a state (stop_strain), and bounds for all states of a stretch of the path at once
+ * Two ways: the exact share in a state (stop_usage), and bounds for all states of a stretch of the path at once
  * (stop_extent_keeps), which cost as much as one state. The bounds never say that a limit is kept which a state passes.
  * mm, s. Pure functions. Main loop of a host.
  */
-#ifndef HODOGRAPH_OFFLINE_STOP_STRAIN_H
-#define HODOGRAPH_OFFLINE_STOP_STRAIN_H
+#ifndef HODOGRAPH_OFFLINE_STOP_USAGE_H
+#define HODOGRAPH_OFFLINE_STOP_USAGE_H
 
 #include "core/program.h"
 #include "offline/stop_limits.h"
@@ -44,20 +44,20 @@ void stop_invert(struct stop_inverse *inverse, const struct stop_limits *limits,
 double stop_share_of(const struct stop_row *low, double s);
 
 /* The motion of the axes at a share of the way from row `low` to the next, with a jerk j along the path. */
-void stop_axes_of(const struct stop_road *road, const struct stop_row *low, double share,
+void stop_axes_of(const struct stop_lookup *lookup, const struct stop_row *low, double share,
                   const struct stop_state *at, double j, struct stop_axes *out);
 
 /* The greatest share of a limit that a state with the jerk j uses; `low`: the last row at or before it. */
-double stop_strain(const struct stop_road *road, const struct stop_inverse *inverse,
-                   const struct stop_row *low, const struct stop_state *at, double j);
+double stop_usage(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
+                  const struct stop_row *low, const struct stop_state *at, double j);
 
 /* 1: no limit is passed anywhere within these bounds. */
-int stop_extent_keeps(const struct stop_road *road, const struct stop_inverse *inverse,
+int stop_extent_keeps(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                       const struct stop_extent *extent);
 
 /* 1: no limit is passed on the path between a row and an arc length; `extent` has what the brake does there, and gets
  * the bounds of the path. */
-int stop_keeps_up_to(const struct stop_road *road, const struct stop_inverse *inverse,
+int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm);
 
 #endif
