@@ -39,8 +39,8 @@ uint64_t cob_get(const uint8_t *from, uint32_t size);
 /* Stores the low `size` (0 ... 8) bytes of `value` at `to`, least significant first. */
 void cob_put(uint8_t *to, uint64_t value, uint32_t size);
 
-/* The same for what process data are made of, in the tick: written out, so that compilers make one load or store of it
- * where the core has unaligned ones. */
+/* The same for process data, in the tick. Written out, so that compilers make one load or store of each where the core
+ * has unaligned ones. */
 static inline uint16_t cob_get16(const uint8_t *from)
 {
     return (uint16_t)(from[0] | (uint32_t)from[1] << 8);

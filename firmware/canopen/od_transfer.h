@@ -39,7 +39,7 @@ void od_transfer_init(struct od_transfer *t, struct od *od);
 uint32_t od_transfer_begin_write(struct od_transfer *t, uint16_t index, uint8_t sub,
                                  uint32_t announced);
 
-/* The next `size` bytes. SDO_ABORT_TOO_LONG beyond what was announced, or what the value has room for. */
+/* The next `size` bytes. SDO_ABORT_TOO_LONG beyond the announced size, or the size of the value. */
 uint32_t od_transfer_put(struct od_transfer *t, const uint8_t *data, uint32_t size);
 
 /* All bytes are there: SDO_ABORT_TOO_SHORT when fewer than announced, else the result of the dictionary. */

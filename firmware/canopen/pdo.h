@@ -31,8 +31,8 @@ struct pdo_actual {
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out);
 int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint);
 
-/* The same in steps, for a frame that is kept from tick to tick: identifier and length (with zeros) once; what has
- * changed of it. */
+/* The same in steps, for a frame that is kept from tick to tick: first identifier and length (with zeros), then in each
+ * tick only the values that have changed. */
 void pdo_begin_setpoint(uint8_t drive, struct can_msg *out);
 static inline void pdo_put_controlword(struct can_msg *out, uint16_t controlword)
 {

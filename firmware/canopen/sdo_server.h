@@ -26,7 +26,7 @@
  * half of the timeout; a client that only paused then repeats a few segments. A block that is lost as a whole ends in
  * the timeout.
  * 
- * A client receives nothing while it sends a block. So after an abort by the server the rest of the block still comes.
+ * A client receives nothing while it sends a block. So after an abort by the server the remaining segments still come.
  * Frames whose numbers continue from the last segment are therefore not taken for requests.
  * 
  * All functions: main loop (the hooks may take long); the receive interrupt only queues. */
@@ -47,10 +47,10 @@ enum sdo_server_state {
     SDO_SERVER_UPLOAD,
     SDO_SERVER_BLOCK_DOWNLOAD,     /* segments of a block are coming */
     SDO_SERVER_BLOCK_DOWNLOAD_END, /* all came; the end request with the CRC is due */
-    SDO_SERVER_BLOCK_UPLOAD_READY, /* initiated; the client's go is due */
+    SDO_SERVER_BLOCK_UPLOAD_READY, /* initiated; the client's start request is due */
     SDO_SERVER_BLOCK_UPLOAD,       /* sending segments from sdo_server_process */
     SDO_SERVER_BLOCK_UPLOAD_ACK,   /* a block is sent; its acknowledgement is due */
-    SDO_SERVER_BLOCK_UPLOAD_END    /* end sent; the client's last word is due */
+    SDO_SERVER_BLOCK_UPLOAD_END    /* end sent; the client's confirmation is due */
 };
 
 struct sdo_server {
@@ -64,33 +64,32 @@ struct sdo_server {
     uint8_t sub;
     uint8_t node;
     uint8_t toggle;
-    uint8_t block_size;  /* segments a block that this server asks for; upload: the client's */
+    uint8_t block_size;  /* segments in a block: the server's choice; upload: the client's */
     uint8_t block_limit; /* segments of the present block */
     uint8_t sequence;    /* last segment received in order, or sent */
     uint8_t held;        /* block download: bytes in `last` */
-    uint8_t received;    /* newest segment of a block that goes on or was broken off; else 0 */
+    uint8_t received;    /* newest segment of a block that continues or was aborted; else 0 */
     bool use_crc;
-    bool acknowledged_early; /* the answer after half of the timeout is the last thing said */
+    bool acknowledged_early; /* the frame sent last is the response after half of the timeout */
     uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */
 };
 
-/* `timeout_us`: silence of the client after which a transfer is aborted; `block_segments` (1 ...
- * 127): size of the blocks that it asks clients to send (fewer for small receive queues). */
+/* `timeout_us`: time without a frame of the client after which a transfer is aborted; `block_segments` (1 ... 127):
+ * segments in the blocks that clients have to send (fewer for small receive queues). */
 void sdo_server_init(struct sdo_server *server, struct od *od, uint8_t node, uint32_t timeout_us,
                      uint8_t block_segments);
 
-/* Drops a transfer under way without a word (NMT reset, stop). */
+/* Drops a transfer under way without an abort frame (NMT reset, stop). */
 void sdo_server_reset(struct sdo_server *server);
 
-/* True for frames that sdo_server_receive wants. Any context. */
+/* True for frames that sdo_server_receive does not ignore. Any context. */
 bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in);
 
 /* Takes one frame; other frames are ignored. Returns true when *out is to be sent. */
 bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out);
 
-/* Lets time pass and gives frames that are due by themselves (timeouts, segments of a block
- * upload). Returns true when *out is to be sent: then call again with elapsed_us 0 as long as the port
- * takes frames. */
+/* Lets time pass and gives frames that are no response to a request (aborts after a timeout, segments of a block
+ * upload). Returns true when *out is to be sent: then call again with elapsed_us 0 as long as the port takes frames. */
 bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
 
 /* The CRC of block transfers (CiA 301, 7.2.4.3.16): polynomial x^16 + x^12 + x^5 + 1, initial value 0, not reflected;

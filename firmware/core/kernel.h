@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interface of a kernel: it precomputes the coefficients of segments and feed pieces, and evaluates them. Its
- * callers are core/coefficients (precomputing, main loop) and core/interpolator (evaluating, tick).
+ * kernel: the interface of a kernel, which precomputes the coefficients of segments and feed pieces, and evaluates
+ * them. Its callers are core/coefficients (precomputing, main loop) and core/interpolator (evaluating, tick).
  *
  * `kernels_linked` lists the kernels of an image: core/kernels_all.c on a host, one of firmware/targets/kernels_*.c on
  * a microcontroller. Pure, any context.

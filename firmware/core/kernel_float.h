@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The float kernel, for processors with single precision in hardware. The inverse of arc length and the tangent are
- * computed in single precision, everything else in 32-bit integers with a scale for each segment. It uses no double,
- * and converts only int32 to float and back. Derivation and error bound: docs/theory/numerics.md section 10. Feed
- * pieces are evaluated by core/feed_piece.h.
+ * kernel_float: the float kernel, for processors with single precision in hardware. The inverse of arc length and the
+ * tangent are computed in single precision, everything else in 32-bit integers with a scale for each segment. It uses
+ * no double, and converts only int32 to float and back. Derivation and error bound: docs/theory/numerics.md section 10.
+ * Feed pieces are evaluated by core/feed_piece.h.
  *
  * Only + - * / are used, with -ffp-contract=off: the same bits on every target with IEEE single precision. Called
  * through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.

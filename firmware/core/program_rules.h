@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rules of a program, for all parts of the check: the codes with which a program is refused (enum program_error),
- * the limits of the controller (struct program_limits), and the place of a fault (struct program_fault).
- * core/program_check.h checks a whole program.
+ * program_rules: what all parts of the program check share: the codes with which a program is refused (enum
+ * program_error), the limits of the controller (struct program_limits), and the place of a fault (struct
+ * program_fault). core/program_check.h checks a whole program. Plain data, any context; program_limits_attend: in the
+ * check, main loop.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_RULES_H
 #define HODOGRAPH_CORE_PROGRAM_RULES_H
@@ -99,7 +100,7 @@ enum program_error {
     PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
     /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
     PROGRAM_ERR_CHUNK_OVER = -89,
-    /* behind a rest it does not begin where its predecessor ends, or flag REST is missing */
+    /* after a rest it does not begin where its predecessor ends, or flag REST is missing */
     PROGRAM_ERR_CHUNK_REST = -79,
     /* events of the shared segments are not the predecessor's; index = the event */
     PROGRAM_ERR_CHUNK_EVENT = -78,
@@ -113,7 +114,7 @@ struct program_limits {
     uint32_t feed_um_s; /* 0: no limit; the same for the next two */
     uint32_t acceleration_um_s2;
     uint32_t jerk_mm_s3;
-    /* Of the path axes, those of the program; mm are degrees for an extra axis that turns. */
+    /* Of the path axes of the program; mm are degrees for a rotary axis. */
     int64_t min_q40_mm[PROGRAM_AXES]; /* travel */
     int64_t max_q40_mm[PROGRAM_AXES];
     uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every override; 0: no limit */
@@ -122,7 +123,7 @@ struct program_limits {
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
     uint32_t chunk;        /* 1: a chunk's program may begin in motion (core/chunk.h) */
     /* Called with `self` at every segment and piece, and at every part of a piece near the limits of axes, so that a
-     * main loop can send heartbeats and make coefficient records meanwhile. May be NULL. */
+     * main loop can send heartbeats and make coefficient records during the check. May be NULL. */
     void (*attend)(void *self);
     void *self;
 };
