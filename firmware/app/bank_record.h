@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Banks for
- * programs and banks for parameters both have one.
+ * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Used by
+ * app/program_slot, app/program_table and app/parameter_store.
  *
  *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
  *
@@ -24,7 +24,7 @@ struct bank_record {
     uint32_t tag;
 };
 
-/* Bytes of a bank that are left for the content. */
+/* Bytes of a bank for the content. */
 uint32_t bank_record_room(unsigned bank);
 
 /* False when the bank has no valid record. */

@@ -17,8 +17,8 @@
  * image. */
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
 
-/* Gives the records that are there to the program, if it has not got them yet and every byte of them is right. True
- * when it has them now. */
+/* Gives the stored records to the program, if it does not have them yet and every byte of them is right. True if it has
+ * them now. */
 bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
 
 #endif

@@ -25,7 +25,7 @@
 
 struct drive_monitor {
     struct heartbeat_consumer consumers[DRIVE_NODES];
-    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are no drives: a host */
+    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are not drives: a host */
     uint32_t without_us[DRIVE_NODES]; /* since the last heartbeat; a new begin does not reset it */
     uint8_t count;
     uint8_t other_count;

@@ -9,13 +9,12 @@
 
 #include "canopen/emcy.h"
 
-/* Codes that only this controller uses, beside those of canopen/emcy.h. Detail: the statusword, where nothing else is
- * said. */
+/* Codes of this controller in addition to those of canopen/emcy.h. Detail: the statusword, if not stated otherwise. */
 #define FAULT_NOT_ENABLED   (EMCY_MANUFACTURER | 0x01u) /* did not switch on in time */
 #define FAULT_DROPPED_OUT   (EMCY_MANUFACTURER | 0x02u) /* left Operation enabled */
 #define FAULT_REBOOTED      (EMCY_MANUFACTURER | 0x03u) /* a drive restarted by itself; 0 */
-#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not followed */
-#define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
+#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 lost: controlword not followed */
+#define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 lost: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
 /* position and setpoint apart; counts */
@@ -39,7 +38,7 @@ struct fault {
 /* One English phrase for a fault code, never NULL. Pure. */
 const char *fault_text(uint16_t code);
 
-/* Whether a drive's own emergency code is more exact than this one, which only has a state seen in its statusword.
+/* Whether this code only describes a state of the statusword, so that the drive's own emergency code is more exact.
  * Pure. */
 bool fault_is_vague(uint16_t code);
 

@@ -23,11 +23,11 @@ struct motion {
     struct interpolator interp;
     struct feed_override feed;
     struct interpolator_point point; /* of the last setpoint */
-    uint32_t setpoints;              /* given so far */
+    uint32_t setpoints;              /* number of setpoints up to now */
     uint32_t rested_ticks;           /* at the end of the program, running, until the next chunk */
-    uint32_t rest_ticks;             /* left before the program starts */
-    bool joined;   /* the end of the program is a rest of the job, not that of a tail */
-    bool precedes; /* that setpoint is still the end of the chunk before: a rest is under way */
+    uint32_t rest_ticks;             /* before the program starts */
+    bool joined;   /* the end of the program is a rest of the job, not the end of a tail */
+    bool precedes; /* `point` is the end of the previous chunk: a rest is under way */
     struct path_counts scale;
     /* at the last setpoint; stepped by `outputs`, where there is an I/O module */
     struct path_outputs outputs;
@@ -37,13 +37,12 @@ struct motion {
  * motion lasts. 0 or a negative INTERPOLATOR_ERR_... Main loop; linear in the number of pieces. */
 int motion_begin(struct motion *motion, const struct program *program, const struct config *config);
 
-/* The same, but to go on from rest at an arc length of the program. Gives where that is, in counts.
- * Main loop. */
+/* The same for a start from standstill at an arc length of the program. Gives its position in counts. Main loop. */
 int motion_begin_at(struct motion *motion, const struct program *program,
                     const struct config *config, int64_t arc_length_q40_mm,
                     int32_t start_counts[AXES_MAX]);
 
-/* As motion_begin, for the first chunk of a job, with these records from its start on. */
+/* As motion_begin, for the first chunk of a job, with these records from its start on. Main loop. */
 void motion_begin_job(struct motion *motion, const struct chunk *first,
                       const struct coefficients_window *window, const struct config *config);
 
@@ -102,16 +101,16 @@ bool motion_held(const struct motion *motion);
 /* True at rest at the end of the tail of a chunk: the motion needs the next chunk to continue. */
 bool motion_waits(const struct motion *motion);
 
-/* The same, but false at a rest of the job (before a chunk that begins at rest). */
+/* The same, except at a rest of the job (before a chunk that begins at rest). */
 bool motion_misses_chunk(const struct motion *motion);
 
 /* True while the motion comes to rest and has passed its stop deadline (1.2 times the stop time bound). */
 bool motion_late(const struct motion *motion);
 
-/* True when there are no more setpoints: end of the program or of the stop. */
+/* True at the end of the program or of a stop: all further setpoints are equal. */
 bool motion_over(const struct motion *motion);
 
-/* Program time of the last setpoint, to nearest; before the first one that of the start; in a brake that of its begin.
+/* Program time of the last setpoint, to nearest; before the first one that of the start; in a brake that of its start.
  * Under the lock. */
 uint64_t motion_time_q32_s(const struct motion *motion);
 

@@ -22,7 +22,7 @@
 struct outputs {
     struct path_outputs_values delayed[CONFIG_OUTPUTS_DELAY_MAX]; /* ring */
     uint32_t newest;                                              /* index of its last entry */
-    struct path_outputs_values present; /* the module has them from the next SYNC on */
+    struct path_outputs_values present; /* those that the module has from the next SYNC on */
     struct path_outputs_values sent;
     uint32_t refresh_ticks; /* until the frame is sent again; 0: it is due */
 };
