@@ -3,7 +3,7 @@
  * of the injector's time. Used by the injector's main program.
  *
  * If the queue of the interface is full, outbox_flush waits for a few frame times. If it stays full, the bus is off,
- * and the frames are lost.
+ * and the frames are lost. One thread for each box.
  */
 #ifndef INJECTOR_OUTBOX_H
 #define INJECTOR_OUTBOX_H

@@ -8,8 +8,8 @@
  *     21, 22   the mirror of 19, 20
  *     35, 37   home is here
  *
- * Switches are read once a period, so the slow speed decides how exact home is. In each period the servo calls
- * drive_homing_move, reads the switches, then calls drive_homing_evaluate. All in one context.
+ * Switches are read once in each period, so the error of home is the distance of a period at the slow speed. In each
+ * period the servo calls drive_homing_move, reads the switches, then calls drive_homing_evaluate. All in one context.
  */
 #ifndef NODE_DRIVE_HOMING_H
 #define NODE_DRIVE_HOMING_H
@@ -25,9 +25,9 @@ enum drive_homing_phase {
     DRIVE_HOMING_SEARCH,   /* fast, until the switch comes on */
     DRIVE_HOMING_BACK,     /* slowly, until it goes off */
     DRIVE_HOMING_APPROACH, /* slowly, until it comes on again */
-    DRIVE_HOMING_STOP,     /* home was passed: coming to rest */
+    DRIVE_HOMING_STOP,     /* home was passed: stopping */
     DRIVE_HOMING_DONE,
-    DRIVE_HOMING_FAILED /* coming to rest, or at rest */
+    DRIVE_HOMING_FAILED /* stopping, or at standstill */
 };
 
 /* All zero is the beginning. */
@@ -38,7 +38,7 @@ struct drive_homing {
     int8_t direction;       /* of the search: -1, 1; 0: none */
     bool entering;          /* home is where the switch comes on */
     bool start_bit;         /* bit 4 of the last controlword */
-    bool homed;             /* a homing has ended at home, and none has begun since */
+    bool homed;             /* the last homing has ended at home */
 };
 
 /* Whether there is such a method (0x6098). Pure. */
@@ -61,8 +61,8 @@ void drive_homing_control(struct drive_homing *homing, bool start_bit, bool perm
 bool drive_homing_move(const struct drive_homing *homing, struct axis_motion *axis,
                        const struct od_drive *values);
 
-/* After drive_homing_move, which returned `steady`, with the switches of now in 0x60FD. At rest after home was passed
- * it gives the axis the coordinates of 0x607C and returns true: the axis is homed and its target has changed. */
+/* After drive_homing_move, which returned `steady`, with the present switches in 0x60FD. At standstill after home was
+ * passed it gives the axis the coordinates of 0x607C and returns true: the axis is homed and its target has changed. */
 bool drive_homing_evaluate(struct drive_homing *homing, struct axis_motion *axis,
                            const struct od_drive *values, bool steady);
 

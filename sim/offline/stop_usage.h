@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a motion along a path asks of limits, as a share of them: above 1 a limit is passed.
+ * stop_usage: the limit usage of a motion along a path; above 1 a limit is exceeded. Used by offline/stop_brake,
+ * offline/stop_verdict and offline/stop_trial.
  *
- * Two ways: the exact share in a state (stop_usage), and bounds for all states of a stretch of the path at once
- * (stop_extent_keeps), which cost as much as one state. The bounds never say that a limit is kept which a state passes.
- * mm, s. Pure functions. Main loop of a host.
+ * There are two computations: the exact usage in a state (stop_usage), and bounds for all states of a stretch of the
+ * path at once (stop_extent_keeps), which cost as much as one state. If the bounds show that a limit is kept, no state
+ * exceeds it. mm, s. Pure functions, any thread of a host.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_USAGE_H
 #define HODOGRAPH_OFFLINE_STOP_USAGE_H
@@ -15,7 +16,8 @@
 
 /* One over the limits, less STOP_MARGIN; 0: none. */
 struct stop_inverse {
-    double feed; /* share of the path's feed that counts: a little less than 1 allows more */
+    double
+        feed; /* factor of the feed in the comparison with the path's feed; below 1 it allows more */
     double velocity[PROGRAM_AXES], axis_acceleration[PROGRAM_AXES], axis_jerk[PROGRAM_AXES],
         reach[PROGRAM_AXES], time_constant[PROGRAM_AXES];
 };
@@ -30,7 +32,7 @@ struct stop_axes {
     double velocity[PROGRAM_AXES], acceleration[PROGRAM_AXES], jerk[PROGRAM_AXES];
 };
 
-/* Upper bounds of what a brake does, and of the path that it takes. */
+/* Upper bounds of the motion of a brake, and of the path on its braking distance. */
 struct stop_extent {
     double speed, acceleration, jerk;
     struct stop_stretch path;
@@ -40,10 +42,10 @@ struct stop_extent {
 void stop_invert(struct stop_inverse *inverse, const struct stop_limits *limits,
                  uint32_t axis_count);
 
-/* Share, 0 ... 1, of the way from a row to the next at which an arc length lies. */
+/* Share, 0 ... 1, of the distance from a row to the next at which an arc length lies. */
 double stop_share_of(const struct stop_row *low, double s);
 
-/* The motion of the axes at a share of the way from row `low` to the next, with a jerk j along the path. */
+/* The motion of the axes at a share of the distance from row `low` to the next, with a jerk j along the path. */
 void stop_axes_of(const struct stop_lookup *lookup, const struct stop_row *low, double share,
                   const struct stop_state *at, double j, struct stop_axes *out);
 
@@ -51,12 +53,12 @@ void stop_axes_of(const struct stop_lookup *lookup, const struct stop_row *low, 
 double stop_usage(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                   const struct stop_row *low, const struct stop_state *at, double j);
 
-/* 1: no limit is passed anywhere within these bounds. */
+/* 1: no state within these bounds exceeds a limit. */
 int stop_extent_keeps(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                       const struct stop_extent *extent);
 
-/* 1: no limit is passed on the path between a row and an arc length; `extent` has what the brake does there, and gets
- * the bounds of the path. */
+/* 1: no limit is exceeded on the path between a row and an arc length. `extent` has the bounds of the motion there, and
+ * gets those of the path. */
 int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm);
 

@@ -12,7 +12,7 @@
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H
 
-/* The law, sorted by what is known early in the sample, so that little has to wait for the encoder:
+/* The control law, arranged so that few operations have to wait for the encoder:
  *     volts = volts_per_ref * speed_ref + (volts_per_integral * integral before - volts_per_speed * speed) */
 struct pdff {
     double k_pp_rad_s_mm;
@@ -25,7 +25,7 @@ struct pdff {
     double volts_limit;
 };
 
-/* What one sample sees. */
+/* The inputs of one sample. */
 struct pdff_input {
     double command_mm;
     double command_mm_s; /* d(x_com)/dt */
@@ -52,8 +52,8 @@ static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
     return volts;
 }
 
-/* The same with a feedforward from outside: rad/s added to the speed reference, volts to the output.
- * With both 0 the same bits. */
+/* The same with an external feedforward: rad/s added to the speed reference, volts to the output. With both 0 the same
+ * bits. */
 static inline double pdff_step_offset(const struct pdff *pdff, double *integral_rad,
                                       const struct pdff_input *in, double speed_offset_rad_s,
                                       double volts_offset)

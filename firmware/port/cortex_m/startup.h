@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What every Cortex-M does between reset and main(): vectors, stack, memory, FPU. ARMv6-M to ARMv8-M.
+ * startup: what every Cortex-M does between reset and main(): vectors, stack, memory, FPU. ARMv6-M to ARMv8-M. The
+ * hardware calls these functions; a board defines those that it needs.
  *
  * At its start the core has to be in the state after reset: thread mode, MSP, no interrupt enabled. A boot loader must
  * leave this state, and may load the image anywhere: startup sets VTOR to the vector table. A Cortex-M0 has no VTOR;
@@ -29,15 +30,15 @@ typedef void (*startup_vector)(void);
 /* The entry. Variables are set up here; nothing of C runs before. */
 void startup_reset(void);
 
-/* Stays for ever, for a watchdog or a debugger to find. What is not defined by the board ends here. */
+/* Loops for ever, for a watchdog or a debugger. All handlers that the board does not define end here. */
 void startup_halt(void);
 
-/* The board's, where it wants them. */
+/* Defined by the board if it needs them. */
 void startup_nmi(void);
 void startup_hard_fault(void); /* and all faults that have no handler of their own enabled */
 void startup_systick(void);
 
-/* The board's: what becomes of the exit status of main(). May return: the core then halts. */
+/* Defined by the board: takes the exit status of main(). May return: the core then halts. */
 void startup_exit(int status);
 
 #endif
