@@ -90,7 +90,7 @@ static bool starts_program(enum command command)
     return command == COMMAND_START || command == COMMAND_START_FROM;
 }
 
-/* Wants a configuration, and a controller that stays. */
+/* Commands that need a confirmed configuration, and a controller that is not being shut down. */
 static bool begins_something(enum command command)
 {
     return command == COMMAND_ENABLE || command == COMMAND_HOME || starts_program(command);
@@ -156,7 +156,7 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
 }
 
-/* What allows a start without homing is for one attempt. */
+/* The permission to start without homing is valid for one attempt. */
 static enum machine_refusal attempt_start(struct controller *controller, enum command command)
 {
     enum machine_refusal refusal = stream_is_open(&controller->stream)

@@ -24,7 +24,7 @@
 #define REQUEST_UPLOAD           0x40u
 #define REQUEST_UPLOAD_SEGMENT   0x60u
 
-/* Command specifiers of answers, bits 5 ... 7. */
+/* Command specifiers of responses, bits 5 ... 7. */
 #define SPECIFIER               0xE0u
 #define ANSWER_DOWNLOAD         0x60u
 #define ANSWER_DOWNLOAD_SEGMENT 0x20u
@@ -256,7 +256,7 @@ static uint8_t specifier_due(enum sdo_client_step step)
     }
 }
 
-/* An abort code when `data` is not the answer that is due. */
+/* An abort code when `data` is not the response that is due. */
 static uint32_t check(const struct sdo_client *client, const uint8_t *data)
 {
     const bool segment =
@@ -268,8 +268,7 @@ static uint32_t check(const struct sdo_client *client, const uint8_t *data)
     return !segment || (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
 }
 
-/* Late words about an earlier transfer. Aborts of object 0 come from servers that do not know it.
- */
+/* Late responses to an earlier transfer. Aborts of object 0 come from servers that do not know the object. */
 static bool is_stale(const struct sdo_client *client, const uint8_t *data)
 {
     bool names_object = client->step == SDO_CLIENT_DOWNLOAD || client->step == SDO_CLIENT_UPLOAD;

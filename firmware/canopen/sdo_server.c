@@ -274,7 +274,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
     bool block_ends = last || sequence == s->block_limit;
 
     if (sequence != 0 && sequence == s->sequence) {
-        /* Doubled on the bus, or one of the two is somebody else's. */
+        /* Doubled on the bus, or one of the two is from another client. */
         return memcmp(s->last, data + 1, SEGMENT_BYTES) != 0 && fail(s, SDO_ABORT_SEQUENCE, out);
     }
     s->received = block_ends ? 0 : sequence;
@@ -295,7 +295,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
         return false;
     }
     if (!in_order && s->acknowledged_early) {
-        return false; /* the rest of a block that paused: it has its answer */
+        return false; /* remaining segments of a block that paused: the response was sent */
     }
     if (in_order && last) {
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
@@ -303,7 +303,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
     return block_download_acknowledge(s, out);
 }
 
-/* While idle: true for each segment that is left of a block whose transfer the server broke off. */
+/* While idle: true for each remaining segment of a block whose transfer the server has aborted. */
 static bool block_download_late_segment(struct sdo_server *s, const uint8_t *data)
 {
     uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
@@ -437,7 +437,7 @@ static bool block_upload_command(struct sdo_server *s, const uint8_t *data, stru
         s->state = SDO_SERVER_BLOCK_UPLOAD;
         return block_upload_send(s, out);
     }
-    /* A client that sees a gap may answer before the block is complete. */
+    /* A client that detects a gap may answer before the block is complete. */
     if ((s->state == SDO_SERVER_BLOCK_UPLOAD_ACK || s->state == SDO_SERVER_BLOCK_UPLOAD) &&
         subcommand == REQUEST_UPLOAD_ACKNOWLEDGE) {
         return block_upload_acknowledged(s, data, out);
@@ -473,7 +473,7 @@ bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
     return in->id == COB_SDO_REQUEST + server->node && in->len == SDO_BYTES;
 }
 
-/* Forgets a transfer under way and notes the object of the new one. */
+/* Drops a transfer under way and stores the object of the new one. */
 static void begin(struct sdo_server *s, const uint8_t *data)
 {
     drop(s);
@@ -539,7 +539,7 @@ static bool go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out
     }
 }
 
-/* A request by all its bits, for an object that there is: few segments that have such a first byte look like one. */
+/* A request by all its bits, for an existing object: few segments with such a first byte have this form. */
 static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t first = data[0];
@@ -549,8 +549,8 @@ static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
     return known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
 }
 
-/* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if
- * its bytes are those of a request.) */
+/* Within a block: by its number not a segment of this client. (After a loss this may also be one of its segments, if
+ * its bytes have the form of a request.) */
 static bool is_foreign(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
@@ -565,13 +565,13 @@ static bool same_object(const struct sdo_server *s, const uint8_t *data)
     return cob_get(data + 1, 2) == s->index && data[3] == s->sub;
 }
 
-/* The client of this transfer has lost the answer to its first request. */
+/* The client of this transfer has lost the response to its first request. */
 static bool begins_again(const struct sdo_server *s, const uint8_t *data)
 {
     return same_object(s, data) && s->object.moved == 0 && s->held == 0;
 }
 
-/* The same within a block, where a segment may look like it. */
+/* The same within a block, where a segment may have the same form. */
 static bool restarts(const struct sdo_server *s, const uint8_t *data)
 {
     return begins_again(s, data) && is_foreign(s, data);
@@ -586,7 +586,7 @@ static bool refuse_other_client(const struct sdo_server *s, const uint8_t *data,
     return true;
 }
 
-/* The entry of a write that waits for nobody; NULL: it is another frame. */
+/* The entry of an urgent write; NULL: the frame is not one. */
 static const struct od_entry *urgent_entry(const struct sdo_server *s, const uint8_t *data)
 {
     const bool whole = data[5] == 0u && data[6] == 0u && data[7] == 0u;
@@ -598,7 +598,7 @@ static const struct od_entry *urgent_entry(const struct sdo_server *s, const uin
     return taken && s->object.od->hooks->urgent(entry, data[4]) ? entry : NULL;
 }
 
-/* Beside the transfer under way, which is not touched. */
+/* Executes a write during the transfer under way, which does not change. */
 static bool write_meanwhile(const struct sdo_server *s, const struct od_entry *entry,
                             const uint8_t *data, struct can_msg *out)
 {
@@ -661,8 +661,8 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     return go_on(server, in->data, out);
 }
 
-/* A block whose last segment was lost is answered before the client gives up, once. Not when no
- * segment of it has come: a client that only paused would then send the whole block twice. */
+/* A block whose last segment was lost is acknowledged once before the client's timeout. Not if no segment of it has
+ * come: a client that only paused would then send the whole block twice. */
 static bool acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
     const bool begun = s->sequence != 0 || (s->received != 0 && !s->acknowledged_early);
@@ -680,7 +680,7 @@ bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct c
         return false;
     }
     if (server->state == SDO_SERVER_BLOCK_UPLOAD) {
-        server->waited_us = 0; /* it is the server that talks */
+        server->waited_us = 0; /* the server sends, so no frame of the client is due */
         return block_upload_send(server, out);
     }
     server->waited_us =

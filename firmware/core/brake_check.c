@@ -10,7 +10,7 @@
 #define MOST_STEPS        160
 #define MOST_HALVINGS     3     /* of a step */
 #define MOST_PARTS        14    /* of a piece at a time */
-#define MOST_EVALUATIONS  3000  /* at a stretch of a brake, for a piece and kind, */
+#define MOST_EVALUATIONS  3000  /* of stretches of brakes, for a piece and kind, */
 #define EVALUATIONS_PER_S 30000 /* and more for a long piece */
 #define LOW_RATES         4     /* halvings of the rate of the lowest level, each by itself */
 #define PIECE_SLACK_Q40   ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
@@ -44,9 +44,9 @@ struct part {
 struct flow {
     const struct numbers *own;
     struct states at;
-    struct span begin;  /* accelerations at the begin, */
+    struct span begin;  /* accelerations at the start, */
     struct real least;  /* and the least at any time; */
-    struct real lowest; /* the least so far */
+    struct real lowest; /* the least up to now */
     struct real slow;   /* least jerk of the release phase; 0: not known */
     struct real period_s;
     struct span late_s; /* when the acceleration begins to fall: at least, at most */
@@ -194,8 +194,8 @@ static struct real least_release(const struct flow *flow)
     return real_div(real_mul(flow->own->up, steady), most);
 }
 
-/* The speed that the jerk of the onset makes in a tick, times 2: by so much a brake may lose less whose last tick
- * before the release phase has no jerk. */
+/* The speed that the jerk of the onset makes in a tick, times 2: a brake whose last tick before the release phase has
+ * no jerk may lose less speed by this much. */
 static struct real tick_change(const struct flow *flow)
 {
     return real_mul(flow->own->down, square(flow->period_s));
@@ -312,7 +312,7 @@ static struct real jerkless_tick(const struct flow *flow, const struct states *s
     return none_releases(flow, swept) != 0 ? zero : real_mul(flow->own->down, flow->period_s);
 }
 
-/* One step on: `swept` are all states on the way there. */
+/* One step on: `swept` are all states during the step. */
 static void flow_step(struct flow *flow, struct real step_s, struct states *swept)
 {
     const struct span v = flow->at.v;
@@ -345,8 +345,8 @@ static void flow_step(struct flow *flow, struct real step_s, struct states *swep
     flow->time_s = later_s;
 }
 
-/* The greatest speed in the release phase at a deceleration up to b: of least jerk all the way, or of one that began
- * with b1 and v1 = b1^2 / (2 j2) 1.016 + 2 T b1 at most, and had at most j2 since. */
+/* The greatest speed in the release phase at a deceleration up to b: that of the least jerk, or of a phase that began
+ * with b1 and at most v1 = b1^2 / (2 j2) 1.016 + 2 T b1, and had at most j2 since. */
 static struct real release_speed(const struct flow *flow, struct real b)
 {
     const struct real twice_up = real_scale(flow->own->up, 1);
@@ -384,7 +384,7 @@ static int step_keeps(struct brake_check *check, const struct flow *flow,
     return real_less(last.v.high, swept->v.low) != 0 || keeps_on(check, &path, &last, up) != 0;
 }
 
-/* Bounds of time and distance from here to rest (core/stop_check). */
+/* Bounds of time and distance from here to standstill (core/stop_check). */
 static int to_rest(const struct flow *flow, const struct program_stop *stop, uint32_t period_us,
                    struct real *time_s, int64_t *distance_q40)
 {
@@ -411,7 +411,7 @@ static struct real greatest_speed(const struct flow *flow)
     return real_add(flow->at.v.high, real_add(late, falls));
 }
 
-/* All that is left of the brakes at once. */
+/* The remaining motion of all brakes at once. */
 static int remainder_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
 {
     struct states left = flow->at;
@@ -430,7 +430,7 @@ static int remainder_keeps(struct brake_check *check, const struct flow *flow, i
     return keeps_on(check, &path, &left, jerk);
 }
 
-/* Every brake from these states, all the way to rest. */
+/* Every brake from these states, until standstill. */
 static int brakes_keep(struct brake_check *check, const struct program_stop *stop,
                        const struct numbers *own, const struct states *from)
 {
@@ -540,7 +540,7 @@ static struct real width(const struct span *a)
     return real_sub(a->high, a->low);
 }
 
-/* Halves a part where its states differ most: by the speed that they make different. */
+/* Halves a part in the direction in which its states differ most in speed. */
 static void split(const struct feed_polynomial *poly, const struct states *at,
                   const struct numbers *own, struct part *low, struct part *high)
 {
@@ -565,7 +565,7 @@ static void split(const struct feed_polynomial *poly, const struct states *at,
     }
 }
 
-/* What is to be proved of a piece. */
+/* The stops of a piece that are to be proved. */
 struct stops {
     const struct program_stop *own;
     struct numbers numbers;
@@ -573,7 +573,7 @@ struct stops {
     const struct feed_polynomial *poly;
 };
 
-/* All of a part, which is halved where need be; depth first. */
+/* All of a part, which is halved where necessary; depth first. */
 static int parts_keep(struct brake_check *check, const struct stops *stops,
                       const struct part *whole)
 {
@@ -604,8 +604,8 @@ static struct real level_rate(const struct program_override *bounds, uint32_t le
                                        : real_make((int64_t)program_level_q9(level), -9);
 }
 
-/* The greatest slope of the rate up to a rate: that of the level, and what its second derivative q makes from rest,
- * sqrt(2 q rate). */
+/* The greatest override rate up to an override: the lower one of the level's, and sqrt(2 q override), which the
+ * override acceleration q can reach from a constant override of 0. */
 static struct real greatest_slope(const struct program_override *bounds, uint32_t level,
                                   struct real rate)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/coefficients.h (see there): what a kernel needs of a program, computed once: coefficient
- * records. */
+/* Implements core/coefficients.h (see there): makes the coefficient records of a program. */
 #include "core/coefficients.h"
 
 #include <string.h>

@@ -8,8 +8,8 @@
 #include "core/bernstein.h"
 #include "core/qmath.h"
 
-/* What the rounding of powers of tau and of the coefficients' lower bits can take from a Bernstein coefficient, in q36:
- * 4 bits dropped and 3 units a power, times the binomials, over the scale. */
+/* The most by which rounding of powers of tau and of the coefficients' lower bits changes a Bernstein coefficient, in
+ * q36: 4 bits dropped and 3 units a power, times the binomials, over the scale. */
 #define COEFFICIENT_ROUNDING 64
 
 /* tau at the end of the piece in q64; exactly 1 is 0. */

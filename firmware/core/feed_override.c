@@ -10,14 +10,14 @@
 
 enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 
-/* A state that others see as FEED_RUNNING: at rest at the end of a tail. */
+/* A state that feed_override_state reports as FEED_RUNNING: rest at the end of a tail. */
 #define STATE_WAITING ((uint32_t)FEED_HELD + 1u)
 
 #define TICK_Q30          ((int64_t)1 << 30)
 #define SPARE_TICKS       2        /* of the deadline: rounding */
 #define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
 #define END_TICKS         2u       /* until a command counts, and until the end is a setpoint */
-#define SEARCH_STEPS      2        /* in a tick at rest */
+#define SEARCH_STEPS      2        /* in a tick at standstill */
 #define NO_NUMBERS        2u
 #define MOST_FEED_Q32     ((int64_t)1 << 45)
 /* 2^57, the greatest, less a unit: it is made an int32_t */
@@ -53,7 +53,7 @@ static uint32_t state_at_tail_end(uint32_t state)
     return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED;
 }
 
-/* The end of the program is known beforehand, so that the tick that comes to it takes no longer for it. */
+/* The state at the end of the program is set beforehand, so that the last tick takes no more time. */
 static void set_state(struct feed_override *f, uint32_t state)
 {
     f->state = state;
@@ -79,7 +79,7 @@ void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
 
 /* --- Commands --- */
 
-/* At the end of a tail the plan is what goes on, and goes nowhere. */
+/* At the end of a tail the nominal motion is still the source of setpoints, and stays at its end. */
 int feed_override_waits(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN && (f->state == STATE_WAITING || f->state == FEED_HELD);
@@ -119,7 +119,7 @@ static void read_numbers(struct feed_override *f)
         path_brake_numbers_of(&f->numbers, &stop, f->clock.period_us) ? f->kind : NO_NUMBERS;
 }
 
-/* A brake under way keeps the time that it had. */
+/* The deadline of a brake under way stays. */
 static void request_stop(struct feed_override *f, enum program_stop_kind kind)
 {
     const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
@@ -183,7 +183,7 @@ void feed_override_fault_stop(struct feed_override *f)
     set_state(f, FEED_STOPPING);
 }
 
-/* --- Where the plan is --- */
+/* --- State of the nominal motion --- */
 
 static uint32_t override_q30(const struct feed_override *f)
 {
@@ -196,7 +196,7 @@ static uint32_t time_of_tick_q40(const struct feed_override *f)
     return (uint32_t)(qmath_product_unsigned(override_q30(f), MS_Q40) >> 30);
 }
 
-/* With v the override: v F' and v^2 F'' + v' F' as way of a tick. */
+/* With v the override: speed v F' and acceleration v^2 F'' + v' F', in units of a tick. */
 int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56)
 {
@@ -250,7 +250,7 @@ static int interpolate_brake(struct feed_override *f, struct interpolator *it)
                                       &f->point);
 }
 
-/* The tick that leaves the plan. */
+/* The tick that leaves the nominal motion. */
 static int first_brake_tick(struct feed_override *f, struct interpolator *it)
 {
     f->left_q30 -= TICK_Q30;
@@ -278,8 +278,8 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. The remainder
- * is rounded down, to micrometres and microseconds. */
+/* Whether every brake of the stop table would end before the end of the path, and before the program does. The
+ * remainder is rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
@@ -293,11 +293,10 @@ static int is_far_from_end(const struct feed_override *f, const struct path_stat
            qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 
-/* --- From the plan to the brake --- */
+/* --- From the nominal motion to the brake --- */
 
-/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk
- * of the program's limits would have to take away more than a quarter of the deceleration first: the rise is cut
- * instead. */
+/* Leaves the nominal motion, if a brake may begin here. A hold or a stop does not begin while a rising override adds
+ * more than a quarter of the deceleration to the acceleration: the rise is cut instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
     if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
@@ -312,8 +311,9 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
-/* The plan goes on for another tick. At a low override, at which it may be long until the place of the next brake, the
- * override goes to 0; at a high one its fall would add to the deceleration that the plan itself has. */
+/* The nominal motion continues for another tick. At a low override it may take long to the place of the next brake, so
+ * the override goes to 0. At a high one the fall of the override would add to the deceleration of the nominal motion.
+ * */
 static void wait_slowly(struct feed_override *f)
 {
     if (f->plan.now.override_q57 < OVERRIDE_ONE / 2) {
@@ -323,7 +323,7 @@ static void wait_slowly(struct feed_override *f)
     }
 }
 
-/* The plan is left, or it is known to rest. */
+/* Leaves the nominal motion, or finds that it ends at standstill by itself. */
 static int leaves_or_rests(struct feed_override *f, const struct interpolator *it)
 {
     struct path_state state;
@@ -337,8 +337,8 @@ static int leaves_or_rests(struct feed_override *f, const struct interpolator *i
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
-/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited
- * for the end of a rise of the override, which the bound of the piece before does not know of: then the bound of this
+/* The nominal motion is in another piece, whose stop parameters are valid from now on. A hold or a stop may have waited
+ * for the end of a rise of the override, which the bound of the previous piece does not include: then the bound of this
  * piece counts. */
 static void enter_piece(struct feed_override *f)
 {
@@ -348,7 +348,7 @@ static void enter_piece(struct feed_override *f)
     }
 }
 
-/* A stop has been requested, and the plan is still what goes on: it is left, or it goes on for another tick. */
+/* A stop has been requested during the nominal motion: leaves it, or continues it for another tick. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
@@ -364,7 +364,7 @@ static int wait_tick(struct feed_override *f, struct interpolator *it)
     return plan_tick(f, it);
 }
 
-/* A fault stop gives its own numbers to the brake of a hold or a stop, where that then rests on the path. */
+/* A fault stop gives its own numbers to the brake of a hold or a stop, if the brake then still ends on the path. */
 static void replace_brake(struct feed_override *f)
 {
     const struct path_state at = f->brake.at;
@@ -374,7 +374,8 @@ static void replace_brake(struct feed_override *f)
     f->replace = 0;
 }
 
-/* On from the place of rest when that is known, and wanted. */
+/* At standstill: searches the program time of the place; continues from there when it is found and the motion is
+ * resumed. */
 static void search_place(struct feed_override *f, const struct interpolator *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
@@ -434,7 +435,7 @@ static int is_shared(const struct feed_override *f, const struct chunk *next)
            p->header.length_q40_mm - program_piece_start(p, joint) >= REACH_Q40;
 }
 
-/* The plan goes on, and an override ramp that is under way ends before the joint. */
+/* The nominal motion continues, and an override ramp under way ends before the joint. */
 static int may_take_over_moving(const struct feed_override *f, const struct chunk *next)
 {
     return f->state == FEED_RUNNING && is_shared(f, next) &&
@@ -447,7 +448,7 @@ static int may_take_over_resting(const struct feed_override *f, const struct chu
                               program_piece_start(&next->program, 0);
 }
 
-/* A chunk behind a rest: at the end of its predecessor. A path that is held waits. */
+/* A chunk that begins at rest: at the end of its predecessor. A held path waits. */
 static int may_begin_next(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN && f->state == STATE_WAITING;
@@ -462,8 +463,8 @@ static int may_take_over(const struct feed_override *f, const struct chunk *next
            (rests(f) ? may_take_over_resting(f, next) : may_take_over_moving(f, next));
 }
 
-/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the
- * first piece. */
+/* For a chunk that begins at rest its start. In motion the same place in the next program; at standstill the search for
+ * it begins with the first piece. */
 static void place_in_next(const struct feed_override *f, const struct interpolator *it,
                           const struct chunk *next, struct feed_place *place)
 {
@@ -486,7 +487,7 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
     return may_take_over(f, next);
 }
 
-/* At rest: on from the same arc length, once its time is found. */
+/* At standstill: continues from the same arc length when its time is found. */
 static void rest_in_next(struct feed_override *f)
 {
     interpolator_search_begin(&f->place, 0, f->point.arc_length_q40_mm);
@@ -495,7 +496,7 @@ static void rest_in_next(struct feed_override *f)
     f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
 }
 
-/* As a program begins. */
+/* Begins the next program as a program begins. */
 static void begin_next(struct feed_override *f, const struct chunk *next,
                        const struct coefficients_piece *first)
 {
@@ -508,7 +509,7 @@ static void go_on_in_next(struct feed_override *f, const struct chunk *next,
                           const struct feed_place *at, const struct coefficients_piece *record)
 {
     const int resting = at->by_arc != 0u;
-    /* at rest at its start until the place is found */
+    /* standstill at its start until the place is found */
     program_clock_carry(&f->clock, &next->program,
                         resting ? f->clock.time_q42_s : qmath_q42_of_q32(next->time_shift_q32_s),
                         at->piece, record);
@@ -542,7 +543,7 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 
 /* --- Its records --- */
 
-/* The program clock is where the motion is: not in a brake, nor until the place of its rest is found. */
+/* 1: the program clock is at the place of the motion: not in a brake, nor until the place of standstill is found. */
 static int clock_is_here(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
@@ -558,7 +559,7 @@ void feed_override_place(const struct feed_override *f, const struct interpolato
     place->by_arc = here ? 0u : 1u;
 }
 
-/* While it is looked for where the motion rests, no piece is needed but that which is bisected; in a brake, none. */
+/* While the place of standstill is searched only the bisected piece is needed; in a brake, none. */
 int feed_override_use(struct feed_override *f, struct interpolator *it,
                       const struct coefficients_window *window)
 {
@@ -576,7 +577,7 @@ int feed_override_use(struct feed_override *f, struct interpolator *it,
     return 1;
 }
 
-/* --- What is so --- */
+/* --- State --- */
 
 enum feed_state feed_override_state(const struct feed_override *f)
 {

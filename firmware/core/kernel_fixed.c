@@ -157,7 +157,7 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
     tangent_q25[1] = qmath_mul_hi(2 * qmath_mul_hi(u, v), inverse_q27);
 }
 
-/* Where an arc length is on its segment. */
+/* The place of an arc length on its segment. */
 struct place {
     int32_t z_q31;
     int64_t remainder_q48_mm; /* the remainder of the arc length there, */
@@ -236,14 +236,14 @@ static void tangent_in_space(const struct kernel_fixed_space *k, int32_t z, int3
     tangent_q25[2] = qmath_mul_hi(z_q30, inverse_q27);
 }
 
-/* How far the rest of the arc length is in z. */
+/* The remainder of the arc length, as a difference in z. */
 static int32_t remainder_in_z_q44(const struct kernel_fixed_arc *k, const struct place *place)
 {
     int32_t remainder_q44 = qmath_clamp32(qmath_shift(place->remainder_q48_mm, -4 - k->exponent));
     return qmath_clamp32(qmath_product(remainder_q44, place->reciprocal_q15) >> 15);
 }
 
-/* Not in the line of a tick without extra axes. */
+/* A function of its own, so that a tick without extra axes does not contain its code. */
 static KERNEL_APART void extras_at(const struct kernel_fixed_space *k, int64_t position_q40[],
                                    int32_t z_q31, int32_t dz_q44)
 {

@@ -9,10 +9,11 @@
 
 #define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
 #define NOWHERE UINT32_MAX
-#define EARLY   16u /* ticks before a rest in which the next ramp is looked for */
+#define EARLY   16u /* ticks before the end of a ramp in which the next one is searched */
 /* Half of a ramp above guaranteed_q57: it leaves less than OVERRIDE_SPARE. */
 #define MOST_TICKS ((uint32_t)1 << 18)
-/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
+/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the end of a ramp.
+ * */
 #define MARGIN 8u
 
 static const struct ramp_ticks SHORTEST = {1, 1};
@@ -68,7 +69,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->guaranteed = *least;
     plan->guaranteed_q57 = override_of_factor(least->factor_q14);
     plan->ahead.bounds =
-        &plan->guaranteed; /* of a window of the program before: not looked at again */
+        &plan->guaranteed; /* of a window of the previous program: not evaluated again */
     plan->ends_q32_s -= plan->ends_q32_s < shift_q32_s ? plan->ends_q32_s : shift_q32_s;
     plan->searched = NOWHERE;
 }
@@ -139,7 +140,7 @@ static int64_t factor_q57(const struct override_window *w)
     return override_of_factor(w->bounds->factor_q14);
 }
 
-/* Where the override rests next: the end of a ramp that falls to it. */
+/* The next constant override: the end of a ramp under way. */
 static int64_t next_rest(const struct override_plan *plan)
 {
     return override_ramp_moves(&plan->ramp) ? plan->ramp.end_q57 : plan->now.override_q57;
@@ -156,13 +157,13 @@ static void begin_search(struct override_plan *plan, enum override_kind kind, in
 {
     plan->task = OVERRIDE_SEARCHES;
     plan->kind = kind;
-    plan->ends_q32_s = UINT64_MAX; /* until one is found that ends where the override may stay */
+    plan->ends_q32_s = UINT64_MAX; /* until a ramp is found that ends at a permitted override */
     plan->target_q57 = target_q57;
     plan->step = OVERRIDE_EVALUATES;
     plan->window = 0;
 }
 
-/* The ramp back that was found before the override went up. */
+/* Begins the return ramp, which was found before the override rose. */
 static void begin_return(struct override_plan *plan)
 {
     plan->ticks = plan->back;
@@ -172,7 +173,7 @@ static void begin_return(struct override_plan *plan)
     plan->task = OVERRIDE_BEGINS;
 }
 
-/* No window will do for what was looked for, which was not to settle. */
+/* No window allows what was searched, which was not OVERRIDE_SETTLE. */
 static void give_up(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
@@ -188,8 +189,8 @@ static void give_up(struct override_plan *plan)
     }
 }
 
-/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is
- * it. */
+/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window. Sets `target_q57` to that
+ * override. */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
@@ -199,7 +200,7 @@ static int may_climb(struct override_plan *plan)
            qmath_magnitude(plan->target_q57 - now_q57) > OVERRIDE_SPARE;
 }
 
-/* What the window allows, for an override above guaranteed_q57. */
+/* Limits the target to the factor of the window, for an override above guaranteed_q57. */
 static void check_factor(struct override_plan *plan)
 {
     if (plan->kind == OVERRIDE_CLIMB) {
@@ -215,7 +216,8 @@ static void check_factor(struct override_plan *plan)
     }
 }
 
-/* The next window. Behind the last, below guaranteed_q57, the least bounds of the program, which always do. */
+/* Evaluates the next window. After the last one, below guaranteed_q57, the least bounds of the program, which are
+ * always enough. */
 static void look(struct override_plan *plan, const struct program_clock *clock)
 {
     plan->step = OVERRIDE_STAGES;
@@ -236,7 +238,8 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
     }
 }
 
-/* How far one ramp may go with the bounds of the window. Above guaranteed_q57 it goes all the way, or not at all. */
+/* How far one ramp may go with the bounds of the window. Above guaranteed_q57 one ramp makes the whole change, or none.
+ * */
 static void find_stage(struct override_plan *plan)
 {
     plan->step = OVERRIDE_MEASURES;
@@ -292,8 +295,8 @@ static int fits(struct override_plan *plan, const struct program_clock *clock)
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
-/* Until when an override above guaranteed_q57 may last: the ramp back, at most at this override, ends inside the
- * window. 0: not at all. */
+/* Until when an override above guaranteed_q57 may last, so that the return ramp, at most at this override, ends inside
+ * the window. 0: not at all. */
 static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t span = margin_q32(plan, clock) +
@@ -302,13 +305,13 @@ static uint64_t return_by(const struct override_plan *plan, const struct program
     return plan->ticks.half < MOST_TICKS && span < end_q32_s ? end_q32_s - span : 0;
 }
 
-/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the
- * ramp back too. */
+/* The present override may stay for a longer time than before; or a ramp up begins, if the window has time for the
+ * return ramp as well. */
 static void fit_above(struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t by_q32_s = return_by(plan, clock);
     const int stays = plan->kind == OVERRIDE_STAY;
-    /* by then, if the ramp up takes what the ramp back may take */
+    /* latest end of the ramp up, if it takes as long as the return ramp */
     const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
     if (stays ? by_q32_s <= plan->return_q32_s
               : by_q32_s == 0 || qmath_q32_of_q42(clock->time_q42_s) + there_q32_s > by_q32_s) {
@@ -340,7 +343,7 @@ void override_plan_search(struct override_plan *plan, const struct program_clock
     }
 }
 
-/* --- At rest --- */
+/* --- At a constant override --- */
 
 static void begin_ramp(struct override_plan *plan, int64_t step_q56)
 {
@@ -390,7 +393,7 @@ static void decide(struct override_plan *plan, const struct program_clock *clock
     }
 }
 
-/* At rest, and not steady: one step of deciding what to do next. */
+/* At a constant override that is not the commanded one: one step of the decision. */
 static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->now.override_q57 > plan->guaranteed_q57 &&
@@ -407,8 +410,8 @@ static void tick_of_decision(struct override_plan *plan, const struct program_cl
     }
 }
 
-/* 1 when the override is where it is wanted and may stay there whatever the pieces are. Then the next tick is like this
- * one, and what was planned is off. */
+/* 1 if the override is the commanded one and all pieces allow it. Then the next tick is like this one, and a plan is
+ * dropped. */
 static int comes_steady(struct override_plan *plan)
 {
     const int64_t wanted_q57 = wanted_override(plan);
@@ -424,8 +427,8 @@ static int comes_steady(struct override_plan *plan)
 
 /* --- On a ramp --- */
 
-/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above guaranteed_q57 on
- * the way down, where nothing says how to return. */
+/* Another override is commanded: the ramp continues until a cut would end there, or beyond. Above guaranteed_q57 a
+ * falling ramp is not cut, because no return ramp would be known. */
 static void change_target(struct override_plan *plan, int64_t wanted_q57)
 {
     struct override_ramp *ramp = &plan->ramp;
@@ -437,7 +440,7 @@ static void change_target(struct override_plan *plan, int64_t wanted_q57)
     }
 }
 
-/* A stage ends soon: the next one is looked for, so that the rest between them is short. */
+/* A stage ends soon: searches the next one, so that the time of constant override between them is short. */
 static void search_early(struct override_plan *plan, const struct program_clock *clock,
                          int64_t wanted_q57)
 {
@@ -468,7 +471,7 @@ static int64_t next_slope(struct override_plan *plan, const struct program_clock
 
 /* --- Tick --- */
 
-/* A program begins with feed and acceleration zero: there the override may step. */
+/* A program begins with feed and acceleration 0: there the override may change in a step. */
 static void first_tick(struct override_plan *plan, struct program_clock *clock)
 {
     plan->started = 1;
@@ -500,7 +503,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
         tick_of_ramp(plan, clock);
         return;
     }
-    if (clock->even_q62_s == 0) { /* after a ramp: not in its last tick, which takes long itself */
+    if (clock->even_q62_s == 0) { /* after a ramp; its last tick has no time for it */
         clock->even_q62_s = program_clock_step_q62_s(clock, &plan->now, 0);
     }
     if (!comes_steady(plan)) {
@@ -513,7 +516,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
 
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock)
 {
-    if (plan->steady != 0) { /* nothing is on its way: the same again */
+    if (plan->steady != 0) { /* no ramp and no search: as in the last tick */
         program_clock_advance_even(clock, plan->now.override_q57);
     } else {
         override_plan_change(plan, clock);

@@ -51,7 +51,7 @@ static uint32_t level_of(int64_t override_q57)
     return level;
 }
 
-/* The bounds of the higher level are not much below those of the lower one: a rest between them would gain nothing. */
+/* The bounds of the higher level are not much below those of the lower one: two ramps would not be faster than one. */
 static int alike(const struct program_override *bounds, uint32_t high, uint32_t low)
 {
     return bounds->rate[high] + ALIKE >= bounds->rate[low] &&
@@ -81,7 +81,7 @@ static void stage_up(struct ramp_stage *out, const struct program_override *boun
     out->end_q57 = level < change->last ? override_of(level) : change->to_q57;
 }
 
-/* To rest just inside the first level below whose bounds are not alike. */
+/* The stage ends just inside the first lower level with different bounds. */
 static void stage_down(struct ramp_stage *out, const struct program_override *bounds,
                        const struct ramp_change *change)
 {
@@ -108,8 +108,8 @@ void override_stage_of(struct ramp_stage *out, const struct program_override *bo
 
 /* --- Bounds of a level --- */
 
-/* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms:
- * R = number 2^21 h / 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
+/* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms: R = number 2^21 h /
+ * 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
 void override_limits_of(struct ramp_limits *out, const struct program_override *bounds,
                         uint32_t level, uint32_t period_log2)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, as numbers that bounds
- * can be proved of. */
+/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, and bounds of it. */
 #include "core/path_motion.h"
 
 #include "core/ph_segment.h"
@@ -70,7 +69,7 @@ void path_motion_stretch(struct real *c, int degree, struct real by)
     }
 }
 
-/* --- What is read from the image --- */
+/* --- Reading the image --- */
 
 /* From Bernstein coefficients of degree 2 to powers. */
 static void to_powers(struct real out[3], const int64_t w_q44[3])
@@ -399,7 +398,7 @@ void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE +
     const struct real high =
         parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, one), offset_mm));
     const struct real middle = real_scale(real_add(low, high), -1);
-    /* 2^-10 of it more, and 2^-20 of the segment: a feed may creep back by its slack */
+    /* 2^-10 of it more, and 2^-20 of the segment: a feed may go back by its slack */
     struct real half = real_abs(real_scale(real_sub(high, low), -1));
     half = real_add(real_mul(half, real_make(1025, -10)), real_make(1, -20));
     majorant(polynomial, path->sigma, PATH_DEGREE, middle, half);

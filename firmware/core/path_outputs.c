@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/path_outputs.h (see there): the outputs of the path at each setpoint. */
 #include "core/path_outputs.h"
 
 #include <string.h>
@@ -12,7 +13,7 @@ void path_outputs_clear(struct path_outputs *outputs)
     memset(outputs, 0, sizeof *outputs);
 }
 
-/* Event number `next` is the next one, if there is such a one. */
+/* Reads the place of event number `next`, if it exists. */
 static void read_next(struct path_outputs *outputs, const struct program *program)
 {
     const int is_left = outputs->next < program->header.event_count;

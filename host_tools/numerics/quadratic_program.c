@@ -427,7 +427,7 @@ static void assemble(struct solving *s)
 }
 
 /* Factors the matrix in place: row i of a unit triangle, and the inverse of its pivot. Before the first row are as many
- * of zeros as it looks back. */
+ * rows of zeros as it reads back. */
 static void matrix_factor(struct solving *s)
 {
     double *row = s->matrix;
@@ -441,7 +441,7 @@ static void matrix_factor(struct solving *s)
         row[1] = u2 * pivot[-2];
         row[2] = u1 * pivot[-1];
         const double own = row[3] - u3 * row[0] - u2 * row[1] - u1 * row[2];
-        /* Rounding left no digit of this pivot: the unknown stays as it is. */
+        /* This pivot has no valid digit after rounding: the unknown does not change. */
         pivot[0] = own > LEAST_PIVOT * row[3] && !known(s->given, i) ? 1.0 / own : 0.0;
     }
 }

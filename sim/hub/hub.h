@@ -107,7 +107,7 @@ int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub
 /* Waits for the next event and handles it. False: `end` has become readable, or no event can follow. */
 bool hub_step(struct hub *hub, int end);
 
-/* Closes the buses for all their members, and removes the sockets. */
+/* Closes the buses and the connections of all their members. */
 void hub_close(struct hub *hub);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-hub: CAN buses for the processes of one machine, whose kernel need not have CAN. */
+/* hodograph-hub: CAN buses for the processes of one computer, without kernel CAN. */
 #define _GNU_SOURCE
 #include <getopt.h>
 #include <inttypes.h>
@@ -40,7 +40,7 @@ static int wrong(const char *what, const char *value)
     return EXIT_USAGE;
 }
 
-/* Above the simulated drives (20), where that is permitted: a real bus does not wait for anybody. */
+/* Above the simulated drives (20), if permitted: a real bus does not wait for a process. */
 static void ask_for_priority(void)
 {
     const struct sched_param priority = {.sched_priority = 25};

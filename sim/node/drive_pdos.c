@@ -34,7 +34,7 @@ static bool maps_more_than_cyclic(const struct od_drive *v, const struct pdo_map
     return found;
 }
 
-/* What the mapping means for the rest of the drive. */
+/* Evaluates which values the mapping contains. */
 static void evaluate_mapping(struct drive_pdos *pdos)
 {
     const struct od_drive *values = pdos->servo->values;

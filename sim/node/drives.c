@@ -61,7 +61,7 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
     return 0;
 }
 
-/* What the module receives beside what the drives do; returns how many there are. */
+/* Filters for frames that only the module receives; returns their number. */
 static size_t module_filters(struct io_module *module, struct can_match filters[])
 {
     size_t n = 0;

@@ -15,7 +15,7 @@ static const double CONTOUR_WINDOW = 4.0;
 
 struct foot {
     struct place place;
-    double moved_mm; /* along the curve from where the search began */
+    double moved_mm; /* along the curve, from the start of the search */
     double distance_mm;
     bool found;
 };
@@ -68,8 +68,8 @@ static double contour_gap_at(const struct contour *c, double arc_length_mm, cons
     return contour_gap(c, contour_place(c, c->cursor, contour_wrap(c, arc_length_mm)), point);
 }
 
-/* Slow and sure: samples the window, then closes in on the best sample by golden sections. *foot_mm is the arc length
- * found. */
+/* Slow but without failure: samples the window, then searches around the best sample by golden sections. *foot_mm is
+ * the arc length found. */
 static double contour_search(const struct contour *c, double arc_length_mm, double window_mm,
                              const double point[3], double *foot_mm)
 {

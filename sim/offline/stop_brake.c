@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_brake.h (see there): whether a brake along the path keeps given limits. */
 #include "offline/stop_brake.h"
 
 #include <math.h>
 
 #define GREATEST_CODE 255
-#define LEAST_MM_S    1e-4 /* slower is rest */
+#define LEAST_MM_S    1e-4 /* slower is standstill */
 #define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
-/* ticks of a brake between two looks whether the rest of it, or so many ticks, surely keep the limits */
+/* ticks of a brake between two tests whether bounds show the limits kept, for its remaining ticks or so many ticks */
 #define SURE_EACH   12
 #define SPARE_TIME  1.25 /* of stop_brake_time, */
 #define SPARE_TICKS 10.0 /* and ticks more */
-/* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+/* of a feed, or the velocity of an axis: at other overrides the states include some that look-ahead excludes */
 #define FASTER 0.03
 
 double stop_number_of(int k, int code)
@@ -94,7 +95,7 @@ static struct stop_state moved(const struct stop_state *from, double j, double t
     return to;
 }
 
-/* 1 while one tick keeps the limits, looked at in `parts` places. */
+/* 1 if one tick keeps the limits, sampled at `parts` places. */
 static int tick_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                       const struct stop_state *from, const struct stop_state *to, uint32_t *row,
                       int parts)
@@ -127,8 +128,8 @@ double stop_brake_extent(const struct stop_setting *setting,
     return most->s + extent->speed * most_s;
 }
 
-/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are
- * far from the limits, and to follow each of them would take nearly all of the time of a search. */
+/* 1: bounds show that the remaining brake keeps the limits; 0: they do not decide. Most brakes at low overrides are far
+ * from the limits, and following each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
 {
@@ -140,7 +141,7 @@ static int surely_keeps(const struct stop_setting *setting, const struct stop_in
     return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, to_mm);
 }
 
-/* 1: some ticks of a brake, at[0 ... count], surely keep the limits, by bounds of all of them; 0: that is open. */
+/* 1: bounds show that some ticks of a brake, at[0 ... count], keep the limits; 0: they do not decide. */
 static int ticks_surely_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                              const struct stop_state *at, int count, uint32_t row)
 {

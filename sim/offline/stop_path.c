@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_path.h (see there): the path of a program as a table. */
 #include "offline/stop_path.h"
 
 #include <math.h>
@@ -57,7 +58,7 @@ static void planar_row(const struct preimage *w, double xi, struct stop_row *row
     row->slope = (2.0 * turn2 - 8.0 * turn * along / sigma) / (sigma * sigma * sigma);
 }
 
-/* What x', y', z' and sigma are of, as symmetric forms of two preimages. */
+/* The symmetric forms of two preimages that give x', y', z' and sigma. */
 static void forms(const double a[PROGRAM_COMPONENTS], const double b[PROGRAM_COMPONENTS],
                   double out[4])
 {
@@ -166,7 +167,7 @@ static double feed_here(const struct stop_limits *limits, const struct stop_row 
     return most < limits->feed ? most : limits->feed;
 }
 
-/* The first of `count` rows at or behind an arc length. */
+/* The first of `count` rows at or after an arc length. */
 static uint32_t first_row_from(const struct stop_row *rows, uint32_t count, double s_mm)
 {
     uint32_t low = 0;
@@ -322,7 +323,7 @@ void stop_pass_rows(const struct stop_lookup *lookup, double s, uint32_t *row)
     }
 }
 
-/* The first row behind both a row and an arc length; the last one if there is none. */
+/* The first row after both a row and an arc length; the last one if there is none. */
 static uint32_t row_after(const struct stop_lookup *lookup, uint32_t row, double to_mm)
 {
     const uint32_t last = lookup->row_count - 1u;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_piece.h (see there): instants and states of a feed piece in which a stop may begin. */
 #include "offline/stop_piece.h"
 
 #include <math.h>
 
-#define EVEN_INSTANTS 129  /* of a piece, one as long after the other */
+#define EVEN_INSTANTS 129  /* of a piece, at equal distances */
 #define ROWS_EACH     4    /* of the path, for an instant between them */
-#define LEAST_MM_S    1e-4 /* slower is rest */
-/* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+#define LEAST_MM_S    1e-4 /* slower is standstill */
+/* of the shortest brake: with more jerk the distance of one tick would matter */
 #define LEAST_TICKS 6.0
 
 /* Feed overrides at which brakes are followed, and the same shares of the piece's greatest. */
@@ -61,8 +62,8 @@ static int add_instant(const struct stop_setting *setting, const double c[8], do
     return 1;
 }
 
-/* Adds those of a stretch, from the last one to u = high, at which every `each`-th row of the path is passed, no closer
- * to each other than step_s: a bend may be narrower than the even instants are apart. */
+/* Adds the instants of a stretch, from the last one to u = high, at every `each`-th row of the path, no closer than
+ * step_s: a bend may be shorter than the distance of the even instants. */
 static int add_rows(const struct stop_setting *setting, const double c[8], double high,
                     uint32_t each, double step_s, struct stop_piece *piece)
 {
@@ -102,7 +103,7 @@ static int add_instants(const struct stop_setting *setting, const double c[8], u
 }
 
 /* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by
- * the reciprocals of their limits. They may turn by many degrees within a millimetre. */
+ * the reciprocals of their limits. A rotary axis may turn by many degrees within a millimetre. */
 static double extra_axes_most(const struct stop_setting *setting, const struct stop_piece *piece,
                               const double inverse[PROGRAM_AXES])
 {
@@ -127,8 +128,8 @@ static double followed_most(const struct stop_setting *setting, const struct sto
                : most;
 }
 
-/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or over the path that is
- * left after it where that needs more; but no more than the extra axes can follow. */
+/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or on the remaining path
+ * if that needs higher codes; but no more than the extra axes can follow. */
 static void piece_most(const struct stop_setting *setting, struct stop_piece *piece)
 {
     const double span_s = LEAST_TICKS * setting->period_s;
@@ -182,8 +183,8 @@ void stop_piece_fill(const struct stop_setting *setting, const struct program *p
     piece->fastest.a = most;
 }
 
-/* Greatest slope at a rate of program time, of a rise (sign 1) or a fall (-1): it came from a rest, and can come to one
- * within the level. */
+/* Greatest override rate at an override, of a rise (sign 1) or a fall (-1): it began at a constant override, and can
+ * end at one within the level. */
 static double slope_at(const struct stop_piece *piece, double rate, int sign)
 {
     double most = 0.0;

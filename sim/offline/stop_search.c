@@ -10,16 +10,16 @@
 #include "offline/stop_verdict.h"
 
 #define GREATEST_CODE 255
-#define WAIT_BETTER   0.8   /* of the mean time: rather none than such a brake; */
-#define WAIT_AS_GOOD  1.001 /* or such a one that could also take much longer */
-#define NEAR          1.05  /* so near to the least time without limits no other start is tried */
+#define WAIT_BETTER   0.8   /* of the mean time: no brake is used if waiting takes less; */
+#define WAIT_AS_GOOD  1.001 /* or about as long, if the brake could also take much longer */
+#define NEAR 1.05 /* times the least time without limits: below it no other start is tried */
 
 struct choice {
     int codes[3];
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-/* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
+/* Takes the codes if they are better; `strict`: at all overrides, and at more instants. */
 static int better(const struct stop_setting *setting, struct stop_piece *piece, const int codes[3],
                   double after_s, int strict, struct choice *best)
 {
@@ -67,7 +67,7 @@ static void climb(const struct stop_setting *setting, struct stop_piece *piece, 
     }
 }
 
-/* Lowers all codes until the limits are kept at all rates; 0: they never are. */
+/* Lowers all codes until the limits are kept at all overrides; 0: they never are. */
 static int lowered(const struct stop_setting *setting, struct stop_piece *piece, const int start[3],
                    double after_s, struct choice *best)
 {
@@ -163,8 +163,8 @@ static int lower_by(const struct stop_setting *setting, struct stop_piece *piece
     return better(setting, piece, codes, after_s, 1, best);
 }
 
-/* A search of few trials: the codes of the next piece, else lower ones of all, or of the onset first, down to the
- * lowest; then raised together as far as that goes. */
+/* A search of few trials: the codes of the next piece, else lower ones, of all three or of the onset first, down to the
+ * lowest; then all raised together as far as the limits allow. */
 static void search_quickly(const struct stop_setting *setting, struct stop_piece *piece,
                            const int warm[3], double after_s, struct choice *best)
 {
@@ -194,7 +194,7 @@ static void search_quickly(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* A piece without a brake: the plan goes on into the next. */
+/* A piece without a brake: the nominal motion continues into the next. */
 static void wait_for_next(const struct stop_piece *piece, double after_s, struct choice *out)
 {
     double seconds = piece->seconds;
@@ -225,7 +225,7 @@ static void known_choice(const struct stop_setting *setting, const struct stop_p
     out->first_s = times.first_s;
 }
 
-/* Takes the given codes. Returns 1 where they are `kept` and keep the limits out of `before` too. */
+/* Takes the given codes. Returns 1 if they are `kept` and keep the limits also in place of the brake `before`. */
 static int kept_choice(const struct stop_setting *setting, struct stop_piece *piece,
                        const struct stop_found *found, double after_s, struct choice *best)
 {
@@ -261,8 +261,8 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the
- * same override. They are looked at first; what is found does not depend on that. */
+/* If brakes from a piece exceed a limit, those from the previous piece usually do so as well, from its last instant at
+ * the same override. These are evaluated first; the result does not depend on the order. */
 static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden behind[2])
 {
     piece->suspect = piece->count - 1u;

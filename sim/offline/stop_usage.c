@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_usage.h (see there): the limit usage of a motion along a path. */
 #include "offline/stop_usage.h"
 
 #include <math.h>
@@ -6,7 +7,7 @@
 #define UNLIMITED_MM_S 1e12
 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes */
 #define SPARE_SHARE   1e-4
-#define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
+#define FEED_ROUNDING 1e-9 /* share of a feed by which the plan may exceed it */
 
 static double over(double limit)
 {
@@ -112,7 +113,7 @@ static double length_of(double along, double across)
     return sqrt(along * along + across * across);
 }
 
-/* Greatest component along an axis, for an axis that the tangent has at most this component of. */
+/* Greatest component along an axis, if the component of the tangent along it is at most this one. */
 static double component(double along, double across, double tangent)
 {
     return stop_lesser(length_of(along, across), along * tangent + across);
@@ -187,7 +188,7 @@ int stop_extent_keeps(const struct stop_lookup *lookup, const struct stop_invers
 int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm)
 {
-    /* Where limits bind, the first row alone shows it as a rule. */
+    /* If a limit is exceeded, the first row alone usually shows it. */
     stop_stretch_of_row(lookup, row, &extent->path);
     if (!stop_extent_keeps(lookup, inverse, extent)) {
         return 0;

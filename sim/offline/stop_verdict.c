@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed piece. */
 #include "offline/stop_verdict.h"
 
 #include <math.h>
 
-#define STEP_S         0.002  /* between two looks at a brake, */
-#define FINE_S         0.0005 /* and in the last look */
-#define BRAKE_EACH     5      /* ticks of a brake out of which another may begin, */
+#define STEP_S         0.002  /* between two samples of a brake, */
+#define FINE_S         0.0005 /* and in the strict test */
+#define BRAKE_EACH     5      /* ticks of a brake that another may replace, */
 #define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
 #define LONGEST_SHARE  0.1
-#define FAR_TICKS 20.0 /* and twice the brake: so far from its end a program has room for a brake */
+#define FAR_TICKS                                                                                  \
+    20.0 /* and twice the brake: so far from its end a brake fits before the end of the program */
 #define NO_BRAKE_S 10.0
 
 /* What a brake has to keep; `surely`: it does. */
@@ -30,8 +32,8 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
         double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
         double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
         double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
-        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not
-         * counted, or the worst numbers would be the best. */
+        /* A brake that is longer than the remaining program is not begun. The next instant may have a better one. It is
+         * not counted, otherwise the worst numbers would be the best. */
         int begins = stop_brake_begin(&brake, at, numbers, setting->period_s);
         double total_s = begins ? stop_brake_time(at, numbers, setting->period_s) : STOP_NEVER_S;
         if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
@@ -57,7 +59,7 @@ struct begun {
     double speed, rise, fall;
 };
 
-/* Bounds of all brakes that begin in the piece in states within these; returns the arc length that they do not pass. */
+/* Bounds of all brakes that begin in the piece in states within these; returns the arc length of their end at most. */
 static double begun_extent(const struct stop_setting *setting, const struct stop_piece *piece,
                            const struct path_brake_numbers *numbers, const struct begun *begun,
                            struct stop_extent *extent)
@@ -68,7 +70,7 @@ static double begun_extent(const struct stop_setting *setting, const struct stop
     return to_mm;
 }
 
-/* The states at any rate. */
+/* The states at any override. */
 static struct begun begun_at_any_rate(const struct stop_setting *setting,
                                       const struct stop_piece *piece)
 {
@@ -82,7 +84,7 @@ static struct begun begun_at_any_rate(const struct stop_setting *setting,
     return out;
 }
 
-/* Whether bounds alone show that all brakes out of such states keep the limits. */
+/* Whether bounds alone show that all brakes from such states keep the limits. */
 static int begun_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                       const struct stop_piece *piece, const struct path_brake_numbers *numbers,
                       const struct begun *begun)
@@ -133,7 +135,7 @@ static double quarter(const struct stop_setting *setting, const struct path_brak
            (setting->period_s * setting->period_s);
 }
 
-/* Whether a brake out of this state fits and keeps the limits, or need not fit; 1 for a state that there is not. */
+/* Whether a brake from this state fits and keeps the limits, or need not fit; 1 for a state that cannot occur. */
 static int overridden_keeps(const struct stop_setting *setting, const struct stop_piece *piece,
                             const struct keeping *keeping, const struct stop_overridden *which,
                             const struct path_brake_numbers *numbers)
@@ -187,7 +189,7 @@ static int overrides_keep(const struct stop_setting *setting, struct stop_piece 
     return 1;
 }
 
-/* The same at the rate 1 from instants close to each other. */
+/* The same at override 1 from instants close to each other. */
 static int close_keep(const struct stop_setting *setting, struct stop_piece *close,
                       const struct path_brake_numbers *numbers, int surely)
 {
@@ -205,7 +207,7 @@ static int close_keep(const struct stop_setting *setting, struct stop_piece *clo
     return 1;
 }
 
-/* Whether a brake out of one that has begun at this state with the numbers `before` keeps the limits. */
+/* Whether a brake keeps the limits that replaces one with the numbers `before`, begun in this state. */
 static int out_of_brake_keeps(const struct stop_setting *setting, const struct stop_state *from,
                               uint32_t row, const struct path_brake_numbers *before,
                               const struct path_brake_numbers *numbers)
@@ -277,7 +279,7 @@ static int out_of_rate_keeps(const struct stop_setting *setting, struct stop_pie
     return 1;
 }
 
-/* At all overrides; the state that broke a limit last is looked at first. */
+/* At all overrides; the state that broke a limit last is evaluated first. */
 int stop_out_of_brakes_keeps(const struct stop_setting *setting, struct stop_piece *piece,
                              const int codes[3])
 {

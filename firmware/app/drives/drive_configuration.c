@@ -76,7 +76,7 @@ struct drive_row {
     uint32_t argument;
 };
 
-/* One PDO of a drive as the controller wants it. */
+/* One PDO of a drive as the controller needs it. */
 #define PDO_ENTRIES 5u
 #define PDO_INVALID UINT32_C(0x80000000) /* bit 31 of the COB-ID */
 #define PDO_NO_RTR  UINT32_C(0x40000000) /* bit 30, of TPDOs */
@@ -87,7 +87,7 @@ struct drive_pdo {
     uint8_t type;                  /* transmission type */
     uint8_t count;                 /* mapped objects; 0: the PDO shall be off */
     uint8_t inhibit_ms;            /* TPDO; 0: the drive's own */
-    bool event_timer;              /* RPDO: the drive watches for it (0x2004 sub 10) */
+    bool event_timer;              /* RPDO: the drive supervises its arrival (0x2004 sub 10) */
     uint32_t entries[PDO_ENTRIES]; /* index << 16 | sub << 8 | bits */
     uint8_t property; /* enum drive_property: known of a drive that has taken all of it */
 };
@@ -191,19 +191,19 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_NEED_BITS, 0x6502, 0, 4, FROM_ROW, CIA402_SUPPORTS(CIA402_MODE_CSP)},
     {WHEN_ALWAYS, ROW_READ, 0x60FD, 0, 4, FROM_ROW, DRIVE_INPUTS},
     {WHEN_HOMING, ROW_READ, 0x6064, 0, 4, FROM_ROW, DRIVE_POSITION},
-    /* a drive that was left enabled, and whose PDOs are not ours: it stops, and goes off */
+    /* for a drive that is still enabled, with other PDOs: it stops and switches off */
     {WHEN_ALWAYS, ROW_TRY, 0x6040, 0, 2, FROM_ROW, CIA402_QUICK_STOP},
     /* SYNC; its counter may change only while the period is 0 (CiA 301, 0x1019) */
     {WHEN_ALWAYS, ROW_MAY, 0x1005, 0, 4, FROM_ROW, COB_SYNC},
     {WHEN_ALWAYS, ROW_TRY, 0x1006, 0, 4, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x1019, 0, 1, FROM_ROW, SYNC_COUNTER},
     {WHEN_ALWAYS, ROW_MAY, 0x1006, 0, 4, FROM_PERIOD_US, 0},
-    /* heartbeats both ways instead of node guarding; without them: a quick stop */
+    /* heartbeats in both directions instead of node guarding; without them: a quick stop */
     {WHEN_ALWAYS, ROW_MAY, 0x100C, 0, 2, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_TIMEOUT_MS},
-    /* it stays operational, so that its TPDOs show what it does */
+    /* it stays operational, so that its TPDOs report its state */
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */
@@ -320,7 +320,7 @@ static uint32_t cob_of(const struct drive_pdo *pdo, uint8_t node)
     return flags | (pdo->cob + (uint32_t)node);
 }
 
-/* A PDO that shall be off only has to be invalid; what it would map does not matter. */
+/* To switch a PDO off it only has to be invalid; its mapping does not matter. */
 static bool turn_off(const struct drive_pdo *pdo, uint8_t node, uint8_t item, struct drive_op *op)
 {
     write_number(op, pdo->communication, SUB_COB, 4, PDO_INVALID | cob_of(pdo, node));
@@ -329,7 +329,7 @@ static bool turn_off(const struct drive_pdo *pdo, uint8_t node, uint8_t item, st
     return item == ITEM_DISABLE;
 }
 
-/* Times that a drive lacks leave a PDO that works. */
+/* A PDO also works if the drive does not have these times. */
 static void write_time(struct drive_op *op, const struct drive_pdo *pdo, uint32_t sub,
                        uint32_t value)
 {
@@ -397,7 +397,7 @@ static bool pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_
     return after_entries(pdo, node, setpoint_timeout_ms, entry, op);
 }
 
-/* ---- The way through the table ---- */
+/* ---- Execution of the table ---- */
 
 static uint8_t node_of(const struct drive_configuration *configuration)
 {

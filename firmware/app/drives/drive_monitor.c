@@ -97,7 +97,7 @@ static void restarted(struct machine *machine, uint8_t node)
     if (axis != NULL) {
         axis_restarted(axis);
     }
-    if (machine->state == MACHINE_BOOT) { /* it has lost what was configured so far */
+    if (machine->state == MACHINE_BOOT) { /* it has lost its configuration */
         machine_enter_boot(machine);
     } else {
         gone(machine, FAULT_REBOOTED, node);
@@ -116,7 +116,7 @@ static void take_event(struct machine *machine, const struct heartbeat_consumer 
     port_unlock();
 }
 
-/* Nobody looks after the machine any more. With drives off there is nothing to bring to rest. */
+/* The host does not supervise the machine any more. With drives off nothing has to be stopped. */
 static void host_lost(struct machine *machine, uint8_t node)
 {
     port_lock();

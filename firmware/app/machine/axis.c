@@ -87,7 +87,7 @@ static bool moves_in(enum cia402_state state)
            state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
-/* Reset in each state: an axis is at rest when its power comes on. */
+/* Restarts with each state: an axis stands when its power comes on. */
 static void count_unmoved(struct axis *axis, uint32_t tolerance_counts)
 {
     if (!moves_in(axis->state)) {
@@ -187,7 +187,7 @@ bool axis_moves(const struct axis *axis)
     return moves_in(axis->state) && axis->unmoved_syncs < AXIS_UNMOVED_SYNCS;
 }
 
-/* A statusword that means nothing, once, does not make a moving drive a stopped one. */
+/* One invalid statusword does not make a moving drive a stopped one. */
 bool axis_has_stopped(const struct axis *axis)
 {
     if (axis->state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {

@@ -10,7 +10,7 @@
 #include "core/kernel.h"
 #include "core/qmath.h"
 
-/* Objects of the configuration, beside those in the table of axis fields. */
+/* Objects of the configuration, in addition to those in the table of axis fields. */
 enum {
     PERIOD = 0x1006,
     CONFIGURATION = 0x2004,
@@ -119,7 +119,7 @@ static bool is_by_axis(uint16_t index)
     return index == NODE || index == TRAVEL_MIN || index == TRAVEL_MAX || is_axis_field(index);
 }
 
-/* What axes beyond the last one hold is left over from another machine and means nothing. */
+/* Values of axes beyond the last one may be those of another machine: they are ignored. */
 static bool counts(const struct od_entry *entry, uint8_t axis_count)
 {
     return (entry->access & OD_WRITE) != 0u && config_contains(entry->index) &&
@@ -269,13 +269,13 @@ bool config_same_zero(const struct config *first, const struct config *second, u
            a->gear_shaft_revolutions == b->gear_shaft_revolutions;
 }
 
-/* magnitude * 2^40 / counts_per_mm; rest < counts_per_mm <= 2^23 keeps the shift inside. */
+/* magnitude * 2^40 / counts_per_mm; remainder < counts_per_mm <= 2^23, so the shift stays inside 64 bits. */
 static uint64_t q40_from_magnitude(uint32_t magnitude, uint32_t counts_per_mm, bool round_up)
 {
     const uint64_t whole = magnitude / counts_per_mm;
-    const uint64_t rest = magnitude % counts_per_mm;
+    const uint64_t remainder = magnitude % counts_per_mm;
     const uint64_t bias = round_up ? counts_per_mm - 1u : 0u;
-    return (whole << 40) + qmath_div_u64((rest << 40) + bias, counts_per_mm);
+    return (whole << 40) + qmath_div_u64((remainder << 40) + bias, counts_per_mm);
 }
 
 static int64_t q40_from_counts(int32_t counts, uint32_t counts_per_mm, bool upwards)

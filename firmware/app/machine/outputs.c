@@ -28,7 +28,7 @@ static enum outputs_mode mode_of(const struct machine *machine)
 {
     const uint32_t behaviour = machine->config.outputs.behaviour;
     switch (machine->state) {
-    case MACHINE_RUNNING: /* a motion that waits for a chunk is as one in hold */
+    case MACHINE_RUNNING: /* a motion that waits for a chunk counts as held */
         return follow_or((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u ||
                              !motion_misses_chunk(&machine->motion),
                          OUTPUTS_MASKED);
@@ -73,8 +73,8 @@ static void switch_off(struct outputs *outputs)
     memset(&outputs->present, 0, sizeof outputs->present);
 }
 
-/* Executes the events up to the last setpoint. During a rest before a program that setpoint is not the program's: an
- * event at its start acts with its first setpoint. */
+/* Executes the events up to the last setpoint. During a rest before a program the last setpoint belongs to its
+ * predecessor: an event at the start acts with the first setpoint of the program. */
 static void follow_path(struct motion *motion)
 {
     if (motion->setpoints > 0u && !motion->precedes && path_outputs_active(&motion->outputs) != 0) {

@@ -40,7 +40,7 @@ void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry)
     schedule->hurry = hurry && schedule->lock_step;
 }
 
-/* A stall was no work, and the drives must not be left without SYNCs for as long again. */
+/* The pause after a tick. A stall is not counted as work: the drives must not be without SYNCs for as long again. */
 static void rest_after_work(struct schedule *schedule, uint64_t now_ns)
 {
     const uint64_t half_ns = (now_ns - schedule->started_ns) / 2u;

@@ -7,12 +7,12 @@
 #include "port/stm32g4/reg_clock.h"
 #include "port/stm32g4/reg_flash.h"
 
-/* A crystal takes milliseconds; at 16 MHz this many looks take some tenths of a second. */
+/* A crystal takes milliseconds to start; at 16 MHz this many polls take some tenths of a second. */
 #define POLLS 1000000u
 
 #define WAIT_STATES 4u
 
-/* RM0440 wants a microsecond at half the clock before the last step above 80 MHz. */
+/* RM0440 requires a microsecond at half the clock before the last step above 80 MHz. */
 #define HALF_CLOCK_POLLS 100u
 
 static bool wait_for(uint32_t address, uint32_t field, uint32_t value)

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The port for NUCLEO-G474RE: what port.h asks for, from the modules of this folder; the store is in port_store.c. */
+/* Implements port/port.h for NUCLEO-G474RE by the modules of this folder; the store is in port_store.c. */
 #include "port/port.h"
 
 #include "port/stm32g4/clock.h"
