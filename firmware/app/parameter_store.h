@@ -33,7 +33,7 @@ enum parameter_store_state {
     PARAMETER_STORE_WHOLE = 1,    /* complete: can be restored */
     PARAMETER_STORE_OTHER = 2,    /* of a firmware with other parameters */
     PARAMETER_STORE_DAMAGED = 3,  /* wrong CRC, or a value that is not allowed */
-    PARAMETER_STORE_DEFAULTS = 4, /* the defaults are wanted */
+    PARAMETER_STORE_DEFAULTS = 4, /* the defaults are selected */
 };
 
 struct parameter_store {

@@ -30,9 +30,9 @@ struct tick {
 void tick_init(struct tick *tick, struct machine *machine);
 
 /* One period k. Sends SYNC k, checks the answers of the drives to SYNC k-1, executes one step of the machine, then
- * sends setpoints k, feedforward and changed outputs. For simulated drives it asks the port to wait for their answers,
- * for at most the longer of answer_wait_ms (0x2004 sub 8) and a period. now_us: port_time_us(); late_ns: delay of this
- * tick after its due time. Timer. */
+ * sends setpoints k, feedforward and changed outputs. For simulated drives it requests that the port waits for their
+ * answers, for at most the longer of answer_wait_ms (0x2004 sub 8) and a period. now_us: port_time_us(); late_ns: delay
+ * of this tick after its due time. Timer. */
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

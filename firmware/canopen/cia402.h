@@ -28,7 +28,7 @@ enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP
 /* Bit of 0x6502 (supported drive modes) for a mode 1 ... 32. */
 #define CIA402_SUPPORTS(mode) (UINT32_C(1) << ((mode) - 1))
 
-/* Statusword bits beside those of the state. */
+/* Statusword bits that do not belong to the state. */
 #define CIA402_STATUS_VOLTAGE         0x0010u /* power stage is fed */
 #define CIA402_STATUS_WARNING         0x0080u
 #define CIA402_STATUS_REMOTE          0x0200u /* controlword is followed */

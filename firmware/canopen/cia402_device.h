@@ -36,8 +36,9 @@ struct cia402_device {
     enum cia402_state state;
     struct cia402_options options; /* may change at any time */
     uint16_t controlword;          /* last one, for edges */
-    uint16_t flags; /* CIA402_STATUS_... bits beside the state; the drive sets and clears them */
-    bool stopped;   /* in Quick stop active: the motor has come to rest; bit 10 of the statusword */
+    uint16_t
+        flags; /* CIA402_STATUS_... bits in addition to the state; the drive sets and clears them */
+    bool stopped; /* in Quick stop active: the motor has come to rest; bit 10 of the statusword */
     bool leaving; /* Operation enabled, stopping, then `leaving_to`; enabling again cancels that */
     enum cia402_state leaving_to;
     bool fault_persists; /* set by the drive: the cause is still there, a reset has no effect */

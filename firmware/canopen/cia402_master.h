@@ -13,7 +13,7 @@
 #include "canopen/cia402.h"
 
 enum cia402_goal {
-    CIA402_GOAL_OFF, /* Switch on disabled; also out of Quick stop active. A Fault is left alone */
+    CIA402_GOAL_OFF, /* Switch on disabled; also out of Quick stop active. It does not change a Fault */
     CIA402_GOAL_READY, /* Ready to switch on */
     CIA402_GOAL_SWITCHED_ON,
     CIA402_GOAL_ENABLED, /* Operation enabled. From Quick stop active through Switch on disabled */

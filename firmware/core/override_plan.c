@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/override_plan.h (see there): which override ramp comes next on the way to the commanded
+/* Implements core/override_plan.h (see there): which override ramp comes next towards the commanded
  * override, and a tick of it. */
 #include "core/override_plan.h"
 

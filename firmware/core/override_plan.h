@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * override_plan: decides which ramp comes next on the way to the commanded override, and executes it tick by tick. Used
+ * override_plan: decides which ramp comes next towards the commanded override, and executes it tick by tick. Used
  * by core/feed_override.
  *
  * One ramp at a time is decided, between two constant overrides, by look-ahead into the feed pieces that it covers. The

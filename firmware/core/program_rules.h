@@ -84,7 +84,7 @@ enum program_error {
     PROGRAM_ERR_EVENT_VALUE = -101, /* mask or value outside of what the kind has */
     PROGRAM_ERR_EVENT_PLACE = -102, /* before the event before it, or outside the path */
     PROGRAM_ERR_EVENT_DENSE = -103, /* a tick at 200 % could pass more than 16 events */
-    /* chunks of a stream (core/chunk.h): index = the segment, piece or event of the chunk where it says so, else 0 */
+    /* chunks of a stream (core/chunk.h): index = the segment, piece or event of the chunk if stated so, else 0 */
     /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
     PROGRAM_ERR_CHUNK_FORMAT = -80,
     PROGRAM_ERR_CHUNK_CRC = -81, /* CRC-32 of the chunk is wrong */

@@ -14,8 +14,8 @@
  * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
  * `receive`.) On Linux one thread stands for both interrupts.
  *
- * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Unless its comment says otherwise, a function
- * may be called from any context. Call none before port_begin().
+ * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. If its comment states nothing else, a
+ * function may be called from any context. Call none before port_begin().
  */
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
@@ -40,10 +40,10 @@ enum port_error {
 int port_begin(int argc, char **argv);
 
 /* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
- * failed on the way (the bus went away); that has been reported. Main loop. */
+ * has failed (the bus is gone); that has been reported. Main loop. */
 int port_end(void);
 
-/* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without such a request. */
+/* True when the end of the controller is requested (SIGTERM, SIGINT); never on a board without such a request. */
 bool port_stop_requested(void);
 
 /* True when it has been requested a second time: the drives then stop by their own ramps, not along the path. */
@@ -76,7 +76,7 @@ struct port_handlers {
     void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
     /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A late tick is called late.
      * Where the port has the choice it skips none, and no two are closer than three quarters of a period; a timer whose
-     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. Either way a
+     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. In both cases a
      * program goes on with its next tick: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };

@@ -2,7 +2,7 @@
 /*
  * Implements numerics/quadratic_program.h (see there).
  *
- * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step asks
+ * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step needs
  *
  *     hessian dx + sum of coefficient d multiplier = -residual of the gradient      coefficient dx + d slack = -excess
  *     multiplier d slack + slack d multiplier = target - multiplier slack

@@ -128,7 +128,7 @@ static void smoothing_move(struct smoothing_search *m, const double *shift)
     }
 }
 
-/* Room, differences and value of the shifts of a state. */
+/* Computes `room`, differences and value of the shifts of a state. */
 static void smoothing_evaluate(struct smoothing_search *m, struct smoothing_state *at, double level)
 {
     const struct smoothing *s = m->given;

@@ -53,7 +53,7 @@ double stop_piece_powers(const struct program_piece *from, double c[8]);
 /* A derivative of such powers by u. */
 double stop_piece_value(const double c[8], double u, int order);
 
-/* Fills piece i of a program, with instants step_s apart or less; left_s: duration of the program behind it. */
+/* Fills piece i of a program, with instants step_s apart or less; left_s: duration of the program after it. */
 void stop_piece_fill(const struct stop_setting *setting, const struct program *p, uint32_t i,
                      double left_s, double step_s, struct stop_piece *piece);
 

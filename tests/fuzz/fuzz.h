@@ -33,7 +33,7 @@ void fuzz_frame(struct fuzz_input *in, struct can_msg *frame);
 /* Runs the harness on an input; a failed assertion of Unity inside, as those of the fakes, aborts. Returns 0. */
 int fuzz_run(void (*harness)(struct fuzz_input *in), const uint8_t *data, size_t size);
 
-/* A rule that has to hold: says which one, and aborts. */
+/* A rule that has to hold: if it does not, prints it and aborts. */
 #define FUZZ_CHECK(rule) ((rule) ? (void)0 : fuzz_broken(#rule, __FILE__, __LINE__))
 void fuzz_broken(const char *rule, const char *file, int line) __attribute__((noreturn));
 

@@ -46,7 +46,7 @@ static struct job {
 
 /* As a job comes: its chunks with the changes of the input. */
 struct part {
-    uint8_t *bytes; /* exactly as long as it says, so that the sanitizer sees any read beyond */
+    uint8_t *bytes; /* exactly as long as its size, so that the sanitizer detects any read beyond */
     uint32_t size;
     struct chunk chunk;
     uint32_t from_tick;

@@ -193,7 +193,7 @@ static void round_of_bus(struct fuzz_input *in, uint32_t us)
     deliver(in);
 }
 
-/* Whether fake drives can do what the configuration asks for. */
+/* Whether fake drives can do what the configuration requires. */
 static bool possible(void)
 {
     const struct config *config = &self.config;

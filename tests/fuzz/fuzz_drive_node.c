@@ -2,7 +2,7 @@
 /*
  * A simulated drive with any frames at any time: what it sends are frames, and after a reset its SDO server answers.
  *
- * Input: one byte says what happens next.
+ * Input: one byte selects what happens next.
  */
 #include <string.h>
 

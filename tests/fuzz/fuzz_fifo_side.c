@@ -90,7 +90,7 @@ static void fill_records(struct fuzz_input *in, struct exchange_message *request
     }
 }
 
-/* The board asks; it may stop in the middle, and then it is gone. */
+/* The board sends a request; it may stop in the middle, and then it has ended. */
 static void write_request(struct fuzz_input *in)
 {
     struct exchange_message request;

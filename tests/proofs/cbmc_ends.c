@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces of which any first ones have records, from any of
- * these and at any time: it never asks for a record after the last, stops at the first piece that ends after the time, and
+ * The program clock searches its piece, in a program of any three pieces of which any first ones have records, from any of
+ * these and at any time: it never reads a record after the last, stops at the first piece that ends after the time, and
  * is at the duration in no other than the last state of the program.
  *
  * prover: cbmc

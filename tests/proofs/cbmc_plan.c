@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The override at rest: a tick that looks for a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
+ * A constant override: a tick that searches a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
  * reset.
  *
  * prover: cbmc

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The way of a brake to rest (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
+ * The release phase of a brake (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
  * in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
  *
  * prover: cbmc
@@ -55,7 +55,7 @@ static void rest(uint64_t n, uint64_t p, uint64_t q)
     prove(brake.at.speed_q56 == 0 && brake.at.acceleration_q56 == 0);
 }
 
-/* A tick with a jerk that is not negative, as those behind it are: they bring the acceleration to 0. */
+/* A tick with a jerk that is not negative, as all later ones are: they bring the acceleration to 0. */
 static void settle_one(void)
 {
     struct path_brake brake;

@@ -38,7 +38,7 @@ int nondet_int(void);
 #define PIECES 3u
 #define LENGTH POWER(61)
 
-/* --- Two chunks, the second behind the first --- */
+/* --- Two chunks, the second after the first --- */
 
 static struct chunk chunks[2];
 static struct coefficients_piece records[2][PIECES]; /* in order, without gaps */
@@ -504,7 +504,7 @@ static int holds(uint32_t state)
     return state == FEED_HOLDING || state == FEED_HELD;
 }
 
-/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program behind which nothing goes on ends. */
+/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program without a next chunk ends. */
 static void kept(const struct feed_override *before, int commanded)
 {
     const int ended = f.state == FEED_ENDED;
@@ -541,7 +541,7 @@ static void tick_or_command(uint32_t n)
     kept(&before, commanded);
 }
 
-/* In motion: the same instant in a shared piece, and what is on its way ends by the joint. */
+/* In motion: the same instant in a shared piece, and a ramp under way ends by the joint. */
 static void kept_in_motion(const struct feed_override *before)
 {
     const struct chunk *next = &chunks[1];
@@ -559,7 +559,7 @@ static void kept_in_motion(const struct feed_override *before)
           f.plan.now.slope_q56 == before->plan.now.slope_q56);
 }
 
-/* At rest: it rests, and looks for the place; a hold is still one. */
+/* At standstill: it stays there, and searches the place; a hold is still one. */
 static void kept_at_rest(const struct feed_override *before)
 {
     prove(!stops(before->state) && before->state != FEED_ENDED);
@@ -569,7 +569,7 @@ static void kept_at_rest(const struct feed_override *before)
     prove(f.point.arc_length_q40_mm >= starts[1][0]);
 }
 
-/* Behind a rest: as at the start of a program, running before and after. */
+/* After a rest: as at the start of a program, running before and after. */
 static void begun_at_rest(const struct feed_override *before)
 {
     prove(before->phase == PHASE_PLAN && before->state == STATE_WAITING);

@@ -63,7 +63,7 @@ static void test_a_quick_stop_takes_the_target_that_was_sent(void)
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
 }
 
-/* One wrong statusword, with a wrong position beside it, moves nothing. */
+/* One wrong statusword, with a wrong position in the same frame, moves nothing. */
 static void test_a_statusword_that_lies_once_does_not_move_the_target(void)
 {
     axis.goal = CIA402_GOAL_ENABLED;

@@ -440,7 +440,7 @@ static void test_a_drive_that_is_gone_while_off_is_looked_for_again(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* A stall of the main loop counts as no silence of the client: its transfer goes on. */
+/* A stall of the main loop does not count in the client's timeout: its transfer continues. */
 static void test_a_busy_main_loop_ends_no_transfer(void)
 {
     struct can_msg frame;

@@ -74,7 +74,7 @@ static void test_a_drive_of_another_identity_is_refused(void)
     }
 }
 
-/* It says nothing of itself, but something is expected. */
+/* It reports no identity, but one is expected. */
 static void test_a_drive_without_identity_is_not_the_expected_one(void)
 {
     bench.drives[0].lacks[0] = 0x1018;
@@ -201,7 +201,7 @@ static void test_a_fixed_mapping_passes_if_it_is_the_right_one(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
 }
 
-/* TPDO3 is a convenience: a drive that cannot is asked by SDO. */
+/* TPDO3 is not required: without it the inputs are read by SDO. */
 static void test_inputs_without_their_pdo(void)
 {
     drive(0)->lacks[0] = 0x1802;
@@ -233,7 +233,7 @@ static void test_inputs_by_their_pdo(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x201B, 1));
 }
 
-/* Each drive is asked a few times a second, not more. */
+/* Each drive is polled a few times a second, not more. */
 static void test_looking_costs_little(void)
 {
     boot();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the controller does when drives, bus or operator want something else than the program. Numbers of ticks are
+/* The reaction of the controller to drives, bus or operator that interrupt the program. Numbers of ticks are
  * those of docs/reference/architecture.md. */
 #include <string.h>
 
@@ -229,7 +229,7 @@ static void test_off_has_more_patience(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* --- Drives that go their own way --- */
+/* --- Drives that do not follow --- */
 
 /* A heartbeat that stops while the drive follows: the stop is on the path, then all are off. */
 static void test_a_fault_with_all_drives_obeying_stops_on_the_path(void)
@@ -776,7 +776,7 @@ static void test_a_drive_that_does_not_follow_without_a_word(void)
     recover();
 }
 
-/* Without a window nothing is said on the way: but the program has not been run. */
+/* Without a window no deviation is reported during the motion: but the program has not been completed. */
 static void test_ready_means_at_the_target(void)
 {
     run_some(450);
@@ -864,7 +864,7 @@ static void test_a_fault_in_the_middle_of_a_write(void)
 
 /* --- Reset --- */
 
-/* A statusword that says Fault, for ever, and no EMCY with it: the mapping may be another one. */
+/* A statusword with Fault, for ever, and no EMCY with it: the mapping may be another one. */
 static void test_a_reset_configures_a_drive_that_speaks_nonsense(void)
 {
     run_some(100);

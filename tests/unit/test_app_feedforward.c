@@ -85,7 +85,7 @@ static void test_both(void)
     expect_nothing();
 }
 
-/* velocity(k) goes with the way from setpoint k-1 to setpoint k. */
+/* velocity(k) belongs to the distance from setpoint k-1 to setpoint k. */
 static void test_velocity_belongs_to_the_way_of_its_setpoint(void)
 {
     prepare(2);

@@ -251,7 +251,7 @@ static void test_time_for_the_way_there_and_back(void)
     TEST_ASSERT_EQUAL_UINT32(HOMING_MAX_S, homing_time_s(&config, 2));
 }
 
-/* Homed before, the drive says so until it receives the command to home again; frames of that command are lost. */
+/* A drive that was homed reports so until it receives the command to home again; frames of that command are lost. */
 static void test_an_old_success_is_not_taken_for_a_new_one(void)
 {
     want(1, 37, 1000);

@@ -20,7 +20,7 @@
 
 #define FEED_UM_S   30000u
 #define OTHER_UM_S  40000u
-#define VALUES_AT   12u /* of the content: behind layout, CRC, flag */
+#define VALUES_AT   12u /* of the content: after layout, CRC, flag */
 #define CONTENT_MAX 2032u
 
 enum { STATE_NONE = 0, STATE_CONFIRMED = 1, STATE_RESTORED = 2 };
@@ -66,7 +66,7 @@ static uint32_t forget(void)
     return app_bench_write(&bench, 0x1011, 1, LOAD, 4);
 }
 
-/* Everything that is configured here beside the defaults; returns the CRC. */
+/* All values of these tests that differ from the defaults; returns the CRC. */
 static uint32_t configure(uint32_t feed_um_s)
 {
     write(0x2004, 2, feed_um_s, 4);

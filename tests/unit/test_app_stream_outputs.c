@@ -233,7 +233,7 @@ static void send_rounds(void)
     send(&second, X_MM + ROUND_UM / 1000, 101);
 }
 
-/* Those at the end of a path act with its last setpoint, those at the start of the next one with its first: behind the
+/* Those at the end of a path act with its last setpoint, those at the start of the next one with its first: after the
  * dwell. They stay in the dwell, where nothing is missing. */
 static void test_outputs_over_a_rest(void)
 {

@@ -92,8 +92,8 @@ static void test_stop_ends_with_the_smallest_deceleration(void)
     TEST_ASSERT_TRUE(axis_motion_ramp(&axis, 0, 0));
 }
 
-/* The brake is as strong as the motor: 5 V of 83 rad/s/V over 0.2 s take 3310 mm/s^2, and the
- * damping helps. From 50 mm/s the way is below v^2 / 2a = 0.38 mm. */
+/* The brake is as strong as the motor: 5 V of 83 rad/s/V over 0.2 s take 3310 mm/s^2, and the damping helps. From 50
+ * mm/s the braking distance is below v^2 / 2a = 0.38 mm. */
 static void test_without_power_the_brake_stops_the_motor(void)
 {
     for (int k = 1; k < 200; k++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the drive watches: following error, switches, software limits, overload, supply, encoder,
+/* What the drive supervises: following error, switches, software limits, overload, supply, encoder,
  * deadlines, short frames; and its objects for scaling, feedforward and actual values. */
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"

@@ -36,7 +36,7 @@ static void put(uint16_t index, int64_t value)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(index, 0, value));
 }
 
-/* Periods until the state is left; the axis' way meanwhile in counts. */
+/* Periods until the state is left; the distance of the axis meanwhile in counts. */
 static int32_t way;
 static int leave(enum cia402_state from)
 {
@@ -146,7 +146,7 @@ static void test_quick_stop_codes(void)
     }
 }
 
-/* Way of a motor that is braked from `speed` mm/s with constant volts, mm: the solution of its equation
+/* Braking distance of a motor from `speed` mm/s with constant volts, mm: the solution of its equation
  * (plant/motor.h). */
 static double braking_way_mm(double speed_mm_s, double volts)
 {
@@ -297,7 +297,7 @@ static void test_a_stop_ends_when_the_motor_stands(void)
     TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.servo.axis));
 }
 
-/* A motor that never comes to rest is left to its brake after a second. */
+/* After a second the brake has to stop a motor that never stands. */
 static void test_patience_ends(void)
 {
     put(0x605A, 6);
@@ -386,7 +386,7 @@ static void test_error_behaviour(void)
     }
 }
 
-/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap
+/* A heartbeat just before time passes for the node: what has passed before it does not count. Never early, one nap
  * late. */
 static void test_the_masters_heartbeat_is_not_missed_early(void)
 {

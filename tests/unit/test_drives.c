@@ -323,7 +323,7 @@ static void test_only_acyclic_frames_want_process(void)
     TEST_ASSERT_TRUE(drives_receive(&drives));
 }
 
-/* In a flood the wall clock goes on, too. */
+/* In a flood the wall clock advances as well. */
 static void test_so_many_frames_at_a_time(void)
 {
     struct local_bus_frame rest;

@@ -134,7 +134,7 @@ static void test_a_piece_stays_between_its_ends(void)
     }
 }
 
-/* With the largest coefficients nothing leaves 64 bits (the sanitizer looks). */
+/* With the largest coefficients nothing leaves 64 bits (checked by the sanitizer). */
 static void test_the_way_of_extreme_coefficients(void)
 {
     struct program_piece c = {.duration_q32_s = UINT64_C(1) << 32};

@@ -376,7 +376,7 @@ static void choose(uint64_t random)
     }
 }
 
-/* At the start, or at any instant, from rest or already at rate 1. */
+/* At the start, or at any instant, from standstill or already at override 1. */
 static void begin(uint64_t *random)
 {
     uint64_t duration_q42 = chosen.p->program.header.duration_q32_s << 10;

@@ -69,7 +69,7 @@ static struct override_ramp ramp_of(const struct bounds *b, const struct overrid
 }
 
 /* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it
- * rises to, and it rests where the ramp said. Gives the program time in ticks at override 1. */
+ * rises to, and it ends where the ramp computed. Gives the program time in ticks at override 1. */
 static double run(struct override_ramp *ramp, struct override_state *rate, uint64_t cut)
 {
     const int64_t step = ramp->step_q56;
@@ -246,7 +246,7 @@ static void test_stages(void)
     }
 }
 
-/* Where a rest between two levels would gain nothing there is none. */
+/* A ramp does not end between two levels if that would gain nothing. */
 static void test_levels_that_are_alike_are_one(void)
 {
     struct program_override bounds = {.factor_q14 = 1u << 14};

@@ -180,9 +180,9 @@ static void test_acceleration_goes_to_the_deceleration(void)
     expect_first_step(-most - 5 * jerk, jerk);
 }
 
-/* A state from which the way to rest just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration as
- * it is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise
- * before the way to rest. */
+/* A state from which the release phase just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration
+ * as it is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise
+ * before the release phase. */
 static void test_no_rise_before_the_way_to_rest(void)
 {
     const int64_t jerk = (int64_t)1 << 34;
@@ -249,7 +249,7 @@ static void check_tick(const struct path_state *a, const struct path_state *b,
     TEST_ASSERT_TRUE(way >= 0);
 }
 
-/* Ticks until rest. */
+/* Ticks until standstill. */
 static int check_brake(struct path_brake *brake, const struct path_brake_numbers *n)
 {
     const int64_t first_acceleration = brake->at.acceleration_q56;
@@ -278,7 +278,7 @@ static bool ordinary(const struct brake_case *c)
            c->most < 4000 * c->period * fmin(c->down, c->up) && c->speed > least;
 }
 
-/* What path_brake_fits takes for the distance of a brake: the least distance in which it says that one fits. */
+/* The distance that path_brake_fits computes for a brake: the least one in which a brake fits by its result. */
 static int64_t bound_of(const struct path_state *from, const struct path_brake_numbers *n)
 {
     int64_t low = 0;
@@ -350,9 +350,9 @@ static void test_brakes_nearest_to_the_bound(void)
 }
 
 /* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and
- * the acceleration is below half the deceleration, there is one. No brake takes
- * MORE_TICKS more than the continuous one; a short one with a slow last jerk takes MORE_IN_SHORT.
- * path_brake_fits never promises less than a brake takes, with its first tick in place of a step or without. */
+ * the acceleration is below half the deceleration, there is one. No brake takes MORE_TICKS more than the continuous
+ * one; a short one with a slow last jerk takes MORE_IN_SHORT. path_brake_fits never promises less than a brake takes,
+ * with its first tick in place of a step or without. */
 static void test_random_brakes(void)
 {
     uint32_t found = 0;

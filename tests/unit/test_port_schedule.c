@@ -73,7 +73,7 @@ static void test_who_is_not_ready_in_time_makes_the_tick_late(void)
     TEST_ASSERT_EQUAL_UINT64(2u * MS, tick(2u * MS));
 }
 
-/* Two thirds of the time at most: the rest is for the main loop. */
+/* Two thirds of the time at most: the remainder is for the main loop. */
 static void test_a_slow_machine_rests_half_of_what_it_worked(void)
 {
     const uint64_t start_ns = schedule.due_ns;

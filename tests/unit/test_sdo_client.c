@@ -25,7 +25,7 @@ void tearDown(void)
 {
 }
 
-/* Carries frames between client and server until both are silent. */
+/* Carries frames between client and server until both send nothing. */
 static void run(int begun)
 {
     struct can_msg answer;

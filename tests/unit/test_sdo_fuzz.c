@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked
- * in small_od.c), touch no byte that is not its own (sanitizers), leave constants alone, and serve
- * the next honest client. */
+/* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked in small_od.c), touch no
+ * byte that is not its own (sanitizers), leave constants alone, and serve the next honest client. */
 #include "canopen/sdo_client.h"
 #include "canopen/sdo_server.h"
 
@@ -183,7 +182,7 @@ static void test_random_answers_to_the_client(void)
     struct sdo_client client;
     struct can_msg in;
     struct can_msg out;
-    uint8_t value[30] = {0}; /* the sanitizer watches its end */
+    uint8_t value[30] = {0}; /* the sanitizer checks its end */
     int done = 0;
 
     random_state = 20260101;

@@ -357,7 +357,7 @@ static void test_an_urgent_write_is_done_beside_a_transfer(void)
     TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
 }
 
-/* One whose client is gone still ends by its time-out. */
+/* A transfer without its client still ends by its timeout. */
 static void test_an_urgent_write_does_not_keep_a_transfer_alive(void)
 {
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);

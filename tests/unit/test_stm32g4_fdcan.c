@@ -38,7 +38,7 @@ static void start(void)
     TEST_ASSERT_TRUE(fdcan_model_active());
 }
 
-/* What the receive interrupt does, as long as the line asks for it. */
+/* The receive interrupt, as long as its line is active. */
 static void serve(void)
 {
     for (unsigned i = 0; fdcan_model_interrupt(); ++i) {

@@ -29,7 +29,7 @@
 #define SPACE_PART 8u /* of the cuts there is one in space for so many in the plane */
 #define CHAINS     6u /* of each whole program */
 #define MOST_TICKS 6000u
-#define LONGEST    20000u /* until rest */
+#define LONGEST    20000u /* until standstill */
 #define CACHE_MOST 131072u
 #define EVENTS     40u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
@@ -376,7 +376,7 @@ static void command(uint64_t *random)
     }
 }
 
-/* A chunk comes damaged, or one that is not wanted: refused, and nothing changes. */
+/* A chunk comes damaged, or in the wrong order: refused, and nothing changes. */
 static void refuse(uint64_t *random)
 {
     const struct program_limits limits = golden_no_limits();

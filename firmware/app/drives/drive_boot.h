@@ -3,7 +3,7 @@
  * drive_boot: finds the drives and the I/O module, configures them by SDO (drive_configuration) and starts them (NMT),
  * one after the other, and begins again from the first when one does not answer or refuses.
  *
- * A refused write is no error if the object already has the wanted value. So a drive with a fixed PDO mapping is
+ * A refused write is no error if the object already has the value. So a drive with a fixed PDO mapping is
  * accepted if the mapping is the right one.
  *
  * Called by app/controller.c. Frames in, frames out; main loop.

@@ -4,7 +4,7 @@
  * the host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
  *
  * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS may have been switched off and on while its boot-up message was
- * lost. Its axis is then no longer homed, in every state.
+ * lost. Its axis then counts as not homed, in every state.
  *
  * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine.
  */

@@ -47,7 +47,7 @@ void motion_begin_job(struct motion *motion, const struct chunk *first,
                       const struct coefficients_window *window, const struct config *config);
 
 /* Takes the next chunk of the job over, with its coefficient records in `window`. This is possible while the motion is
- * in the part that both chunks share, or rests: then true, and the previous chunk is no longer needed. A chunk that
+ * in the part that both chunks share, or rests: then true, and the previous chunk is free. A chunk that
  * begins at rest starts chunk_rest_ticks after the end of its predecessor, or at once if it comes later. Ticks of a
  * hold do not count. Under the lock. */
 bool motion_take_over(struct motion *motion, const struct chunk *next,

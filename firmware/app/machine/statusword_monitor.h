@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * statusword_monitor: finds wrong bits in the statusword of a drive in Operation enabled, besides the bits of its
+ * statusword_monitor: finds wrong bits in the statusword of a drive in Operation enabled, other than the bits of its
  * state. Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock.
  *
  * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the

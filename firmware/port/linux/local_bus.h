@@ -37,7 +37,7 @@
 /* In frame.__res0 of a frame that comes back to the member that has sent it (LOCAL_BUS_TRACK); 0 in all others. */
 #define LOCAL_BUS_OWN 1u
 
-/* A frame on its way to a member. */
+/* A frame as a member receives it. */
 struct local_bus_frame {
     struct can_frame frame;
     uint64_t time_ns; /* of the last bit: virtual time, or in real time nanoseconds since 1970 */
@@ -66,7 +66,8 @@ enum local_bus_kind {
 };
 
 enum local_bus_flag {
-    LOCAL_BUS_NOTICES = 1, /* hello: wants notices of processes that join, leave or send signals */
+    LOCAL_BUS_NOTICES =
+        1, /* hello: requests notices of processes that join, leave or get signals */
     LOCAL_BUS_VIRTUAL = 2, /* welcome: time is virtual */
     LOCAL_BUS_SENT = 4,    /* wait: its members have sent something since the last one */
     LOCAL_BUS_FRAMES = 8,  /* grant: frames have come */

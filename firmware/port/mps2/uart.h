@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * uart: UART 0 of the board (Arm's CMSDK UART), both ways by interrupt.
+ * uart: UART 0 of the board (Arm's CMSDK UART), both directions by interrupt.
  *
  * The interrupt of the transmitter takes characters from a ring, so the sender does not wait. The other end controls
  * the flow: the emulator gives a character when the last one has been read. Used by link_slcan.
