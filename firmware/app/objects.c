@@ -266,7 +266,7 @@ static uint32_t reconfigure(struct controller *controller, const struct od_entry
     return SDO_OK;
 }
 
-/* Objects of the configuration (config_contains). Writing the value that is there changes nothing. */
+/* Objects of the configuration (config_contains). Writing the present value changes nothing. */
 static uint32_t object_write_configuration(struct controller *controller,
                                            const struct od_entry *entry, uint64_t value)
 {

@@ -28,7 +28,7 @@ uint32_t slcan_encode(const struct can_msg *message, char line[SLCAN_LINE_MAX]);
 /* Takes characters one by one. All zero is the beginning. */
 struct slcan_decoder {
     char line[SLCAN_LINE_MAX + 4u];
-    uint32_t length;  /* so far; more than fits: the line is ignored */
+    uint32_t length;  /* characters of the line; more than fits: the line is ignored */
     uint32_t refused; /* lines that began like a frame and were none */
     bool closed;      /* a line C has come */
 };

@@ -23,12 +23,12 @@
 /* Longest value that is not a DOMAIN, in bytes. */
 #define OD_VALUE_MAX 64u
 
-/* Read `entry`, `size` and `moved`; the rest is private. */
+/* Read `entry`, `size` and `moved`; all other fields are private. */
 struct od_transfer {
     struct od *od;
     const struct od_entry *entry; /* valid after a begin that gave SDO_OK */
     uint32_t size;  /* bytes; write: as announced, 0: not announced; read: of the whole */
-    uint32_t moved; /* write: bytes put so far; read: the caller's own count, 0 at the beginning */
+    uint32_t moved; /* write: bytes put; read: the caller's own count, 0 at the beginning */
     bool open;      /* a DOMAIN's domain_end or domain_abort is due */
     uint8_t value[OD_VALUE_MAX];
 };

@@ -43,7 +43,7 @@ struct pdo_field {
     uint8_t size; /* bytes: 1, 2, 4, 8 */
 };
 
-/* Read `valid`, `cob_id`, `type` and `length`; the rest is private. */
+/* Read `valid`, `cob_id`, `type` and `length`; all other fields are private. */
 struct pdo_map {
     struct od *od;
     struct pdo_field fields[PDO_MAP_ENTRIES];

@@ -93,7 +93,7 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
 bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct can_msg *out);
 
 /* The CRC of block transfers (CiA 301, 7.2.4.3.16): polynomial x^16 + x^12 + x^5 + 1, initial value 0, not reflected;
- * check value of "123456789": 0x31C3. Goes on from `crc` (0 at the beginning) over `size` bytes. Pure, any context. */
+ * check value of "123456789": 0x31C3. Continues `crc` (0 at the beginning) over `size` bytes. Pure, any context. */
 uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size);
 
 #endif

@@ -21,7 +21,7 @@
 #include "core/program.h"
 #include "core/program_rules.h"
 
-/* Contents private, but for `evaluations`. */
+/* Contents private, except `evaluations`. */
 struct brake_check {
     struct path_bounds bounds;
     struct motion limit;

@@ -33,11 +33,11 @@
 
 enum feed_state {
     FEED_RUNNING = 0,  /* at the override, or on a ramp to it; also with an override of 0 */
-    FEED_STOPPING = 1, /* comes to rest, for good */
-    FEED_STOPPED = 2,  /* at rest before the end */
+    FEED_STOPPING = 1, /* brakes to standstill, final */
+    FEED_STOPPED = 2,  /* at standstill before the end */
     FEED_ENDED = 3,    /* the last setpoint was the exact end point */
-    FEED_HOLDING = 4,  /* comes to rest until resumed */
-    FEED_HELD = 5,     /* at rest until resumed */
+    FEED_HOLDING = 4,  /* brakes to standstill until resumed */
+    FEED_HELD = 5,     /* at standstill until resumed */
 };
 
 /* Contents private: use the functions. */
@@ -50,10 +50,10 @@ struct feed_override {
     uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
     struct interpolator_search place; /* of rest */
     struct interpolator_point point;  /* of the last setpoint */
-    uint32_t state;   /* enum feed_state: what is commanded, and whether it is reached, */
-    uint32_t at_end;  /* and what it becomes at the end of the program */
-    uint32_t phase;   /* where setpoints come from */
-    uint32_t kind;    /* enum program_stop_kind of the requested stop */
+    uint32_t state;                   /* enum feed_state, */
+    uint32_t at_end;                  /* and the state that follows at the end of the program */
+    uint32_t phase;                   /* where setpoints come from */
+    uint32_t kind;                    /* enum program_stop_kind of the requested stop */
     uint32_t replace; /* 1: a fault stop, whose numbers the brake does not have yet */
     uint32_t found;   /* 1: `place` has been found */
     uint32_t goes_on; /* 1: the job continues after the end of the program */
@@ -61,8 +61,8 @@ struct feed_override {
 };
 
 /* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42),
- * running, override 100 %. period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must stay
- * as it is. */
+ * running, override 100 %. period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must not
+ * change. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
@@ -140,7 +140,7 @@ void feed_override_fault_stop(struct feed_override *f);
 
 /* --- Tick --- */
 
-/* The next setpoint; *it is an interpolator of the same program that nobody else moves. After the end, or at
+/* The next setpoint; *it is an interpolator of the same program that is used by this motion only. After the end, or at
  * standstill, the same point again. Returns 0 or a negative INTERPOLATOR_ERR_..., then *out is unchanged. Bounded time,
  * tick context. */
 int feed_override_next(struct feed_override *f, struct interpolator *it,

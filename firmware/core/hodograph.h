@@ -16,7 +16,7 @@
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
  *   of a job in chunks, in place of program_open, program_check and feed_override_begin (core/chunk.h):
- *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it goes on from its predecessor
+ *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it continues its predecessor
  *               feed_override_begin_job      with the first chunk
  *               feed_override_take_over      the next chunk for the program under way; needs the tick held off
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off

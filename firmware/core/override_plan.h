@@ -9,7 +9,7 @@
  * time at which it has to begin, are known before a ramp up begins (docs/theory/numerics.md section 12, "Override
  * ramps" and "Look-ahead windows").
  *
- * Integers only, bounded time, no heap. One owner. Tick context, but for override_plan_begin.
+ * Integers only, bounded time, no heap. One owner. Tick context, except override_plan_begin.
  */
 #ifndef HODOGRAPH_CORE_OVERRIDE_PLAN_H
 #define HODOGRAPH_CORE_OVERRIDE_PLAN_H
@@ -47,7 +47,7 @@ struct override_window {
     uint64_t end_q32_s;                    /* UINT64_MAX with the last piece */
 };
 
-/* Contents private, but for `now` and `saturated`. */
+/* Contents private, except `now` and `saturated`. */
 struct override_plan {
     struct override_state now;
     uint32_t saturated; /* 1: the commanded override is more than the pieces allow here */

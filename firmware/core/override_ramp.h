@@ -57,7 +57,7 @@ struct ramp_stage {
     uint32_t level;
 };
 
-/* A change of the override, whatever the bounds are: its ends, and the levels of its first part and of its last. */
+/* A change of the override, independent of bounds: its ends, and the levels of its first part and of its last. */
 struct ramp_change {
     int64_t from_q57;
     int64_t to_q57;

@@ -41,7 +41,7 @@ struct path_brake_numbers {
     int64_t jerk_up_q56;
 };
 
-/* Contents private but for `at`, the state at the last tick. */
+/* Contents private, except `at`, the state at the last tick. */
 struct path_brake {
     struct path_state at;
     struct path_brake_numbers numbers;

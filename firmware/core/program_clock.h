@@ -43,7 +43,7 @@ struct program_clock {
     /* program time of a tick whose override does not change; 0: not computed yet */
     uint64_t even_q62_s;
     uint32_t piece; /* of the last tick, */
-    /* and its coefficient record; not in use while the program does not go on */
+    /* and its coefficient record; not in use while the clock does not advance */
     const struct coefficients_piece *record;
 };
 

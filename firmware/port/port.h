@@ -77,7 +77,7 @@ struct port_handlers {
     /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A late tick is called late.
      * Where the port has the choice it skips none, and no two are closer than three quarters of a period; a timer whose
      * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. In both cases a
-     * program goes on with its next tick: only time is lost. */
+     * program continues with its next tick: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
@@ -134,7 +134,7 @@ void port_progress(void);
 #define PORT_STORE_BANKS_ALL  4u
 #define PORT_STORE_PARAMETER_BYTES 2048u
 
-uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */
+uint32_t port_store_size(unsigned bank); /* bytes of a bank; equal in a pair */
 
 /* Erases a bank, its last 16 bytes first; then writes go in ascending order. One gap is allowed: before the last 16
  * bytes, which are written at once. Written data can be read at multiples of 8 bytes, and after the last write. 0 or

@@ -5,7 +5,7 @@
 
 #define SLEEP_MAX_NS 100000000u /* latest check for signals */
 
-/* At lock step the board goes on by itself when all have answered. */
+/* At lock step the board continues by itself when all have answered. */
 static void begin_tick(struct pacing *pacing, const struct exchange_header *request,
                        uint64_t now_ns)
 {

@@ -21,7 +21,7 @@ struct drive_node_port {
     void *context;
 };
 
-/* Read `rpdos`; clear `moved`; the rest is private. */
+/* Read `rpdos`; clear `moved`; all other fields are private. */
 struct drive_pdos {
     struct pdo_map rpdos[DRIVE_PDOS];
     struct pdo_map tpdos[DRIVE_PDOS];

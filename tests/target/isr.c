@@ -105,7 +105,7 @@ static void write_times(void)
     times.count = 0;
 }
 
-/* A tick between two looks at the clock; inlined, its argument would be computed between them. */
+/* A tick between two readings of the clock; inlined, its argument would be computed between them. */
 __attribute__((noinline)) static void timed_isr(uint32_t now_us)
 {
     const uint32_t before = clock_now();

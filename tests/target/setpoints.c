@@ -43,7 +43,7 @@ __attribute__((noinline)) static int tick(int32_t *target_counts)
     return motion_step(&motion, target_counts);
 }
 
-/* A tick between two looks at the clock. */
+/* A tick between two readings of the clock. */
 static int timed_tick(size_t slot)
 {
     const uint32_t before = clock_now();

@@ -99,7 +99,7 @@ struct drive_pdo {
 #define ON_CHANGE     255u
 #define INHIBIT_MS    10u
 
-enum { QUICK_STOP = 3 };     /* 0x6007: what it does then */
+enum { QUICK_STOP = 3 };     /* 0x6007: the reaction to a lost connection */
 enum { QUICK_STOP_OFF = 2 }; /* 0x605A, 0x605E: by 0x6085, then off, then Fault */
 enum { MINUS_THREE = 0xFD }; /* 0x60C2 sub 2: the time is sub 1 * 10^-3 s */
 
@@ -178,7 +178,7 @@ static const struct drive_pdo drive_pdos[] = {
 static const struct drive_row drive_rows[] = {
     /* STOPPED it would not answer; no process data while parameters change */
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
-    /* what is it? */
+    /* identity */
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_DRIVE},
     {WHEN_ALWAYS, ROW_READ, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
     {WHEN_ALWAYS, ROW_READ, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},

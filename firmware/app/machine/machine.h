@@ -170,7 +170,7 @@ void machine_override(struct machine *machine, uint32_t percent);
 bool machine_configurable(const struct machine *machine);
 /* True while setpoints come from the program: from start until READY, and while braking on the path in a fault. */
 bool machine_on_path(const struct machine *machine);
-/* The same, or the drives move by themselves: homing, quick stop. The program must stay as it is. */
+/* The same, or the drives move by themselves: homing, quick stop. The program must not change. */
 bool machine_moving(const struct machine *machine);
 
 /* True at the end of a tail: the motion continues when the next chunk of the job is taken over. */

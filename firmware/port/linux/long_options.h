@@ -18,7 +18,8 @@
 #define LONG_OPTIONS_END   0
 #define LONG_OPTIONS_WRONG (-1)
 
-/* Read `value`; `quoted`, `no_value` and `unknown` may be set after long_options_begin; the rest is private. */
+/* Read `value`; `quoted`, `no_value` and `unknown` may be set after long_options_begin; all other fields are private.
+ * */
 struct long_options {
     int argc;
     char **argv;

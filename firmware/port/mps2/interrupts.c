@@ -14,7 +14,7 @@ static struct {
     struct port_handlers handlers;
     struct link_request request;
     uint32_t late_ns;        /* of the next tick */
-    volatile uint32_t ticks; /* so far; wraps */
+    volatile uint32_t ticks; /* number of ticks; wraps */
     volatile bool woken;
     bool in_tick; /* nothing else runs meanwhile */
 } self;

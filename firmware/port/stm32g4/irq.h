@@ -24,7 +24,7 @@ void irq_stop(void);
 /* From the next tick on. Main loop, or the tick. */
 void irq_period(uint32_t period_us);
 
-/* Ticks so far. Main loop. */
+/* Number of ticks since irq_start. Main loop. */
 uint32_t irq_ticks(void);
 
 /* The handlers themselves, for the vectors. */
