@@ -191,7 +191,7 @@ static bool send_segment(struct sdo_client *client, struct can_msg *out)
     return true;
 }
 
-static bool ask_segment(struct sdo_client *client, struct can_msg *out)
+static bool request_segment(struct sdo_client *client, struct can_msg *out)
 {
     client->step = SDO_CLIENT_UPLOAD_SEGMENT;
     make_request(client, (uint8_t)(REQUEST_UPLOAD_SEGMENT | client->toggle), out);
@@ -212,7 +212,7 @@ static bool take(struct sdo_client *client, const uint8_t *data, uint32_t size, 
 static bool answer_upload(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
 {
     if ((data[0] & EXPEDITED) == 0) {
-        return ask_segment(client, out);
+        return request_segment(client, out);
     }
     uint32_t unused = (data[0] & SIZE_GIVEN) != 0 ? (data[0] >> 2) & 3u : 0;
     return take(client, data + 4, EXPEDITED_BYTES - unused, out) || done(client);
@@ -234,7 +234,7 @@ static bool answer_upload_segment(struct sdo_client *client, const uint8_t *data
         return sdo_client_cancel(client, SDO_ABORT_NO_DATA, out);
     }
     client->toggle ^= TOGGLE;
-    return ask_segment(client, out);
+    return request_segment(client, out);
 }
 
 static bool is_about_object(const struct sdo_client *client, const uint8_t *data)

@@ -33,13 +33,13 @@ static void set_inverses(struct kernel_fixed_arc *k, const struct ph_segment *ph
     ph_segment_end(ph, end_q48);
     int shift = -18 - ph->exponent;
     int32_t before = (int32_t)qmath_shift(ph->c_q48_mm[PH_S][0], shift);
-    int32_t behind = (int32_t)qmath_shift(end_q48[PH_S] - ph->c_q48_mm[PH_S][0], shift);
+    int32_t after = (int32_t)qmath_shift(end_q48[PH_S] - ph->c_q48_mm[PH_S][0], shift);
     int32_t sigma_q30[3];
     for (int i = 0; i < 3; i++) {
         sigma_q30[i] = (int32_t)qmath_shift(ph->sigma_q50_mm[i], shift - 2);
     }
     set_inverse(&k->inverse[0], before, sigma_q30[1], sigma_q30[0]);
-    set_inverse(&k->inverse[1], behind, sigma_q30[1], sigma_q30[2]);
+    set_inverse(&k->inverse[1], after, sigma_q30[1], sigma_q30[2]);
 }
 
 static void set_arc(struct kernel_fixed_arc *k, const struct ph_segment *ph)

@@ -174,7 +174,7 @@ static void begin_return(struct override_plan *plan)
 }
 
 /* No window allows what was searched, which was not OVERRIDE_SETTLE. */
-static void give_up(struct override_plan *plan)
+static void search_failed(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
     plan->task = OVERRIDE_DECIDES;
@@ -205,11 +205,11 @@ static void check_factor(struct override_plan *plan)
 {
     if (plan->kind == OVERRIDE_CLIMB) {
         if (!may_climb(plan)) {
-            give_up(plan);
+            search_failed(plan);
         }
     } else if (factor_q57(&plan->ahead) < plan->now.override_q57) {
         if (plan->kind == OVERRIDE_STAY) {
-            give_up(plan);
+            search_failed(plan);
         } else {
             plan->step = OVERRIDE_EVALUATES;
         }
@@ -218,7 +218,7 @@ static void check_factor(struct override_plan *plan)
 
 /* Evaluates the next window. After the last one, below guaranteed_q57, the least bounds of the program, which are
  * always enough. */
-static void look(struct override_plan *plan, const struct program_clock *clock)
+static void evaluate_window(struct override_plan *plan, const struct program_clock *clock)
 {
     plan->step = OVERRIDE_STAGES;
     if (plan->window < OVERRIDE_WINDOWS) {
@@ -231,7 +231,7 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
         plan->ahead.bounds = &plan->guaranteed;
         plan->ahead.end_q32_s = UINT64_MAX;
     } else {
-        give_up(plan);
+        search_failed(plan);
     }
     if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY) {
         override_change_of(&plan->change, next_rest(plan), plan->target_q57);
@@ -252,7 +252,7 @@ static void find_stage(struct override_plan *plan)
     if (plan->kind == OVERRIDE_CLIMB) {
         plan->stage.level = PROGRAM_LEVEL_FULL;
         if (plan->stage.end_q57 != plan->target_q57) {
-            give_up(plan);
+            search_failed(plan);
         }
     }
 }
@@ -328,7 +328,7 @@ static void fit_above(struct override_plan *plan, const struct program_clock *cl
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->step == OVERRIDE_EVALUATES) {
-        look(plan, clock);
+        evaluate_window(plan, clock);
     } else if (plan->step == OVERRIDE_STAGES) {
         find_stage(plan);
     } else if (plan->step == OVERRIDE_MEASURES) {

@@ -20,10 +20,10 @@ void override_bounds_of(struct program_override *out, const struct program *p, u
                         uint32_t count)
 {
     const uint32_t left = p->header.piece_count - first;
-    const uint32_t behind = first + least(count, left);
+    const uint32_t after = first + least(count, left);
     struct program_override own;
     program_piece_override(p, first, out);
-    for (uint32_t i = first + 1u; i < behind; i++) {
+    for (uint32_t i = first + 1u; i < after; i++) {
         program_piece_override(p, i, &own);
         out->factor_q14 = (uint16_t)least(out->factor_q14, own.factor_q14);
         for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {

@@ -18,7 +18,7 @@
 
 #include "hub/frame_bits.h"
 
-enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, LOOK_ALL_MS = 20 };
+enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
 
 #define NS_PER_S      1000000000u
 #define PACE_AHEAD_NS 2e6 /* of virtual time before real time, where its speed is limited */
@@ -557,7 +557,7 @@ static int go_on(struct hub *hub)
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
 {
-    const struct timeval look_all = {.tv_usec = LOOK_ALL_MS * 1000};
+    const struct timeval poll_all_interval = {.tv_usec = POLL_ALL_MS * 1000};
     if (hello->kind == LOCAL_BUS_HELLO_MEMBER) {
         from->role = HUB_MEMBER;
         from->number = hub->options.is_virtual ? hello->number : 0u;
@@ -568,7 +568,8 @@ static void greet(struct hub *hub, struct hub_connection *from,
         from->number =
             virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_NOTICES) != 0u);
         from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_UNKNOWN;
-        (void)setsockopt(from->fd, SOL_SOCKET, SO_RCVTIMEO, &look_all, sizeof look_all);
+        (void)setsockopt(from->fd, SOL_SOCKET, SO_RCVTIMEO, &poll_all_interval,
+                         sizeof poll_all_interval);
         if (from->number == 0u) {
             drop_connection(hub, from);
             return;
@@ -733,7 +734,7 @@ bool hub_step(struct hub *hub, int end)
     }
     const bool all = !held || hub->poll_all;
     const size_t count = fill(hub, end, wait, who, all);
-    const int ready = poll(wait, count, all ? limit_ms : LOOK_ALL_MS);
+    const int ready = poll(wait, count, all ? limit_ms : POLL_ALL_MS);
     if (ready < 0) {
         return errno == EINTR;
     }

@@ -41,7 +41,7 @@ static int wrong(const char *what, const char *value)
 }
 
 /* Above the simulated drives (20), if permitted: a real bus does not wait for a process. */
-static void ask_for_priority(void)
+static void request_priority(void)
 {
     const struct sched_param priority = {.sched_priority = 25};
     (void)sched_setscheduler(0, SCHED_FIFO, &priority);
@@ -66,7 +66,7 @@ static int serve(char **paths, size_t count, struct hub_options options)
         return EXIT_BUS;
     }
     if (!options.is_virtual) {
-        ask_for_priority();
+        request_priority();
     }
     while (hub_step(&hub, end)) {
     }

@@ -263,13 +263,13 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
 
 /* If brakes from a piece exceed a limit, those from the previous piece usually do so as well, from its last instant at
  * the same override. These are evaluated first; the result does not depend on the order. */
-static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden behind[2])
+static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden suspects[2])
 {
     piece->suspect = piece->count - 1u;
     piece->close->suspect = piece->close->count - 1u;
-    piece->suspect_override = behind[0];
+    piece->suspect_override = suspects[0];
     piece->suspect_override.instant = piece->count - 1u;
-    piece->suspect_before = behind[1];
+    piece->suspect_before = suspects[1];
     piece->suspect_before.instant = piece->count - 1u;
 }
 
@@ -283,7 +283,7 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     double left_s = 0.0;
     stop_setting_open(&setting, p, limits, path);
     int warm[3] = {setting.most[0], setting.most[1], setting.most[2]};
-    struct stop_overridden behind[2] = {{0, 0, -1}, {0, 0, 0}};
+    struct stop_overridden suspects[2] = {{0, 0, -1}, {0, 0, 0}};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
         stop_piece_fill(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
@@ -295,10 +295,10 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
                 piece.before[k] = found[i - 1u].before[k];
             }
             piece.close = &close;
-            suspect_as_next(&piece, behind);
+            suspect_as_next(&piece, suspects);
             search_or_keep(&setting, &piece, &found[i - 1u], warm, after_s, &best);
-            behind[0] = piece.suspect_override;
-            behind[1] = piece.suspect_before;
+            suspects[0] = piece.suspect_override;
+            suspects[1] = piece.suspect_before;
         }
         for (int k = 0; k < 3; k++) {
             found[i - 1u].codes[k] = (uint8_t)best.codes[k];

@@ -59,8 +59,8 @@ static void differences(const struct course *course, uint32_t axis, double perio
     out[2] = (p[0] - 3.0 * (p[1] - p[2]) - p[3]) / (period_s * period_s * period_s);
 }
 
-static void look_at_axes(const struct course *course, double period_s,
-                         const struct stop_limits *limits, struct stop_use *use)
+static void evaluate_axes(const struct course *course, double period_s,
+                          const struct stop_limits *limits, struct stop_use *use)
 {
     for (uint32_t axis = 0; axis < course->interp.axis_count; axis++) {
         double d[3];
@@ -119,8 +119,8 @@ static int step(struct course *course, struct stop_trial *trial)
                               ? course->brake_ticks + 1u
                               : 0u;
     if (course->count > HISTORY) {
-        look_at_axes(course, period_s, course->machine ? &trial->fault : &trial->hold,
-                     course->machine ? &trial->of_fault : &trial->of_hold);
+        evaluate_axes(course, period_s, course->machine ? &trial->fault : &trial->hold,
+                      course->machine ? &trial->of_fault : &trial->of_hold);
         evaluate_along(course, period_s, trial, course->machine ? &trial->fault : &trial->hold,
                        course->machine ? &trial->of_fault : &trial->of_hold);
     }

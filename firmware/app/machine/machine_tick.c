@@ -35,9 +35,9 @@ static void step_boot(struct machine *machine)
     }
     if (!machine_drives_answer(machine)) {
         if (machine_time_is_up(machine)) {
-            const uint8_t silent = unresponsive_node(machine);
+            const uint8_t node = unresponsive_node(machine);
             machine_enter_boot(machine);
-            machine->unresponsive_node = silent;
+            machine->unresponsive_node = node;
         }
         return;
     }

@@ -37,7 +37,7 @@ void watchdog_feed(uint32_t ticks)
 
 bool watchdog_has_reset(void)
 {
-    const bool bitten = (reg_read(RCC_BASE + RCC_CSR) & RCC_CSR_IWDGRSTF) != 0u;
+    const bool restarted = (reg_read(RCC_BASE + RCC_CSR) & RCC_CSR_IWDGRSTF) != 0u;
     reg_set(RCC_BASE + RCC_CSR, RCC_CSR_RMVF);
-    return bitten;
+    return restarted;
 }
