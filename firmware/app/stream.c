@@ -83,8 +83,8 @@ static bool opens_a_job(const struct stream *stream, const struct chunk *chunk)
 }
 
 /* Whether the chunk is the next one of the job. */
-static int check_turn(const struct stream *stream, const struct chunk *chunk,
-                      const struct config *config)
+static int check_sequence(const struct stream *stream, const struct chunk *chunk,
+                          const struct config *config)
 {
     if (opens_a_job(stream, chunk)) {
         return stream->started && !is_over(stream) ? PROGRAM_ERR_CHUNK_JOB : 0;
@@ -131,7 +131,7 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
     if (fault.code == 0 && chunk->size != size) {
         fault.code = PROGRAM_ERR_CHUNK_FORMAT;
     }
-    fault.code = fault.code != 0 ? fault.code : check_turn(stream, chunk, config);
+    fault.code = fault.code != 0 ? fault.code : check_sequence(stream, chunk, config);
     fault.code = fault.code != 0 ? fault.code : check_program(stream, chunk, config, &fault);
     fault.code = fault.code != 0 ? fault.code : fit(stream, chunk, config);
     return fault;

@@ -5,9 +5,7 @@
  *
  *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
  *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close
- *   C\r             from our gateway to a board: close, that is stop the axes and end; the board's own C reports that
- *   it
- *                   has ended
+ *   C\r             from our gateway to a board: close, that is stop the axes and end; from a board: it has ended
  *
  * Other lines (extended and remote frames, answers of an adapter) are ignored. A time stamp (four hex digits after the
  * data) is allowed. Pure, any context; the two directions are independent.

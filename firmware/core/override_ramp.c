@@ -130,7 +130,7 @@ void override_limits_of(struct ramp_limits *out, const struct program_override *
     const uint32_t down = 25u + 32u + period_log2 - (apart >> 3);
     out->inverse_slope = (slopes[rate & 7u] >> ((rate >> 3) + period_log2)) + 1u;
     out->inverse_root = (roots[second & 15u] >> ((second >> 4) + period_log2)) + 1u;
-    out->turns = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
+    out->rate_ticks = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
 }
 
 /* --- Duration --- */
@@ -141,11 +141,11 @@ void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limit
     const uint32_t change_q30 = (uint32_t)(change_q57 >> 27) + 1u;
     const int shift = qmath_clz32(change_q30) & ~1;
     const uint32_t root = qmath_root_above(change_q30 << shift);
-    const uint32_t turns =
+    const uint32_t rate_ticks =
         ((uint32_t)(qmath_product_unsigned(root, limits->inverse_root) >> 32) >> (shift / 2)) + 1u;
     const uint32_t half =
         ((uint32_t)(qmath_product_unsigned(change_q30, limits->inverse_slope) >> 32) >> 3) + 1u;
-    ticks->rise = turns < limits->turns ? turns : limits->turns;
+    ticks->rise = rate_ticks < limits->rate_ticks ? rate_ticks : limits->rate_ticks;
     ticks->half = half > ticks->rise ? half : ticks->rise;
 }
 

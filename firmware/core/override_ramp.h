@@ -74,7 +74,7 @@ void override_stage_of(struct ramp_stage *out, const struct program_override *bo
 /* Bounds of a level as a tick uses them. With R and S the bounds of slope and second difference, in 2^-56 a tick and a
  * tick squared; R from 2^30, S from 2^28, both up to 2^56. */
 struct ramp_limits {
-    uint32_t turns;         /* at least R / S: ticks in which the slope reaches R */
+    uint32_t rate_ticks;    /* at least R / S: ticks in which the slope reaches R */
     uint32_t inverse_slope; /* 2^61 / R, rounded up */
     uint32_t inverse_root;  /* 2^45 / sqrt(S), rounded up */
 };

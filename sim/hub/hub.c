@@ -61,7 +61,7 @@ static bool is_left_over(const char *path, const struct stat *found)
 
 /* Locks the folder of a path, so that no two hubs that start at the same time serve one path. Returns a descriptor,
  * whose close is the unlock (also if the process is killed), or a negative errno. */
-static int take_turn(const char *path)
+static int lock_folder(const char *path)
 {
     char folder[sizeof((struct sockaddr_un *)NULL)->sun_path];
     (void)snprintf(folder, sizeof folder, "%s", path);
@@ -71,12 +71,12 @@ static int take_turn(const char *path)
     } else {
         slash[slash == folder ? 1 : 0] = '\0';
     }
-    const int turn = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (turn < 0 || flock(turn, LOCK_EX) == 0) {
-        return turn < 0 ? -errno : turn;
+    const int folder_lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder_lock < 0 || flock(folder_lock, LOCK_EX) == 0) {
+        return folder_lock < 0 ? -errno : folder_lock;
     }
     const int error = -errno;
-    (void)close(turn);
+    (void)close(folder_lock);
     return error;
 }
 
@@ -108,13 +108,13 @@ static int listen_at(const char *path)
     if (length < 0 || (size_t)length >= sizeof own.sun_path) {
         return -ENAMETOOLONG;
     }
-    const int turn = take_turn(path);
-    if (turn < 0) {
-        return turn;
+    const int folder_lock = lock_folder(path);
+    if (folder_lock < 0) {
+        return folder_lock;
     }
     const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     const int error = fd < 0 ? -errno : serve(fd, &own, path);
-    (void)close(turn);
+    (void)close(folder_lock);
     if (error != 0 && fd >= 0) {
         (void)close(fd);
     }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed piece. */
+/* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed
+ * piece. */
 #include "offline/stop_verdict.h"
 
 #include <math.h>

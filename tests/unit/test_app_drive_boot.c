@@ -299,7 +299,7 @@ static void test_a_mode_that_is_not_taken(void)
     boot();
 }
 
-static void test_a_value_that_is_refused_is_told(void)
+static void test_a_value_that_is_refused_is_reported(void)
 {
     drive(1)->refuses = 0x607D02;
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 2, 123, 4));
@@ -309,7 +309,7 @@ static void test_a_value_that_is_refused_is_told(void)
     boot();
 }
 
-static void test_a_node_that_is_given_twice_is_told(void)
+static void test_a_node_that_is_given_twice_is_reported(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 2, 2, 1));
     expect_trouble(2, 0x200502, SDO_ABORT_INCOMPATIBLE);
@@ -318,7 +318,7 @@ static void test_a_node_that_is_given_twice_is_told(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
 }
 
-static void test_an_axis_at_the_controllers_own_node_is_told(void)
+static void test_an_axis_at_the_controllers_own_node_is_reported(void)
 {
     struct drive_boot attempt;
     struct config config = bench.controller.config;
@@ -332,7 +332,7 @@ static void test_an_axis_at_the_controllers_own_node_is_told(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_INCOMPATIBLE, attempt.trouble.abort_code);
 }
 
-static void test_what_a_drive_says_of_itself_is_kept(void)
+static void test_what_a_drive_reports_is_kept(void)
 {
     drive(1)->values.identity_object.vendor_id = 0x123;
     drive(1)->values.identity_object.serial_number = 99;
@@ -368,9 +368,9 @@ int main(void)
     RUN_TEST(test_a_drive_without_the_mode);
     RUN_TEST(test_a_device_of_another_profile);
     RUN_TEST(test_a_mode_that_is_not_taken);
-    RUN_TEST(test_a_value_that_is_refused_is_told);
-    RUN_TEST(test_a_node_that_is_given_twice_is_told);
-    RUN_TEST(test_an_axis_at_the_controllers_own_node_is_told);
-    RUN_TEST(test_what_a_drive_says_of_itself_is_kept);
+    RUN_TEST(test_a_value_that_is_refused_is_reported);
+    RUN_TEST(test_a_node_that_is_given_twice_is_reported);
+    RUN_TEST(test_an_axis_at_the_controllers_own_node_is_reported);
+    RUN_TEST(test_what_a_drive_reports_is_kept);
     return UNITY_END();
 }

@@ -69,7 +69,7 @@ static void test_settled_is_within_the_window(void)
     TEST_ASSERT_FALSE(axis_motion_settled(&axis, 99));
 }
 
-static void test_stop_works_both_ways(void)
+static void test_stop_works_in_both_directions(void)
 {
     for (int k = 1; k <= 10; k++) {
         axis_motion_follow(&axis, -2000000 - 5000 * k);
@@ -185,7 +185,7 @@ int main(void)
     RUN_TEST(test_stop_is_a_ramp_of_the_deceleration);
     RUN_TEST(test_targets_saturate);
     RUN_TEST(test_settled_is_within_the_window);
-    RUN_TEST(test_stop_works_both_ways);
+    RUN_TEST(test_stop_works_in_both_directions);
     RUN_TEST(test_stop_ends_with_the_smallest_deceleration);
     RUN_TEST(test_without_power_the_brake_stops_the_motor);
     RUN_TEST(test_a_load_stronger_than_the_brake_moves_it);

@@ -324,7 +324,7 @@ static void test_power_off_is_the_brake(void)
     TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.servo.axis) - from);
 }
 
-static void test_reset_says_no_error(void)
+static void test_reset_reports_no_error(void)
 {
     drive_bench_enable();
     drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x4210}, true);
@@ -449,7 +449,7 @@ int main(void)
     RUN_TEST(test_a_stop_ends_when_the_motor_stands);
     RUN_TEST(test_patience_ends);
     RUN_TEST(test_power_off_is_the_brake);
-    RUN_TEST(test_reset_says_no_error);
+    RUN_TEST(test_reset_reports_no_error);
     RUN_TEST(test_abort_connection_codes);
     RUN_TEST(test_error_behaviour);
     RUN_TEST(test_the_masters_heartbeat_is_not_missed_early);

@@ -53,7 +53,7 @@ static void test_nothing_has_the_bits_of_the_plain_drive(void)
     nothing_has_the_bits_of_the_plain_drive();
 }
 
-static void test_nor_has_it_others_with_everything_that_may_be_asked_for(void)
+static void test_nor_has_it_others_with_everything_that_may_be_configured(void)
 {
     struct drive_config config = drive_bench_config;
     config.interpolation = DRIVE_CUBIC;
@@ -211,7 +211,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_nothing_has_the_bits_of_the_plain_drive);
-    RUN_TEST(test_nor_has_it_others_with_everything_that_may_be_asked_for);
+    RUN_TEST(test_nor_has_it_others_with_everything_that_may_be_configured);
     RUN_TEST(test_each_figure_acts);
     RUN_TEST(test_a_load_is_held_by_the_integral);
     RUN_TEST(test_velocity_offset_takes_the_lag_away);

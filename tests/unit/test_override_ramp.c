@@ -192,9 +192,10 @@ static void test_limits_of_all_codes(void)
                 const double root = ldexp(1, 45) / b.limits.inverse_root;
                 TEST_ASSERT_TRUE(slope <= b.slope && root * root <= b.second);
                 TEST_ASSERT_TRUE(slope >= b.slope * 0.8 && root * root >= b.second * 0.8);
-                const double turns = fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
-                TEST_ASSERT_TRUE(b.limits.turns >= turns * 0.9);
-                TEST_ASSERT_TRUE(b.limits.turns <= turns * 1.25 + 2);
+                const double rate_ticks =
+                    fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
+                TEST_ASSERT_TRUE(b.limits.rate_ticks >= rate_ticks * 0.9);
+                TEST_ASSERT_TRUE(b.limits.rate_ticks <= rate_ticks * 1.25 + 2);
             }
         }
     }

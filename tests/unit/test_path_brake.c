@@ -183,7 +183,7 @@ static void test_acceleration_goes_to_the_deceleration(void)
 /* A state from which the release phase just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration
  * as it is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise
  * before the release phase. */
-static void test_no_rise_before_the_way_to_rest(void)
+static void test_no_rise_before_the_release_phase(void)
 {
     const int64_t jerk = (int64_t)1 << 34;
     const int64_t fall = (int64_t)1 << 44;
@@ -447,7 +447,7 @@ int main(void)
     RUN_TEST(test_code_0_is_no_brake);
     RUN_TEST(test_of_a_book);
     RUN_TEST(test_acceleration_goes_to_the_deceleration);
-    RUN_TEST(test_no_rise_before_the_way_to_rest);
+    RUN_TEST(test_no_rise_before_the_release_phase);
     RUN_TEST(test_first_tick);
     RUN_TEST(test_random_brakes);
     RUN_TEST(test_bound_near_the_end_of_a_program);

@@ -92,7 +92,7 @@ static void test_long_values_of_every_length(void)
     }
 }
 
-static void test_says_why_the_server_refused(void)
+static void test_reports_why_the_server_refused(void)
 {
     run(sdo_client_write_number(&client, TALK_NODE, 0x2000, 0, 9, 1, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_REFUSED, client.status);
@@ -215,7 +215,7 @@ int main(void)
     RUN_TEST(test_writes_and_reads_numbers);
     RUN_TEST(test_wide_numbers_go_segmented);
     RUN_TEST(test_long_values_of_every_length);
-    RUN_TEST(test_says_why_the_server_refused);
+    RUN_TEST(test_reports_why_the_server_refused);
     RUN_TEST(test_a_value_that_does_not_fit_is_given_up);
     RUN_TEST(test_timeout);
     RUN_TEST(test_arguments);

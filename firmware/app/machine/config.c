@@ -151,9 +151,10 @@ static uint32_t at_most_u32(uint64_t value)
 static uint32_t window_counts(const struct config *config, uint8_t axis)
 {
     const struct config_axis *own = &config->axis[axis];
-    const bool turns = own->counts_per_unit != 0u;
-    const uint64_t lag_nm = (uint64_t)(turns ? own->velocity_limit_um_s : config->feed_limit_um_s) *
-                            CONFIG_WINDOW_MS; /* um/s * ms */
+    const bool is_rotary = own->counts_per_unit != 0u;
+    const uint64_t lag_nm =
+        (uint64_t)(is_rotary ? own->velocity_limit_um_s : config->feed_limit_um_s) *
+        CONFIG_WINDOW_MS; /* um/s * ms */
     if (lag_nm == 0u || lag_nm > UINT32_MAX) {
         return UINT32_MAX;
     }

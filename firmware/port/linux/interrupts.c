@@ -29,7 +29,7 @@ static struct {
     bool lock_step;
     bool real_time; /* ticks come in time, as far as the machine permits */
     clockid_t main_loop_clock;
-    uint32_t main_loop_turns; /* atomic too */
+    uint32_t main_loop_sleeps; /* atomic too */
 } self;
 
 static __thread bool in_tick;
@@ -135,7 +135,7 @@ static uint64_t time_to_sleep_ns(void)
 
 void interrupts_main_loop_sleeps(void)
 {
-    (void)__atomic_add_fetch(&self.main_loop_turns, 1u, __ATOMIC_RELAXED);
+    (void)__atomic_add_fetch(&self.main_loop_sleeps, 1u, __ATOMIC_RELAXED);
 }
 
 static uint64_t main_loop_had_ns(void)
@@ -148,9 +148,9 @@ static uint64_t main_loop_had_ns(void)
 /* At lock step this thread is not a real-time one, and the scheduler is fair. */
 static bool may_yield(void)
 {
-    const uint32_t turns = __atomic_load_n(&self.main_loop_turns, __ATOMIC_RELAXED);
+    const uint32_t sleeps = __atomic_load_n(&self.main_loop_sleeps, __ATOMIC_RELAXED);
     return !self.lock_step && !clock_is_virtual() &&
-           schedule_overdue(&self.schedule, self.now_ns, turns) &&
+           schedule_overdue(&self.schedule, self.now_ns, sleeps) &&
            schedule_yield(&self.schedule, self.now_ns, main_loop_had_ns());
 }
 

@@ -18,8 +18,8 @@
  * 10 ms at most. If a tick takes less than two thirds of a period this changes nothing.
  *
  * Other real-time processes may use all of that pause (simulated drives that process old SYNCs). So the main loop is
- * supervised. If it has not slept for SCHEDULE_TURN_NS and has had less than an eighth of the processor since, ticks
- * are delayed, each by SCHEDULE_YIELD_NS at most, until it has got that share. A main loop that computes for long
+ * supervised. If it has not slept for SCHEDULE_SLEEPLESS_NS and has had less than an eighth of the processor since,
+ * ticks are delayed, each by SCHEDULE_YIELD_NS at most, until it has got that share. A main loop that computes for long
  * delays no ticks, because it has the processor. One that waits for something else delays ticks for SCHEDULE_YIELDS_NS
  * in all. With real drives (`urgent`) no tick is delayed.
  */
@@ -31,9 +31,9 @@
 
 #define SCHEDULE_SLICE_NS     10000000u
 #define SCHEDULE_SLICE_MAX_NS 20000000u
-#define SCHEDULE_REST_MAX_NS  10000000u
+#define SCHEDULE_PAUSE_MAX_NS 10000000u
 
-#define SCHEDULE_TURN_NS         20000000u
+#define SCHEDULE_SLEEPLESS_NS    20000000u
 #define SCHEDULE_YIELD_NS        10000000u
 #define SCHEDULE_YIELDS_NS       200000000u
 #define SCHEDULE_YIELD_SLICE_NS  1000000u
@@ -41,13 +41,13 @@
 
 /* Processor time of the main loop. */
 struct schedule_main_loop {
-    uint64_t turn_ns;   /* when it last slept, or had its share */
+    uint64_t served_ns; /* when it last slept, or had its share */
     uint64_t judged_ns; /* start of the time in which its share is measured; 0: it is not */
     uint64_t had_ns;    /* its processor time at that start */
     uint64_t slept_ns;  /* when this thread last yielded to it */
     uint64_t tick_ns;   /* by which the present tick may still be delayed */
     uint64_t left_ns;   /* by which ticks may still be delayed in all */
-    uint32_t turns;     /* how often it has gone to sleep */
+    uint32_t sleeps;    /* how often it has gone to sleep */
 };
 
 struct schedule {
@@ -79,9 +79,9 @@ void schedule_wait(struct schedule *schedule, uint64_t now_ns);
  * the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
 
-/* Before a due tick; `turns` counts how often the main loop has gone to sleep. True if the main loop has not slept for
+/* Before a due tick; `sleeps` counts how often the main loop has gone to sleep. True if the main loop has not slept for
  * too long: then call schedule_yield. */
-bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns);
+bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t sleeps);
 
 /* `had_ns`: total processor time of the main loop. True: the tick is delayed, and due_ns is later. */
 bool schedule_yield(struct schedule *schedule, uint64_t now_ns, uint64_t had_ns);
