@@ -490,7 +490,7 @@ static uint32_t path_time_us(const struct controller *controller)
 
 /* If the path stop does not end in time, or the stop has been requested a second time, the drives stop by their own
  * ramps. */
-static bool come_to_rest(struct controller *controller)
+static bool come_to_standstill(struct controller *controller)
 {
     (void)commands_execute(controller, COMMAND_STOP);
     if (wait_until(controller, at_rest, path_time_us(controller), true)) {
@@ -503,7 +503,7 @@ static bool come_to_rest(struct controller *controller)
 bool controller_shut_down(struct controller *controller)
 {
     controller->ending = true;
-    const bool stopped = come_to_rest(controller);
+    const bool stopped = come_to_standstill(controller);
     (void)commands_execute(controller, COMMAND_DISABLE);
     (void)wait_until(controller, at_rest, quick_time_us(controller), false);
     const bool off = wait_until(controller, switched_off, OFF_TIME_US, false);

@@ -385,8 +385,8 @@ static int step_keeps(struct brake_check *check, const struct flow *flow,
 }
 
 /* Bounds of time and distance from here to standstill (core/stop_check). */
-static int to_rest(const struct flow *flow, const struct program_stop *stop, uint32_t period_us,
-                   struct real *time_s, int64_t *distance_q40)
+static int to_standstill(const struct flow *flow, const struct program_stop *stop,
+                         uint32_t period_us, struct real *time_s, int64_t *distance_q40)
 {
     struct stop_start from = {.speed_um = thousandths(flow->at.v.high),
                               .rising_um = thousandths(flow->at.a.high)};
@@ -441,7 +441,7 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
     int64_t distance_q40 = 0;
     int kept = 0;
     flow_begin(&flow, check, own, from);
-    if (to_rest(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
+    if (to_standstill(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
         return 0;
     }
     if (remainder_keeps(check, &flow, distance_q40) != 0) {
@@ -470,7 +470,7 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
         /* again when the speed is a quarter less */
         if (real_less(flow.at.v.high, real_mul(tried, real_make(3, -2))) != 0) {
             tried = flow.at.v.high;
-            kept = to_rest(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
+            kept = to_standstill(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
                    remainder_keeps(check, &flow, distance_q40) != 0;
         }
     }

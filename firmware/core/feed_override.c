@@ -233,7 +233,7 @@ static int plan_tick(struct feed_override *f, struct interpolator *it)
     return result;
 }
 
-static void come_to_rest(struct feed_override *f, uint32_t found)
+static void come_to_standstill(struct feed_override *f, uint32_t found)
 {
     f->phase = PHASE_REST;
     f->found = found;
@@ -263,9 +263,9 @@ static int brake_tick(struct feed_override *f, struct interpolator *it)
     f->left_q30 -= TICK_Q30;
     path_brake_step(&f->brake);
     const int result = interpolate_brake(f, it);
-    if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
+    if (result == INTERPOLATOR_OK && path_brake_ended(&f->brake)) {
         interpolator_search_begin(&f->place, f->clock.piece, f->point.arc_length_q40_mm);
-        come_to_rest(f, 0);
+        come_to_standstill(f, 0);
     }
     return result;
 }
@@ -324,14 +324,14 @@ static void wait_slowly(struct feed_override *f)
 }
 
 /* Leaves the nominal motion, or finds that it ends at standstill by itself. */
-static int leaves_or_rests(struct feed_override *f, const struct interpolator *it)
+static int leaves_or_ends(struct feed_override *f, const struct interpolator *it)
 {
     struct path_state state;
     int64_t turned_q56 = 0;
     const int known = feed_override_motion(f, it, &state, &turned_q56);
     const int rests = (f->plan.now.override_q57 | f->plan.now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
-        come_to_rest(f, 1);
+        come_to_standstill(f, 1);
         return 1;
     }
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
@@ -355,7 +355,7 @@ static int wait_tick(struct feed_override *f, struct interpolator *it)
         if (f->numbers_piece != f->clock.piece) {
             enter_piece(f);
         }
-        if (leaves_or_rests(f, it)) {
+        if (leaves_or_ends(f, it)) {
             return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERPOLATOR_OK;
         }
         f->left_q30 -= qmath_lesser(override_q30(f), TICK_Q30);
@@ -382,7 +382,7 @@ static void search_place(struct feed_override *f, const struct interpolator *it)
         if (interpolator_search_step(it, &f->place)) {
             f->found = 1;
             program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece);
-            override_plan_rest(&f->plan);
+            override_plan_restart(&f->plan);
         }
     }
     if (f->found != 0 && f->state == FEED_RUNNING) {
@@ -488,7 +488,7 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
 }
 
 /* At standstill: continues from the same arc length when its time is found. */
-static void rest_in_next(struct feed_override *f)
+static void stand_in_next(struct feed_override *f)
 {
     interpolator_search_begin(&f->place, 0, f->point.arc_length_q40_mm);
     f->phase = PHASE_REST;
@@ -515,7 +515,7 @@ static void go_on_in_next(struct feed_override *f, const struct chunk *next,
                         at->piece, record);
     override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
     if (resting) {
-        rest_in_next(f);
+        stand_in_next(f);
     }
 }
 

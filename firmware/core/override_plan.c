@@ -20,7 +20,7 @@ static const struct ramp_ticks SHORTEST = {1, 1};
 
 /* --- Commands --- */
 
-static void come_to_rest(struct override_plan *plan)
+static void begin_from_0(struct override_plan *plan)
 {
     memset(&plan->ramp, 0, sizeof plan->ramp);
     plan->now.override_q57 = 0;
@@ -41,7 +41,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
     plan->requested_q57 = OVERRIDE_ONE;
     plan->most_q57 = OVERRIDE_MOST;
     plan->commanded_q57 = OVERRIDE_ONE;
-    come_to_rest(plan);
+    begin_from_0(plan);
 }
 
 void override_plan_limit(struct override_plan *plan, int64_t most_q57)
@@ -85,14 +85,14 @@ void override_plan_forget_records(struct override_plan *plan)
 void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
 {
     override_plan_carry(plan, least, 0);
-    come_to_rest(plan);
+    begin_from_0(plan);
     plan->started = 0;
 }
 
-void override_plan_rest(struct override_plan *plan)
+void override_plan_restart(struct override_plan *plan)
 {
     plan->started = 1;
-    come_to_rest(plan);
+    begin_from_0(plan);
 }
 
 void override_plan_set(struct override_plan *plan, uint32_t percent)
@@ -141,7 +141,7 @@ static int64_t factor_q57(const struct override_window *w)
 }
 
 /* The next constant override: the end of a ramp under way. */
-static int64_t next_rest(const struct override_plan *plan)
+static int64_t next_constant(const struct override_plan *plan)
 {
     return override_ramp_moves(&plan->ramp) ? plan->ramp.end_q57 : plan->now.override_q57;
 }
@@ -234,7 +234,7 @@ static void evaluate_window(struct override_plan *plan, const struct program_clo
         search_failed(plan);
     }
     if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY) {
-        override_change_of(&plan->change, next_rest(plan), plan->target_q57);
+        override_change_of(&plan->change, next_constant(plan), plan->target_q57);
     }
 }
 
@@ -272,7 +272,7 @@ static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
 /* How long the ramp takes. */
 static void measure(struct override_plan *plan, const struct program_clock *clock)
 {
-    const int64_t from_q57 = next_rest(plan);
+    const int64_t from_q57 = next_constant(plan);
     struct ramp_limits limits;
     plan->step = OVERRIDE_FITS;
     plan->high_q57 = from_q57;

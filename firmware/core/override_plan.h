@@ -101,7 +101,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
 void override_plan_forget_records(struct override_plan *plan);
 
 /* A path stop has ended: the override continues from 0. */
-void override_plan_rest(struct override_plan *plan);
+void override_plan_restart(struct override_plan *plan);
 
 /* --- Commands: take effect in the next tick, or when the ramp under way may be cut. --- */
 

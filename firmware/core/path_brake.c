@@ -198,8 +198,8 @@ static int64_t speed_of_rise(int64_t a_q56, int64_t jerk_q56)
 }
 
 /* x^2 + 3/8 y^2 <= 2 a distance, for the distance to standstill from the end of an onset `fall`. */
-static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
-                        int64_t fall_q56, int64_t most_q56, int64_t distance_q40_mm)
+static int ends_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
+                       int64_t fall_q56, int64_t most_q56, int64_t distance_q40_mm)
 {
     /* the parts of speed, a t / 2, and distance, a t^2 / 6, of the first jerk in t ticks */
     const uint32_t exact_q16 = ramp_ticks_q16(fall_q56, numbers->jerk_down_q56);
@@ -238,7 +238,7 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
     if (left_q40_mm <= 0 || most >> FITS_BITS != 0) {
         return 0;
     }
-    return rests_within(numbers, speed, qmath_greater(most + a, 0), most, left_q40_mm);
+    return ends_within(numbers, speed, qmath_greater(most + a, 0), most, left_q40_mm);
 }
 
 /* --- Tick --- */
@@ -328,7 +328,7 @@ void path_brake_step(struct path_brake *brake)
     }
 }
 
-int path_brake_rests(const struct path_brake *brake)
+int path_brake_ended(const struct path_brake *brake)
 {
     return brake->phase == RESTING;
 }

@@ -76,6 +76,6 @@ void path_brake_first(struct path_brake *brake);
 void path_brake_step(struct path_brake *brake);
 
 /* 1 when speed and acceleration are 0. */
-int path_brake_rests(const struct path_brake *brake);
+int path_brake_ended(const struct path_brake *brake);
 
 #endif

@@ -152,7 +152,7 @@ double axis_motion_place_mm(const struct axis_motion *axis)
     return axis->drive.state.motor.position_mm + axis->machine_mm;
 }
 
-bool axis_motion_at_rest(const struct axis_motion *axis)
+bool axis_motion_at_standstill(const struct axis_motion *axis)
 {
     return axis->drive.state.motor.speed_rad_s == 0.0;
 }

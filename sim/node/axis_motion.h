@@ -64,7 +64,7 @@ bool axis_motion_ramp(struct axis_motion *axis, int64_t speed_counts_period,
 /* The position that the drive reads; the place of the axis in the machine; whether it is exactly at standstill. */
 int32_t axis_motion_position(const struct axis_motion *axis);
 double axis_motion_place_mm(const struct axis_motion *axis);
-bool axis_motion_at_rest(const struct axis_motion *axis);
+bool axis_motion_at_standstill(const struct axis_motion *axis);
 
 /* Whether the position is within `window_counts` of the last target. */
 bool axis_motion_settled(const struct axis_motion *axis, uint32_t window_counts);

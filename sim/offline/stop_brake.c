@@ -165,12 +165,12 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
     const int each = (int)stop_greater(step_s / setting->period_s, 1.0);
     int done = 0;
     at[0] = state_of(&tick, from_mm, setting->period_s);
-    while (!path_brake_rests(&tick)) {
+    while (!path_brake_ended(&tick)) {
         if (surely_keeps(setting, inverse, &tick, from_mm, row)) {
             return 1;
         }
         int count = 0;
-        while (count < SURE_EACH && !path_brake_rests(&tick)) {
+        while (count < SURE_EACH && !path_brake_ended(&tick)) {
             if (done + count == 0) {
                 path_brake_first(&tick);
             } else {

@@ -155,7 +155,7 @@ static int prelude(struct course *course, struct stop_trial *trial, uint64_t *ra
 
 /* Time to standstill in ticks; ticks of waiting at an override below 1 are weighted by the override. Below 0: an error,
  * or no standstill. */
-static double to_rest(struct course *course, struct stop_trial *trial)
+static double to_standstill(struct course *course, struct stop_trial *trial)
 {
     double ticks = 0.0;
     for (uint32_t i = 0; i < MOST_TICKS; i++) {
@@ -199,7 +199,7 @@ static void one(const struct course *from, struct stop_trial *trial, uint64_t se
         feed_override_fault_stop(&course.feed);
         course.machine = 1;
     }
-    const double ticks = to_rest(&course, trial);
+    const double ticks = to_standstill(&course, trial);
     if (ticks < 0.0) {
         trial->failures++;
     } else if (runs) {

@@ -219,7 +219,7 @@ static int out_of_brake_keeps(const struct stop_setting *setting, const struct s
         return 1;
     }
     path_brake_first(&first);
-    for (uint32_t k = 1; !path_brake_rests(&first); k++) {
+    for (uint32_t k = 1; !path_brake_ended(&first); k++) {
         if (k % BRAKE_EACH == 0u && path_brake_begin(&second, &first.at, numbers) &&
             !stop_brake_keeps(setting, &setting->at_any_rate, &second, from->s, row, FINE_S)) {
             return 0;

@@ -171,7 +171,7 @@ void override_plan_limit(struct override_plan *plan, int64_t most_q57)
     plan->most_q57 = most_q57;
 }
 
-void override_plan_rest(struct override_plan *plan)
+void override_plan_restart(struct override_plan *plan)
 {
     plan->started = 1;
 }
@@ -367,7 +367,7 @@ void path_brake_step(struct path_brake *brake)
     brake->at.arc_length_q40_mm = any_between(0, LENGTH);
 }
 
-int path_brake_rests(const struct path_brake *brake)
+int path_brake_ended(const struct path_brake *brake)
 {
     (void)brake;
     return nondet_int() != 0;

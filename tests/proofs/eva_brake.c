@@ -158,7 +158,7 @@ static void settle_ticks(void)
     path_brake_step(&brake);
     prove(brake.phase == RESTING || brake.settle_ticks > 0);
     prove(brake.settle_ticks < BRAKE_MOST_SETTLE);
-    prove(path_brake_rests(&brake) == 0 || brake.settle_ticks == 0);
+    prove(path_brake_ended(&brake) == 0 || brake.settle_ticks == 0);
 }
 
 int main(void)

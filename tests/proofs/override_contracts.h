@@ -46,7 +46,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p);
 /*@ requires is_plan(plan);
     assigns *plan \from *plan;
     ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
-void override_plan_rest(struct override_plan *plan);
+void override_plan_restart(struct override_plan *plan);
 
 /*@ requires is_plan(plan);
     assigns plan->held, plan->steady \from \nothing; */
@@ -105,7 +105,7 @@ void path_brake_step(struct path_brake *brake);
 
 /*@ assigns \result \from brake->phase;
     ensures \result == 0 || \result == 1; */
-int path_brake_rests(const struct path_brake *brake);
+int path_brake_ended(const struct path_brake *brake);
 
 /* --- core/interpolator.h: eva_interpolator.c --- */
 

@@ -130,7 +130,7 @@ static int is_way(const struct override_plan *plan, const struct way *way)
 
 static int is_above(const struct override_plan *plan)
 {
-    return next_rest(plan) > plan->guaranteed_q57;
+    return next_constant(plan) > plan->guaranteed_q57;
 }
 
 /* What the steps of a search leave to the next ones. */
@@ -143,7 +143,7 @@ static int search_is_sound(const struct override_plan *plan)
         return 0;
     }
     if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY &&
-        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_rest(plan) &&
+        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_constant(plan) &&
           plan->change.to_q57 == plan->target_q57)) {
         return 0;
     }

@@ -109,7 +109,7 @@ static void test_without_power_the_brake_stops_the_motor(void)
     const int32_t position = axis_motion_position(&axis);
     TEST_ASSERT_GREATER_THAN_INT(10, periods);
     TEST_ASSERT_INT32_WITHIN(60000, 340000, position - from);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&axis));
     for (int k = 0; k < 300; k++) {
         TEST_ASSERT_TRUE(axis_motion_hold(&axis));
         TEST_ASSERT_EQUAL_INT32(position, axis_motion_position(&axis));

@@ -173,7 +173,7 @@ static void test_disabled_while_enabling(void)
     bench.word = CIA402_DISABLE_VOLTAGE;
     drive_bench_run(100);
     TEST_ASSERT_EQUAL_HEX16(NOT_STARTED, drive_bench_statusword() & HOMING_BITS);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&bench.node.servo.axis));
 }
 
 static void test_modes_change_at_rest_only(void)

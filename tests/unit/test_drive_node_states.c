@@ -291,7 +291,7 @@ static void test_a_stop_ends_when_the_motor_stands(void)
     drive_bench_run(reference + 10);
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
     TEST_ASSERT_EQUAL_INT64(0, bench.node.servo.axis.speed_counts_period);
-    TEST_ASSERT_FALSE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_FALSE(axis_motion_at_standstill(&bench.node.servo.axis));
     (void)leave(CIA402_QUICK_STOP_ACTIVE);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
     TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.servo.axis));
@@ -320,7 +320,7 @@ static void test_power_off_is_the_brake(void)
     drive_bench_run(1);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
     drive_bench_run(50);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&bench.node.servo.axis));
     TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.servo.axis) - from);
 }
 

@@ -258,7 +258,7 @@ static void test_rest(void)
     begin_at(1000, 0);
     steps(300);
     program_clock_set(&clock, clock.time_q42_s, clock.piece, clock.record);
-    override_plan_rest(&plan);
+    override_plan_restart(&plan);
     TEST_ASSERT_EQUAL_UINT32(0, override_q30());
     (void)step();
     TEST_ASSERT_TRUE(override_q30() < 1u << 30);

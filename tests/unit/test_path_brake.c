@@ -147,7 +147,7 @@ static void test_of_a_book(void)
     struct path_brake brake;
     int ticks = 0;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &numbers));
-    for (; !path_brake_rests(&brake) && ticks < 100; ticks++) {
+    for (; !path_brake_ended(&brake) && ticks < 100; ticks++) {
         path_brake_step(&brake);
     }
     TEST_ASSERT_INT_WITHIN(2, 71, ticks);
@@ -214,7 +214,7 @@ static void expect_first_tick(int64_t a, int64_t change)
     TEST_ASSERT_INT64_WITHIN(slack, a + change, brake.at.acceleration_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a + change / 2, brake.at.speed_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a / 2 + change / 6, way_q56(&from, &brake.at));
-    TEST_ASSERT_FALSE(path_brake_rests(&brake));
+    TEST_ASSERT_FALSE(path_brake_ended(&brake));
 }
 
 /* An acceleration above 0 falls by the first jerk at most, and as far as 0; one below stays. */
@@ -255,7 +255,7 @@ static int check_brake(struct path_brake *brake, const struct path_brake_numbers
     const int64_t first_acceleration = brake->at.acceleration_q56;
     struct path_state before = brake->at;
     int ticks = 0;
-    for (; !path_brake_rests(brake); ticks++) {
+    for (; !path_brake_ended(brake); ticks++) {
         path_brake_step(brake);
         const int64_t settling = (int64_t)brake->settle_ticks + 16;
         check_tick(&before, &brake->at, n, first_acceleration, 8 * settling * settling + 64);
@@ -297,7 +297,7 @@ static int64_t way_of_stop(const struct path_state *from, const struct path_brak
     struct path_brake brake;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, from, n));
     path_brake_first(&brake);
-    while (!path_brake_rests(&brake)) {
+    while (!path_brake_ended(&brake)) {
         path_brake_step(&brake);
     }
     return way_from(from, &brake.at);
@@ -428,7 +428,7 @@ static void test_extreme_numbers(void)
             continue;
         }
         if (path_brake_begin(&brake, &from, &n)) {
-            for (int tick = 0; !path_brake_rests(&brake); tick++) {
+            for (int tick = 0; !path_brake_ended(&brake); tick++) {
                 TEST_ASSERT_TRUE(tick < 300000);
                 path_brake_step(&brake);
             }
