@@ -90,7 +90,7 @@ static int rests(const struct feed_override *f)
     return f->phase == PHASE_REST || feed_override_waits(f);
 }
 
-static int comes_to_rest(const struct feed_override *f)
+static int comes_to_standstill(const struct feed_override *f)
 {
     return f->state == FEED_HOLDING || f->state == FEED_STOPPING;
 }
@@ -237,7 +237,7 @@ static void come_to_standstill(struct feed_override *f, uint32_t found)
 {
     f->phase = PHASE_REST;
     f->found = found;
-    if (comes_to_rest(f)) {
+    if (comes_to_standstill(f)) {
         f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
     }
 }
@@ -408,7 +408,7 @@ int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
 int feed_override_next(struct feed_override *f, struct interpolator *it,
                        struct interpolator_point *out)
 {
-    const int aside = f->phase != PHASE_PLAN || comes_to_rest(f);
+    const int aside = f->phase != PHASE_PLAN || comes_to_standstill(f);
     const int result = aside ? feed_override_stop_tick(f, it) : plan_tick(f, it);
     if (result < 0) {
         return result;
@@ -586,7 +586,7 @@ enum feed_state feed_override_state(const struct feed_override *f)
 
 int feed_override_late(const struct feed_override *f)
 {
-    return comes_to_rest(f) && f->left_q30 < 0;
+    return comes_to_standstill(f) && f->left_q30 < 0;
 }
 
 uint64_t feed_override_time_q42(const struct feed_override *f)
