@@ -11,7 +11,7 @@
 #define MOST_HALVINGS 20 /* of a cell */
 #define CUT_STEPS     30
 
-/* A function that stays one, so that its frame is not on the stack while the caller attends to the main loop's work. */
+/* Never inlined, so that its frame is not on the stack while the caller calls program_limits_attend(). */
 #if defined(__GNUC__)
 #define CHECK_APART __attribute__((noinline))
 #else
@@ -24,10 +24,10 @@ static const struct real zero = {0, 0};
 struct cell {
     const struct feed_polynomial *poly;
     const struct path *path;
-    struct real
-        c[FEED_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
-    struct real per_s;      /* d x / d t */
-    struct real offset_mm;  /* start of the piece from the start of the segment */
+    /* F from the piece's start in powers of x = (u - middle) / half */
+    struct real c[FEED_DEGREE + 1];
+    struct real per_s;     /* d x / d t */
+    struct real offset_mm; /* start of the piece from the start of the segment */
 };
 
 struct check {
@@ -36,7 +36,7 @@ struct check {
     uint32_t axis_count;
     struct motion limit;    /* m = 0: none */
     struct real per_period; /* 1/s */
-    struct motion last;     /* at the end of the stretch before; at rest before the first, */
+    struct motion last;     /* at the end of the previous stretch; standstill before the first, */
     int unknown;            /* or not known: before a program that begins in motion */
 };
 
@@ -90,8 +90,8 @@ static void in_level(const struct program_override *own, uint32_t level,
 }
 
 /* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
- * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out.
- * docs/theory/numerics.md section 7. */
+ * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes
+ * out. docs/theory/numerics.md section 7. */
 static void at_all_overrides(const struct feed_polynomial *poly,
                              const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
 {
@@ -137,7 +137,7 @@ static int take_sample(const struct check *check, const struct cell *cell, struc
     return 0;
 }
 
-/* 0 when nothing between samples 2 / parts apart in x can pass a limit, else the code of what may. */
+/* 0 if no limit can be exceeded between samples 2 / parts apart in x, else the code of a limit that may be. */
 static int judge(const struct check *check, const struct motion *peak, const struct motion *rise,
                  uint32_t parts_log2)
 {
@@ -153,7 +153,7 @@ static int judge(const struct check *check, const struct motion *peak, const str
     return 0;
 }
 
-/* One cell without halving: 0 kept, a code with *certain set when a sample passes a limit, else a code. */
+/* One cell without halving. 0: the limits are kept; else a code, with *certain set if a sample exceeds the limit. */
 static int check_cell(const struct check *check, const struct cell *cell, int *certain)
 {
     struct motion bend;
@@ -173,7 +173,7 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
     for (uint32_t log2 = 0; (1u << log2) <= MOST_PARTS; log2++) {
         const uint32_t parts = 1u << log2;
         for (uint32_t i = 0; i <= parts; i++) {
-            if (log2 == 0u || (i & 1u) != 0u) { /* the others have been looked at */
+            if (log2 == 0u || (i & 1u) != 0u) { /* the others have been evaluated */
                 const int32_t at = 2 * (int32_t)i - (int32_t)parts;
                 code = take_sample(check, cell, real_make(at, -(int32_t)log2), &peak);
                 if (code != 0) {
@@ -205,8 +205,8 @@ static void set_cell(struct cell *cell, const struct feed_polynomial *poly, cons
     cell->offset_mm = real_make(poly->start_q40_mm - path->start_q40_mm, -40);
 }
 
-/* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of step / period, and
- * so on. */
+/* Steps from the end of the previous cell to the start of this one: to a drive a step of velocity is an acceleration of
+ * step / period, and so on. */
 static int check_step(const struct check *check, const struct motion *now)
 {
     const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
@@ -225,7 +225,7 @@ static int check_step(const struct check *check, const struct motion *now)
     return 0;
 }
 
-/* The begin of a stretch against the end of the one before. */
+/* The start of a stretch compared with the end of the previous one. */
 static CHECK_APART int check_begin(struct check *check, const struct feed_polynomial *poly,
                                    const struct path *path, struct real low, struct real high)
 {
@@ -250,7 +250,7 @@ static CHECK_APART int check_part(const struct check *check, const struct feed_p
     return check_cell(check, &cell, certain);
 }
 
-/* The stretch of a piece on one segment, halved where need be. */
+/* The stretch of a piece on one segment, halved where necessary. */
 static int check_stretch(struct check *check, const struct feed_polynomial *poly,
                          const struct path *path, struct real low, struct real high)
 {
@@ -279,7 +279,7 @@ static int check_stretch(struct check *check, const struct feed_polynomial *poly
     return code;
 }
 
-/* u at which the piece has come this far from its start, between `low` and 1. */
+/* u at which the piece is at this distance from its start, between `low` and 1. */
 static struct real time_of(const struct feed_polynomial *poly, struct real mm, struct real low)
 {
     struct real high = real_make(1, 0);

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, as numbers that bounds
- * can be proved of. */
+/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, and bounds of it. */
 #include "core/path_motion.h"
 
 #include "core/ph_segment.h"
@@ -70,7 +69,7 @@ void path_motion_stretch(struct real *c, int degree, struct real by)
     }
 }
 
-/* --- What is read from the image --- */
+/* --- Reading the image --- */
 
 /* From Bernstein coefficients of degree 2 to powers. */
 static void to_powers(struct real out[3], const int64_t w_q44[3])
@@ -139,7 +138,8 @@ static void read_space(struct path *path, const struct program_segment *segment)
     }
 }
 
-/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at least. */
+/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at
+ * least. */
 static void read_speed(struct path *path, const struct program_segment *segment)
 {
     int64_t e_q50[5][PH_AXES];
@@ -265,7 +265,8 @@ static void taylor(const struct real c[PATH_DEGREE + 1], struct real x, struct r
     out[2] = real_times(half_second, 2);
 }
 
-/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its motion. */
+/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its
+ * motion. */
 static void motion_in_space(const struct path *path, struct real xi,
                             const struct real f[QUANTITIES], struct motion *out)
 {
@@ -301,8 +302,8 @@ void path_motion_at(const struct path *path, struct real s_mm, const struct real
 
 /* --- Majorants: coefficients that bound those of the Taylor series at every instant of a cell --- */
 
-/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the distance from the
- * instant. */
+/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the
+ * distance from the instant. */
 static void majorant(struct real *out, const struct real *c, int degree, struct real middle,
                      struct real half)
 {
@@ -397,7 +398,7 @@ void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE +
     const struct real high =
         parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, one), offset_mm));
     const struct real middle = real_scale(real_add(low, high), -1);
-    /* 2^-10 of it more, and 2^-20 of the segment: a feed may creep back by its slack */
+    /* 2^-10 of it more, and 2^-20 of the segment: a feed may go back by its slack */
     struct real half = real_abs(real_scale(real_sub(high, low), -1));
     half = real_add(real_mul(half, real_make(1025, -10)), real_make(1, -20));
     majorant(polynomial, path->sigma, PATH_DEGREE, middle, half);
