@@ -76,6 +76,9 @@ _TAIL_EFFORT = replace(_EFFORT, spacing=3.0, fewest=6)
 _LOWERED = (1.01, 1.01, 1.02, 1.04, 1.08)
 """By which factors, one after the other, the limits of an interval are lowered that the controller would refuse."""
 
+_FEWER_CODES = (1, 2, 4, 8, 16)
+"""By how many codes the override bounds of pieces are reduced that the controller would still refuse: 8 are a factor of 2."""
+
 _TAIL_LOWERED = (1.04, 1.04)
 """The same of a tail, which need not be the fastest."""
 
@@ -272,6 +275,7 @@ class SectionFeed:
             found,
             lambda one: self._window(one, limits, given, high, stop_s),
             lambda window: (window.stretch, window.count),
+            _with_stretch,
         )
         if self._moving is not None and bad[: made.count].any():
             return self._to_rest(limits, given)
@@ -282,10 +286,12 @@ class SectionFeed:
         found: Solution,
         made: Callable[[Solution], _Made],
         stretch_of: Callable[[_Made], tuple[Stretch, int]],
+        with_stretch: Callable[[_Made, Stretch], _Made],
         steps: Sequence[float] = _LOWERED,
     ) -> tuple[_Made, NDArray[np.bool_]]:
-        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse; and the
-        pieces that it still would refuse. `stretch_of`: its pieces, and how many of them are kept.
+        """What is made of a solution, with lower limits on intervals whose pieces the controller would refuse, and then
+        with lower override bounds of these pieces; and the pieces that it still would refuse. `stretch_of`: its pieces,
+        and how many of them are kept; `with_stretch`: the same with other pieces.
         """
         tight, out = np.ones(found.grid.size), made(found)
         for step in steps:
@@ -299,6 +305,12 @@ class SectionFeed:
                 break
             found = lower
             out = made(found)
+        for fewer in _FEWER_CODES:
+            stretch, count = stretch_of(out)
+            bad = self._exceeded(stretch)
+            if not bad[:count].any():
+                return out, bad
+            out = with_stretch(out, _with_fewer_codes(stretch, bad, fewer))
         return out, self._exceeded(stretch_of(out)[0])
 
     def _window(
@@ -518,7 +530,7 @@ class SectionFeed:
                 return self._stretch(make_track(own, 1.0, ends), window.plan, begin_q40)  # noqa: B023
 
             yield made(one)
-            yield self._lowered(one, made, _whole, _TAIL_LOWERED)[0]
+            yield self._lowered(one, made, _whole, lambda _, own: own, _TAIL_LOWERED)[0]
         pieces = taken(window.stretch.pieces, slice(joint, None))
         yield Stretch(pieces, window.stretch.end_q40)
 
@@ -549,6 +561,24 @@ class SectionFeed:
                 continue
             tried.add(at)
             yield float(ends[at])
+
+
+def _with_stretch(window: Window, stretch: Stretch) -> Window:
+    return replace(window, stretch=stretch)
+
+
+def _with_fewer_codes(stretch: Stretch, bad: NDArray[np.bool_], fewer: int) -> Stretch:
+    """Some pieces (M,) with lower override bounds; what they leave of the axis limits is found from samples, and the
+    controller's proof may find less between them.
+    """
+    pieces = stretch.pieces
+    by = np.where(bad, fewer, 0)[:, None]
+    rate, second = (
+        np.where(codes > by, codes - by, np.minimum(codes, 1)).astype(np.uint8)
+        for codes in (pieces.override_rate_codes, pieces.override_second_codes)
+    )
+    lower = replace(pieces, override_rate_codes=rate, override_second_codes=second)
+    return replace(stretch, pieces=lower)
 
 
 def _whole(stretch: Stretch) -> tuple[Stretch, int]:
