@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""What holds for every test: the same examples in every run, no deadline for each, and Ctrl-C as processes know it."""
+"""What holds for every test: the same examples in every run, no deadline for each, Ctrl-C as processes know it, and
+folders of its own for what commands keep for their user.
+"""
 
+import os
 import signal
+import tempfile
 
 from hypothesis import settings
 
@@ -14,3 +18,9 @@ settings.load_profile("steady")
 # wait for ever.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# The journal of streamed jobs and the local bus of this user: two runs of the tests at once, or a machine that the user
+# simulates meanwhile, must not meet here.
+_OWN = tempfile.TemporaryDirectory(prefix="hodograph-tests-")
+for _name in ("XDG_STATE_HOME", "XDG_RUNTIME_DIR"):
+    os.environ[_name] = _OWN.name

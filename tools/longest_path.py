@@ -42,14 +42,14 @@ STOP: tuple[str, ...] = ()
 
 # What a tick does not call, by what is said of the program's path axes.
 PATHS: dict[str, tuple[str, ...]] = {
-    "2": ("interpolator_point_copy_rest", "path_counts_rest"),
+    "2": ("interpolator_point_copy_others", "path_counts_others"),
     "3": ("extras_at",),
     "6": (),
 }
 
 
 # Loops over axes, and the axes that come before them.
-OVER_AXES = {"interpolator_point_copy_rest": 2, "path_counts_rest": 3}
+OVER_AXES = {"interpolator_point_copy_others": 2, "path_counts_others": 3}
 
 SPATIAL = ("3", "6")
 SPATIAL_GOALS = {

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Banks for
- * programs and banks for parameters both have one.
+ * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Used by
+ * app/program_slot, app/program_table and app/parameter_store.
  *
  *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
  *
- * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check. A bank
- * without a valid record is ignored: the power failed before the record was complete. Of two banks with valid records
- * the one with the later sequence number (modulo 2^32) has the newer content. Main loop.
+ * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check. A
+ * bank without a valid record is ignored: the power failed before the record was complete. Of two banks with valid
+ * records the one with the later sequence number (modulo 2^32) has the newer content. Main loop.
  */
 #ifndef APP_BANK_RECORD_H
 #define APP_BANK_RECORD_H
@@ -20,11 +20,11 @@
 struct bank_record {
     uint32_t sequence;
     uint32_t size; /* of the content, bytes */
-    uint32_t
-        tag; /* a program: CRC-32 of the configuration it was checked against; parameters: CRC-32 of the content */
+    /* a program: CRC-32 of the configuration it was checked against; parameters: CRC-32 of the content */
+    uint32_t tag;
 };
 
-/* Bytes of a bank that are left for the content. */
+/* Bytes of a bank for the content. */
 uint32_t bank_record_room(unsigned bank);
 
 /* False when the bank has no valid record. */

@@ -33,7 +33,7 @@ static bool is_wrapped(const struct chunk_ring *ring)
     return ring->used && ring->write <= ring->oldest;
 }
 
-static uint32_t room_behind_newest(const struct chunk_ring *ring)
+static uint32_t room_after_newest(const struct chunk_ring *ring)
 {
     return (is_wrapped(ring) ? ring->oldest : ring->size) - ring->write;
 }
@@ -45,16 +45,16 @@ static uint32_t room_at_start(const struct chunk_ring *ring)
 
 uint32_t chunk_ring_room(const struct chunk_ring *ring)
 {
-    const uint32_t behind = room_behind_newest(ring);
+    const uint32_t after = room_after_newest(ring);
     const uint32_t start = room_at_start(ring);
-    return behind > start ? behind : start;
+    return after > start ? after : start;
 }
 
 uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size)
 {
-    const bool behind = room_behind_newest(ring) >= least;
-    const uint32_t at = behind ? ring->write : 0u;
-    *size = behind ? room_behind_newest(ring) : room_at_start(ring);
+    const bool after = room_after_newest(ring) >= least;
+    const uint32_t at = after ? ring->write : 0u;
+    *size = after ? room_after_newest(ring) : room_at_start(ring);
     if (*size < least || *size == 0u) {
         return NULL;
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * chunk_ring: memory for the chunks of a stream: blocks that lie in one piece each, taken and freed in the same order.
+ * chunk_ring: memory for the chunks of a job: contiguous blocks, taken and freed in the same order. Used by app/stream.
  *
  * A block that does not fit after the newest one begins at the start of the memory again; the remainder at the end
  * stays unused until then. The newest block may be made smaller, or given back, as long as no other has been taken.
@@ -25,7 +25,7 @@ struct chunk_ring {
     bool used;             /* there is a block */
 };
 
-/* Of all memory that is there; `size` may be 0. */
+/* `memory`: all memory of the ring; `size` may be 0. */
 void chunk_ring_init(struct chunk_ring *ring, uint8_t *memory, uint32_t size);
 
 /* Frees all blocks. */
@@ -34,14 +34,13 @@ void chunk_ring_clear(struct chunk_ring *ring);
 /* Bytes of the largest block that can be taken now. Pure. */
 uint32_t chunk_ring_room(const struct chunk_ring *ring);
 
-/* Takes a block of `least` bytes or more, as large as there is room in its place: *size. NULL: there is no such
- * place. */
+/* Takes a block of at least `least` bytes, as large as its place allows: *size. NULL: there is no such place. */
 uint8_t *chunk_ring_take(struct chunk_ring *ring, uint32_t least, uint32_t *size);
 
-/* The newest block keeps its first `size` bytes, which must be some. */
+/* Shortens the newest block to its first `size` bytes, at least 1. */
 void chunk_ring_trim(struct chunk_ring *ring, uint32_t size);
 
-/* The newest block, the last one taken, is free again. */
+/* Frees the newest block. */
 void chunk_ring_give_back(struct chunk_ring *ring);
 
 /* Frees the oldest block; `next` is the one taken after it. */

@@ -40,8 +40,8 @@ static enum machine_refusal prepare_any(struct controller *controller, int64_t f
                                                                          : MACHINE_OUTSIDE_LIMITS;
 }
 
-/* What keeps the program from being started. Costs a check of it where it was not checked under this configuration: apart from
- * the start, so that the stack never holds the check and a prepared motion. */
+/* What keeps the program from being started. Costs a check of it where it was not checked under this configuration:
+ * apart from the start, so that the stack never holds the check and a prepared motion. */
 static enum machine_refusal program_refusal(struct controller *controller)
 {
     struct program_slot *slot = &controller->slot;
@@ -90,7 +90,7 @@ static bool starts_program(enum command command)
     return command == COMMAND_START || command == COMMAND_START_FROM;
 }
 
-/* Wants a configuration, and a controller that stays. */
+/* Commands that need a confirmed configuration, and a controller that is not being shut down. */
 static bool begins_something(enum command command)
 {
     return command == COMMAND_ENABLE || command == COMMAND_HOME || starts_program(command);
@@ -156,7 +156,7 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
 }
 
-/* What allows a start without homing is for one attempt. */
+/* The permission to start without homing is valid for one attempt. */
 static enum machine_refusal attempt_start(struct controller *controller, enum command command)
 {
     enum machine_refusal refusal = stream_is_open(&controller->stream)
@@ -184,7 +184,7 @@ bool command_urgent_request(const struct can_msg *frame, uint8_t node)
 {
     static const uint8_t request[4] = {0x2F, 0x01, 0x20, 0x00};
     static const uint8_t rest[3] = {0};
-    return frame->id == COB_SDO_ASK + node && frame->len == CAN_DATA_MAX &&
+    return frame->id == COB_SDO_REQUEST + node && frame->len == CAN_DATA_MAX &&
            memcmp(frame->data, request, sizeof request) == 0 && command_is_urgent(frame->data[4]) &&
            memcmp(frame->data + 5, rest, sizeof rest) == 0;
 }

@@ -95,8 +95,8 @@ static void init_values(struct controller *controller, uint8_t port_node)
     }
 }
 
-/* A chunk is checked while the motion goes on: the main loop does not stand still, and the chunk before this one may be
- * due. */
+/* Called during the check of a chunk, while the motion continues: the main loop is alive, and the chunk before this one
+ * may be due. */
 static void beat_in_stream(void *self)
 {
     struct controller *controller = self;
@@ -137,7 +137,7 @@ void controller_init(struct controller *controller, uint8_t node)
 
 /* ---- Interrupts ---- */
 
-/* TPDO3, or what looks like one. */
+/* TPDO3, or a frame with its identifier. */
 static void take_inputs(struct machine *machine, int node, uint32_t inputs)
 {
     struct axis *axis = node > 0 ? machine_axis(machine, (uint8_t)node) : NULL;
@@ -146,7 +146,7 @@ static void take_inputs(struct machine *machine, int node, uint32_t inputs)
     }
 }
 
-/* A drive that boots has lost its zero; said here, since a frame that the queue has no room for is lost. */
+/* A drive that boots has lost its zero. Noted here, because the queue may lose the frame. */
 static void take_boot_up(struct machine *machine, const struct can_msg *message)
 {
     const bool boot_up = (message->id & ~NODE_ID_MAX) == COB_HEARTBEAT && message->len == 1u &&
@@ -158,7 +158,7 @@ static void take_boot_up(struct machine *machine, const struct can_msg *message)
     }
 }
 
-/* Queued as any frame, and answered in its turn; then it changes nothing any more. */
+/* The frame is queued as well, and answered in its order; executing the command twice has no effect. */
 static void note_urgent(struct controller *controller, const struct can_msg *message)
 {
     if (controller->checks_chunk && command_urgent_request(message, controller->node)) {
@@ -179,7 +179,7 @@ static void receive_other(struct controller *controller, const struct can_msg *m
     }
 }
 
-/* Receive: process data at once, the rest waits for the main loop. */
+/* Receive: process data at once, all other frames wait for the main loop. */
 static void on_receive(void *self, const struct can_msg *message, uint32_t now_us)
 {
     struct controller *controller = self;
@@ -205,9 +205,9 @@ static void on_tick(void *self, uint32_t now_us, uint32_t late_ns)
 int controller_start(struct controller *controller)
 {
     const struct can_match filters[] = {
-        {COB_NMT, CAN_ID_MAX},    {COB_EMCY, 0x780u},
-        {COB_TPDO1, 0x780u},      {COB_TPDO3, 0x780u},
-        {COB_SDO_ANSWER, 0x780u}, {(uint16_t)(COB_SDO_ASK + controller->node), CAN_ID_MAX},
+        {COB_NMT, CAN_ID_MAX},      {COB_EMCY, 0x780u},
+        {COB_TPDO1, 0x780u},        {COB_TPDO3, 0x780u},
+        {COB_SDO_RESPONSE, 0x780u}, {(uint16_t)(COB_SDO_REQUEST + controller->node), CAN_ID_MAX},
         {COB_HEARTBEAT, 0x780u},
     };
     const struct port_handlers handlers = {
@@ -244,7 +244,7 @@ static void take_nmt(struct controller *controller, const struct can_msg *in)
     port_unlock();
 }
 
-/* One of the three asks at a time. */
+/* Only one of the three has a request under way. */
 static void take_answer(struct controller *controller, const struct can_msg *in)
 {
     struct can_msg out;
@@ -307,7 +307,7 @@ static bool boot_requested(struct machine *machine)
     return due;
 }
 
-/* Of a drive that is about to be started: what it maps, and its inputs, since TPDO3 reports changes only. */
+/* For a drive that is about to be started: its mapped offsets, and its inputs, because TPDO3 reports changes only. */
 static void note_properties(struct controller *controller, const struct can_msg *command)
 {
     if (command->id != COB_NMT || command->data[0] != (uint8_t)NMT_START) {
@@ -331,12 +331,12 @@ static void note_properties(struct controller *controller, const struct can_msg 
     port_unlock();
 }
 
-static void note_silence(struct controller *controller)
+static void note_missing_heartbeats(struct controller *controller)
 {
     port_lock();
     const uint8_t node = controller->machine.unresponsive_node;
     port_unlock();
-    drive_boot_silent(&controller->boot, node);
+    drive_boot_unresponsive(&controller->boot, node);
 }
 
 static void poll_boot(struct controller *controller, uint32_t elapsed_us)
@@ -362,7 +362,7 @@ static void poll_boot(struct controller *controller, uint32_t elapsed_us)
         }
         port_unlock();
     }
-    note_silence(controller);
+    note_missing_heartbeats(controller);
 }
 
 static void poll_homing(struct controller *controller, uint32_t elapsed_us)
@@ -373,7 +373,7 @@ static void poll_homing(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
-/* During shutdown nothing is requested any more: an answer after the end would be taken for one to the next client. */
+/* During shutdown nothing is requested: a response after the end would be taken for one to the next client. */
 static void poll_drives(struct controller *controller, uint32_t elapsed_us)
 {
     port_lock();
@@ -441,7 +441,8 @@ static bool reached_now(struct controller *controller, bool (*reached)(const str
     return done;
 }
 
-/* Goes on with the main loop until it is so or the time is over, or, where that counts, somebody insists. */
+/* Runs the main loop until the condition is reached, the time is over, or (if that counts here) the stop has been
+ * requested a second time. */
 static bool wait_until(struct controller *controller, bool (*reached)(const struct machine *),
                        uint32_t time_us, bool until_insisted)
 {
@@ -467,14 +468,14 @@ static void leave_pre_operational(const struct controller *controller)
     }
 }
 
-/* As long as the machine itself gives its quick stops, which then end in one way or another. */
+/* The time limit of the machine for a quick stop. */
 static uint32_t quick_time_us(const struct controller *controller)
 {
     return (MACHINE_QUICK_TICKS + AXIS_STANDSTILL_SYNCS) * controller->config.period_us;
 }
 
-/* The machine itself gives a stop up at its deadline, a fifth beyond its bound, or, near the end of a program, beyond
- * twice that at most; then the axes settle and arrive. This is for a machine whose ticks do not come. */
+/* The machine itself ends a stop at its deadline: 1.2 times its bound, near the end of a program 1.2 times twice the
+ * bound at most; then the axes settle and arrive. This longer limit is for a machine without ticks. */
 static uint32_t path_time_us(const struct controller *controller)
 {
     const struct program_slot *slot = &controller->slot;
@@ -487,8 +488,9 @@ static uint32_t path_time_us(const struct controller *controller)
                                controller->config.period_us;
 }
 
-/* Where the path is not left in time, or somebody insists, the drives stop by their own ramps. */
-static bool come_to_rest(struct controller *controller)
+/* If the path stop does not end in time, or the stop has been requested a second time, the drives stop by their own
+ * ramps. */
+static bool come_to_standstill(struct controller *controller)
 {
     (void)commands_execute(controller, COMMAND_STOP);
     if (wait_until(controller, at_rest, path_time_us(controller), true)) {
@@ -501,7 +503,7 @@ static bool come_to_rest(struct controller *controller)
 bool controller_shut_down(struct controller *controller)
 {
     controller->ending = true;
-    const bool stopped = come_to_rest(controller);
+    const bool stopped = come_to_standstill(controller);
     (void)commands_execute(controller, COMMAND_DISABLE);
     (void)wait_until(controller, at_rest, quick_time_us(controller), false);
     const bool off = wait_until(controller, switched_off, OFF_TIME_US, false);

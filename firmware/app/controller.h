@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * controller: node 1: the wiring of machine, tick, protocol objects and port.
+ * controller: CANopen node 1: connects machine, tick, protocol objects and port. Used by app/main.c.
  *
  *     static struct controller controller;        the only instance lives in main
  *     controller_init(&controller, port_node_id());
@@ -21,7 +21,7 @@
 #define CONTROLLER_POLL_US 5000u
 
 /* The most time that one round counts in the timeouts of the protocols. So a main loop that was busy (a program check),
- * or a host that stalled, does not count as silence of the other nodes. */
+ * or a host that stalled, causes no timeout of the other nodes. */
 #define CONTROLLER_ELAPSED_MAX_US 20000u
 
 /* Everything to its power-on state: stored parameters are restored. `node` is the number of the port, which a stored
@@ -34,8 +34,8 @@ int controller_start(struct controller *controller);
 /* One round: takes every waiting frame, lets time pass, sends what is due. */
 void controller_poll(struct controller *controller);
 
-/* Ends in bounded time: stops along the path if running, switches the drives off, leaves them
- * pre-operational. True when all of that succeeded. Interrupts are still on afterwards. */
+/* Ends in bounded time: stops along the path if running, switches the drives off, leaves them pre-operational. True if
+ * all of that succeeded. Interrupts stay on. */
 bool controller_shut_down(struct controller *controller);
 
 #endif

@@ -36,7 +36,7 @@ void controller_heartbeat(struct controller *controller, uint32_t elapsed_us)
     }
 }
 
-/* The time of the work counts for nobody else: what the others have sent meanwhile has not been processed. */
+/* The time of the work is no timeout of other nodes, because their frames have not been processed meanwhile. */
 void controller_beat(void *self)
 {
     struct controller *controller = self;

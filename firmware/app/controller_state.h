@@ -28,7 +28,7 @@
 #include "canopen/sdo_server.h"
 #include "od_controller.h"
 
-/* The configuration that holds: one that the host has confirmed, or one restored from the store. */
+/* The valid configuration: confirmed by the host, or restored from the store. */
 struct configured {
     bool known;
     bool restored;
@@ -40,9 +40,9 @@ struct controller {
     struct machine machine;
     struct tick tick;
     struct frame_queue queue;
-    bool checks_chunk; /* the main loop is busy with a chunk while the motion may go on: */
-    uint16_t
-        urgent; /* commands to stop that have come meanwhile, bit by enum command; they wait in the queue as well */
+    bool checks_chunk; /* the main loop checks a chunk; the motion may continue meanwhile */
+    /* stop commands received during that check, bit by enum command; they wait in the queue as well */
+    uint16_t urgent;
     /* main loop only */
     struct config config; /* the same values as machine.config */
     struct configured configured;
@@ -65,12 +65,12 @@ struct controller {
     enum cia402_state noted_drive[AXES_MAX];
     struct drive_trouble noted_trouble;
     enum machine_refusal refusal; /* of the last command */
-    bool ending; /* the shutdown has begun: nothing is switched on or started any more */
+    bool ending; /* the shutdown has begun: nothing may be switched on or started */
     uint8_t node;
-    bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still there */
+    bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still active */
 };
 
-/* Whether the present configuration is the one that was confirmed or restored: without that nothing is switched on. */
+/* Whether the present configuration is the one that was confirmed or restored. Otherwise nothing may be switched on. */
 bool controller_configured(const struct controller *controller);
 
 /* Sends the heartbeat if it is due. elapsed_us: since the last call. */
@@ -80,15 +80,15 @@ void controller_heartbeat(struct controller *controller, uint32_t elapsed_us);
  * due and calls port_progress(). `self`: the controller. */
 void controller_beat(void *self);
 
-/* Around the check of a chunk: commands to stop that come meanwhile take effect at once. */
+/* Call these before and after the check of a chunk: stop commands that arrive in between take effect at once. */
 void controller_check_begins(struct controller *controller);
 void controller_check_ends(struct controller *controller);
 
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
 void controller_start_itself(struct controller *controller);
 
-/* Sends from the main loop, waiting a little when the port is full; then the frame is dropped: every protocol above
- * tolerates a lost frame. */
+/* Sends a frame. If the port is full, waits for some frame times, then drops the frame: every protocol above tolerates
+ * a lost frame. */
 void controller_send(const struct can_msg *message);
 
 #endif

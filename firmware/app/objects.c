@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/objects.h (see there): what the controller's object dictionary (controller.eds) does beside
- * storing values. */
+/* Implements app/objects.h (see there): the behaviour of the controller's object dictionary (controller.eds). */
 #include "app/objects.h"
 
 #include <stddef.h>
@@ -172,7 +171,7 @@ static uint64_t object_read_configuration(struct controller *controller,
     }
 }
 
-/* Test and use in one critical section: a fault may come between any two. False: not possible now. */
+/* Test and change in one critical section: otherwise a fault could come in between. False: not possible now. */
 static bool apply(struct controller *controller, const struct config *config, bool drives)
 {
     port_lock();
@@ -251,8 +250,7 @@ static uint32_t object_write_confirmation(struct controller *controller,
     return SDO_OK;
 }
 
-/* The dictionary has the new value while the configuration is read from it, and the old one again when it is
- * refused. */
+/* The dictionary has the new value while the configuration is read from it, and the old one again after a refusal. */
 static uint32_t reconfigure(struct controller *controller, const struct od_entry *entry,
                             uint64_t value)
 {
@@ -268,7 +266,7 @@ static uint32_t reconfigure(struct controller *controller, const struct od_entry
     return SDO_OK;
 }
 
-/* Objects of the configuration (config_contains). Writing the value that is there changes nothing. */
+/* Objects of the configuration (config_contains). Writing the present value changes nothing. */
 static uint32_t object_write_configuration(struct controller *controller,
                                            const struct od_entry *entry, uint64_t value)
 {
@@ -334,11 +332,11 @@ struct object {
     /* It is in its field. */
     void (*written)(struct controller *controller);
 
-    /* Whether the value is written whoever else has a transfer under way. */
+    /* Whether the value is written although another client has a transfer under way. */
     bool (*urgent)(uint8_t value);
 };
 
-/* What only the main loop writes; what the interrupts write too. */
+/* Values that only the main loop writes; values that interrupts write as well. */
 #define OWN    false
 #define SHARED true
 

@@ -3,15 +3,15 @@
  * objects_axis: handlers of objects that have one value for each axis, for the table in objects.c.
  *
  *   0x200A ... 0x200E, 0x2017, 0x201B, 0x201C, 0x2024, 0x2026 ... 0x202C
- *               sub i + 1: axis i: the last values that its drive reported, or was sent
+ *               sub i + 1: axis i: values of its drive, reported or sent last
  *   0x1400 + i  TPDO1 of its drive      0x1800 + i  its RPDO1; third object 0x202B where the drive maps a torque offset
  *                                       0x1806 + i  its RPDO2, where the drive maps a velocity offset
  *
- * PDO parameters describe the frames on the bus. PDOs of axes that are not configured, and of offsets that are not sent,
- * have bit 31 of the COB-ID set.
+ * PDO parameters describe the frames on the bus. PDOs of axes that are not configured, and of offsets that are not
+ * sent, have bit 31 of the COB-ID set.
  *
- * All are readers as objects.h describes them: they return the value of the entry, two's complement in 64 bits. Under
- * the lock.
+ * All are readers: they return the value of the entry, two's complement in 64 bits, and change nothing. Called by
+ * objects.c only. Main loop, under the lock.
  */
 #ifndef APP_OBJECTS_AXIS_H
 #define APP_OBJECTS_AXIS_H
@@ -39,7 +39,7 @@ uint64_t object_read_drive_state(struct controller *controller, const struct od_
 /* 0x2027 ... 0x202A: 0x1018 subs 1 ... 4 of the drive. */
 uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry);
 
-/* PDO parameters: COB-IDs (sub 1), number of mapped objects (sub 0), mapped objects that are not always there. */
+/* PDO parameters: COB-IDs (sub 1), number of mapped objects (sub 0), mapped objects that depend on the drive. */
 uint64_t object_read_actual_cob_id(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_setpoint_cob_id(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_velocity_cob_id(struct controller *controller, const struct od_entry *entry);

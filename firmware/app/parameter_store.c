@@ -143,7 +143,7 @@ bool parameter_store_restore(const struct parameter_store *store, struct od *od,
     return true;
 }
 
-/* A writer of content that counts as it goes. */
+/* Writes the content in order and counts its bytes. */
 struct writer {
     unsigned bank;
     uint32_t offset;
@@ -182,7 +182,7 @@ static void make_header(uint8_t header[HEADER_BYTES], const struct od *od, uint3
     header[CONFIRMED_AT] = confirmed ? 1u : 0u;
 }
 
-/* Whether exactly this is stored: then the memory need not wear. */
+/* Whether exactly this content is stored: then a write would only wear the memory. */
 static bool is_stored(const struct parameter_store *store, const struct od *od,
                       const uint8_t *header)
 {
@@ -207,7 +207,7 @@ static unsigned spare_bank(const struct parameter_store *store)
     return first ? PORT_STORE_PARAMETERS + 1u : PORT_STORE_PARAMETERS;
 }
 
-/* What has been written is read again, as the memory may not have taken it; the record goes last. */
+/* Reads the content again, because the memory may not have taken it; then writes the record. */
 static int seal(struct parameter_store *store, unsigned bank, uint32_t size, uint32_t crc)
 {
     const struct bank_record record = {.sequence = store->sequence + 1u, .size = size, .tag = crc};

@@ -93,7 +93,7 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
     slot->present = true;
 }
 
-/* What makes the image in a bank the program: records for the kernel, and last the record of the bank. */
+/* Makes the image in a bank the active program: coefficient records for the kernel, then the commit record. */
 static int seal(struct program_slot *slot, struct program *program, unsigned bank,
                 const struct config *config)
 {
@@ -135,7 +135,7 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
     return 0;
 }
 
-/* Limits are those of a configuration, and may change; these hold for every program. */
+/* Checks with the limits of the format only; those of a configuration may change. */
 static bool sound(const struct program *program)
 {
     struct program_limits none = {.period_us = 0};

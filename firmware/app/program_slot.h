@@ -2,14 +2,15 @@
 /*
  * program_slot: the active program and the upload of its successor (object 0x2000).
  *
- * An upload goes to the spare bank of the port's store. Only a complete image that passes every check becomes the active
- * program. A broken or refused upload leaves the active program unchanged. The commit record of a bank (bank_record.h)
- * is written last. So after a loss of power at any moment the new program or its predecessor is found.
+ * An upload goes to the spare bank of the port's store. Only a complete image that passes every check becomes the
+ * active program. A broken or refused upload leaves the active program unchanged. The commit record of a bank
+ * (bank_record.h) is written last. So after a loss of power at any moment the new program or its predecessor is found.
  *
  * The commit record also holds the CRC-32 of the configuration that the program was checked against. Under another
  * configuration, and once after each power-on, the program is checked again before it may run.
  *
- * Main loop. The program must not run when an upload ends (see machine_moving).
+ * Used by app/commands, app/objects_program and app/controller.c. Main loop. The program must not run when an upload
+ * ends (see machine_moving).
  */
 #ifndef APP_PROGRAM_SLOT_H
 #define APP_PROGRAM_SLOT_H
@@ -29,9 +30,9 @@ enum program_slot_state {
 };
 
 struct program_slot {
-    void (*attend)(
-        void *
-            self); /* called with `self` from time to time while a program is checked; may be NULL */
+    /* Called with `self` at each step of the check of a program, so that the main loop can send heartbeats. May be
+     * NULL. */
+    void (*attend)(void *self);
     void *self;
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */
@@ -43,18 +44,19 @@ struct program_slot {
     uint32_t config_crc32; /* of the configuration it was last checked against */
     bool present;
     bool receiving;
-    bool checked; /* since power-on, under config_crc32; only then the next one and the ends hold */
+    bool
+        checked; /* since power-on, under config_crc32; else start, end and `acceptable` are not valid */
     bool acceptable; /* within the limits of that configuration */
 };
 
 void program_slot_init(struct program_slot *slot);
 
-/* The newest whole program of the store, if there is one, becomes the active one: after power-on, before the first
- * upload. Costs a whole check of each program that it tries. */
+/* Makes the newest complete program of the store the active one: after power-on, before the first upload. Costs a whole
+ * check of each program that it tries. */
 void program_slot_recover(struct program_slot *slot);
 
-/* Object 0x2041: 1 bytes of a bank for image and records; for a kernel the record of 2 a segment in the plane, 3 a
- * piece, 4 a segment in space, 5 and each extra axis of it. */
+/* Object 0x2041, in bytes: number 1 a bank for image and records; for a kernel the record of 2 a segment in the plane,
+ * 3 a piece, 4 a segment in space, 5 each extra axis of it. */
 uint64_t program_slot_memory(uint32_t kernel, uint8_t number);
 
 enum program_slot_state program_slot_state(const struct program_slot *slot);
@@ -67,8 +69,8 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
 
-/* Brings start, end, `acceptable` and the coefficient records up to date; costs a whole check when the configuration is
- * another one, and a copy of the program in the other bank when the kernel is another one. */
+/* Brings start, end, `acceptable` and the coefficient records up to date. Costs a whole check if the configuration has
+ * changed, and a copy of the program to the other bank if the kernel has changed. */
 void program_slot_refresh(struct program_slot *slot, const struct config *config);
 
 #endif

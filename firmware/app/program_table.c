@@ -32,7 +32,7 @@ static int compare_records(void *context, const uint8_t *bytes, uint32_t size)
 }
 
 /* Sizes of header, segments and pieces are multiples of 8, and so is the image's. */
-static struct place behind(unsigned bank, const struct program *program)
+static struct place after_image(unsigned bank, const struct program *program)
 {
     return (struct place){.bank = bank, .offset = program->header.image_size};
 }
@@ -51,7 +51,7 @@ static void attach(unsigned bank, struct program *program, const struct kernel *
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
 {
     const struct kernel *made_for = kernel_find(kernel);
-    struct place place = behind(bank, program);
+    struct place place = after_image(bank, program);
     if (made_for == NULL) {
         return PROGRAM_ERR_KERNEL;
     }
@@ -68,7 +68,7 @@ int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
 bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
 {
     const struct kernel *made_for = kernel_find(kernel);
-    struct place place = behind(bank, program);
+    struct place place = after_image(bank, program);
     if (made_for == NULL) {
         return false;
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program_table: stores the coefficient records (core/coefficients.h) of a program in its bank, after the image. They are
- * for the kernel that the tick uses. The controller computes them when an upload has passed its checks. After power-on it
- * compares the stored records with those that it would write. Used by app/program_slot. Main loop.
+ * program_table: stores the coefficient records (core/coefficients.h) of a program in its bank, after the image. They
+ * are for the kernel that the tick uses. The controller computes them when an upload has passed its checks. After
+ * power-on it compares the stored records with those that it would write. Used by app/program_slot. Main loop.
  */
 #ifndef APP_PROGRAM_TABLE_H
 #define APP_PROGRAM_TABLE_H
@@ -17,8 +17,8 @@
  * image. */
 int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
 
-/* Gives the records that are there to the program, if it has not got them yet and every byte of them is right. True
- * when it has them now. */
+/* Gives the stored records to the program, if it does not have them yet and every byte of them is right. True if it has
+ * them now. */
 bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
 
 #endif

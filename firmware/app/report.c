@@ -19,7 +19,7 @@ static void tell_fault(struct controller *controller, const struct fault *fault)
     }
 }
 
-/* Faults are raised in interrupts; their telling is left to the main loop. */
+/* Faults are raised in interrupts; the main loop reports them. */
 static void report_fault(struct controller *controller)
 {
     port_lock();
@@ -110,7 +110,7 @@ static bool bus_takes_frames(const struct controller *controller)
     return takes;
 }
 
-/* What cannot be sent now is sent later. */
+/* Emergency messages that the port refuses now are sent later. */
 static void send_emergencies(struct controller *controller)
 {
     struct can_msg out;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* report: what the controller reports: emergency messages, the NMT state after its own errors, lines on the console.
- * Main loop. */
+/* report: reports changes of the controller: emergency messages, the NMT state after its own errors, lines on the
+ * console. Used by app/controller.c. Main loop; takes the port's lock to read the machine. */
 #ifndef APP_REPORT_H
 #define APP_REPORT_H
 

@@ -70,7 +70,7 @@ void stream_abandon(struct stream *stream)
     stream->receiving_bytes = 0;
 }
 
-/* ---- What a chunk has to pass ---- */
+/* ---- Checks of a chunk ---- */
 
 static bool is_over(const struct stream *stream)
 {
@@ -82,9 +82,9 @@ static bool opens_a_job(const struct stream *stream, const struct chunk *chunk)
     return (chunk->flags & CHUNK_FLAG_FIRST) != 0u && chunk->job != stream->job;
 }
 
-/* Whether it is this chunk's turn. */
-static int check_turn(const struct stream *stream, const struct chunk *chunk,
-                      const struct config *config)
+/* Whether the chunk is the next one of the job. */
+static int check_sequence(const struct stream *stream, const struct chunk *chunk,
+                          const struct config *config)
 {
     if (opens_a_job(stream, chunk)) {
         return stream->started && !is_over(stream) ? PROGRAM_ERR_CHUNK_JOB : 0;
@@ -112,7 +112,7 @@ static int check_program(const struct stream *stream, struct chunk *chunk,
     return chunk_check(chunk, previous, &limits, fault);
 }
 
-/* The block becomes as small as the chunk. */
+/* Shortens the block to the size of the chunk. */
 static int fit(struct stream *stream, const struct chunk *chunk, const struct config *config)
 {
     const int code = chunk_records_check(&stream->records, &chunk->program, config);
@@ -122,7 +122,7 @@ static int fit(struct stream *stream, const struct chunk *chunk, const struct co
     return code;
 }
 
-/* The first thing that is wrong with the chunk that has come. */
+/* The first rule that the received chunk breaks. */
 static struct program_fault check(struct stream *stream, struct chunk *chunk, uint32_t size,
                                   const struct config *config)
 {
@@ -131,7 +131,7 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
     if (fault.code == 0 && chunk->size != size) {
         fault.code = PROGRAM_ERR_CHUNK_FORMAT;
     }
-    fault.code = fault.code != 0 ? fault.code : check_turn(stream, chunk, config);
+    fault.code = fault.code != 0 ? fault.code : check_sequence(stream, chunk, config);
     fault.code = fault.code != 0 ? fault.code : check_program(stream, chunk, config, &fault);
     fault.code = fault.code != 0 ? fault.code : fit(stream, chunk, config);
     return fault;
@@ -139,7 +139,7 @@ static struct program_fault check(struct stream *stream, struct chunk *chunk, ui
 
 /* ---- A chunk that has passed ---- */
 
-/* Below 2^32 periods of at most 8 ms, which is below 2^36 ms: with 2^22 s behind it, below 2^64. */
+/* Less than 2^32 periods of at most 8 ms, which is below 2^36 ms. Together with 2^22 s of a program below 2^64. */
 static uint64_t ticks_q32_s(uint32_t ticks, uint32_t period_us)
 {
     const uint64_t time_ms = (uint64_t)ticks * (period_us / 1000u);
@@ -172,8 +172,8 @@ static void open_job(struct stream *stream, struct stream_chunk *first, const st
     enter(stream, first);
 }
 
-/* Time of the job at the start of a chunk behind the newest one. */
-static uint64_t job_time_behind_q32_s(const struct stream_chunk *newest, const struct chunk *chunk)
+/* Time of the job at the start of a chunk after the newest one. */
+static uint64_t job_time_after_q32_s(const struct stream_chunk *newest, const struct chunk *chunk)
 {
     if (!chunk_begins_at_rest(chunk)) {
         return newest->job_time_q32_s + chunk->time_shift_q32_s;
@@ -189,7 +189,7 @@ static void accept(struct stream *stream, struct stream_chunk *chunk, const stru
     if (opens_a_job(stream, &chunk->chunk)) {
         open_job(stream, chunk, config);
     } else {
-        chunk->job_time_q32_s = job_time_behind_q32_s(stream->newest, &chunk->chunk);
+        chunk->job_time_q32_s = job_time_after_q32_s(stream->newest, &chunk->chunk);
         stream->newest->next = chunk;
     }
     chunk->joint_time_q32_s =
@@ -256,9 +256,9 @@ void stream_started(struct stream *stream)
 
 /* ---- A round ---- */
 
-/* The chunk behind a rest, where the motion rests; NULL: none. */
-static const struct chunk *chunk_behind_rest(const struct stream *stream,
-                                             const struct machine *machine)
+/* The next chunk, if the motion rests before it; NULL: it does not. */
+static const struct chunk *chunk_after_rest(const struct stream *stream,
+                                            const struct machine *machine)
 {
     const struct stream_chunk *next = stream->executed->next;
     return next != NULL && chunk_begins_at_rest(&next->chunk) && machine_waits_for_chunk(machine)
@@ -268,7 +268,7 @@ static const struct chunk *chunk_behind_rest(const struct stream *stream,
 
 static enum stream_state state_on_path(const struct stream *stream, const struct machine *machine)
 {
-    const struct chunk *next = chunk_behind_rest(stream, machine);
+    const struct chunk *next = chunk_after_rest(stream, machine);
     if (next == NULL) {
         return machine_waits_for_chunk(machine) ? STREAM_UNDERRUN : STREAM_OPEN;
     }
@@ -288,7 +288,7 @@ static enum stream_state state_of(const struct stream *stream, const struct mach
                : STREAM_STOPPED;
 }
 
-/* What has become of the job since the last round. */
+/* Notes changes of the job since the last round. */
 static void note_state(struct stream *stream, const struct machine *machine)
 {
     port_lock();
@@ -307,7 +307,7 @@ static void note_state(struct stream *stream, const struct machine *machine)
 /* Holds the path before a chunk with a program stop, once. */
 static void stop_before_next(struct stream *stream, struct machine *machine)
 {
-    const struct chunk *next = chunk_behind_rest(stream, machine);
+    const struct chunk *next = chunk_after_rest(stream, machine);
     const uint32_t wanted = CHUNK_REST_STOP | (stream->optional_stop ? CHUNK_REST_OPTIONAL : 0u);
     if (next != NULL && (next->rest_flags & wanted) != 0u &&
         stream->stopped_for != next->sequence && machine->state == MACHINE_RUNNING) {
@@ -350,7 +350,7 @@ void stream_process(struct stream *stream, struct machine *machine)
     }
 }
 
-/* ---- What is so ---- */
+/* ---- State of the job ---- */
 
 uint32_t stream_hold_worst_us(const struct stream *stream)
 {

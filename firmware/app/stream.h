@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * stream: a job that comes in chunks (object 0x2060), and may be longer than any memory (core/chunk.h, docs/reference/protocol.md 1.7).
+ * stream: a job in chunks (object 0x2060), which may be longer than any memory (core/chunk.h,
+ * docs/reference/protocol.md 1.7). Used by app/objects_stream, app/commands and app/controller.c. Main loop; takes the
+ * port's lock where it reads or changes the machine.
  *
- * Chunks are downloaded in order to a ring in RAM, and checked there as strictly as a program. Coefficient records are made
- * of what is near the motion only (app/chunk_records.h).
- * In every tick the motion follows one of them, a whole program that ends at rest. While it is in the part that the next
- * chunk shares with this one, or rests, the next one is taken over, and the memory of this one is free. So whatever
- * happens to the line or the host, the path is not left: the motion comes to rest at the end of a tail (an underrun), and
- * goes on when the next chunk has come.
+ * Chunks are downloaded in order to a ring in RAM, and checked as strictly as a program. Coefficient records exist only
+ * near the motion (app/chunk_records.h). In every tick the motion follows one chunk, a whole program that ends at rest.
+ * While the motion is in the part that the next chunk shares, or rests, the next chunk is taken over, and the memory of
+ * its predecessor is free. So if the bus or the host fails, the motion stays on the path: it comes to rest at the end
+ * of a tail (an underrun), and continues when the next chunk has come.
  *
- * Where the next chunk begins at rest, behind a dwell, it is taken over at the end of its predecessor, and the motion counts the
- * ticks until it starts. Before a program stop the path is held once, until a resume.
+ * A chunk that begins at rest, after a dwell, is taken over at the end of its predecessor; the motion counts the ticks
+ * until it starts. Before a program stop the path is held once, until a resume.
  *
- * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped or
- * has met a fault; it can be read until it is closed, another one is opened or a program is uploaded. The power takes it
- * away. A job is bound to the configuration that it was checked under. Main loop; machine is locked here where it has to be.
+ * A job is opened by a first chunk, and started once, by command start. It is over when it has ended, has been stopped
+ * or has met a fault. It can be read until it is closed, another one is opened, a program is uploaded, or the power is
+ * switched off. A job is bound to the configuration that it was checked under.
  */
 #ifndef APP_STREAM_H
 #define APP_STREAM_H
@@ -32,15 +33,15 @@
 enum stream_state {
     STREAM_NONE = 0,
     STREAM_OPEN = 1,         /* a job has its first chunk; it may be running */
-    STREAM_UNDERRUN = 2,     /* at rest at the end of a tail: the next chunk is missing */
+    STREAM_UNDERRUN = 2,     /* rest at the end of a tail: the next chunk is missing */
     STREAM_ENDED = 3,        /* the last chunk has been executed to its end */
     STREAM_STOPPED = 4,      /* over before its end: stopped, or a fault */
     STREAM_PROGRAM_STOP = 5, /* at rest before a chunk with a program stop, until resumed */
 };
 
-/* Where a job is; kept when its chunks are gone. */
+/* The place of a job; kept after its chunks have been freed. */
 struct stream_place {
-    uint32_t sequence; /* of the chunk that is executed, or will be first */
+    uint32_t sequence; /* of the chunk that is executed; before the start, of the first one */
     uint32_t line;
     int64_t job_start_q40_mm;
     uint64_t job_time_q32_s; /* time of the job at program time 0 of this chunk */
@@ -55,9 +56,8 @@ struct stream {
     struct program_fault refused; /* last refusal; code 0: none */
     uint32_t underruns;           /* since the job was opened */
     struct stream_place place;
-    void (*attend)(
-        void
-            *self); /* called with `self` from time to time while a chunk is checked; may be NULL */
+    /* Called with `self` at each step of the check of a chunk. May be NULL. */
+    void (*attend)(void *self);
     void *self;
 
     struct chunk_ring ring;
@@ -70,9 +70,9 @@ struct stream {
     int32_t start_counts[AXES_MAX];
     bool started;
     bool waits;         /* this underrun has been counted */
-    bool optional_stop; /* optional program stops are made */
-    uint32_t
-        stopped_for; /* sequence of the chunk before which a program stop was made last; 0: none */
+    bool optional_stop; /* optional program stops take effect */
+    /* sequence of the chunk before which a program stop was made last; 0: none */
+    uint32_t stopped_for;
     enum stream_state state;
 };
 
@@ -95,17 +95,17 @@ static inline bool stream_is_open(const struct stream *stream)
     return stream->job != 0u;
 }
 
-/* Prepares the start of the job. MACHINE_ACCEPTED, or why it cannot be. */
+/* Prepares the start of the job. MACHINE_ACCEPTED, or the reason of the refusal. */
 enum machine_refusal stream_prepare(struct stream *stream, const struct config *config,
                                     struct motion *prepared, int32_t start_counts[AXES_MAX]);
 /* machine_start has accepted it. */
 void stream_started(struct stream *stream);
 
-/* A round: makes records further on, takes the next chunk over where it can be; notes underrun and end. Short; also to be called
- * from `attend`. */
+/* One round: makes records ahead of the motion, takes over the next chunk if possible, notes underrun and end. Short;
+ * also to be called from `attend`. */
 void stream_process(struct stream *stream, struct machine *machine);
 
-/* The longest hold of the program that is executed, us; 0: none is. */
+/* The longest hold of the program that is executed, us; 0: no program is. */
 uint32_t stream_hold_worst_us(const struct stream *stream);
 
 /* Object 0x2060 subs 7, 8, 11, 12. */

@@ -42,8 +42,9 @@ static bool send_sync(struct tick *tick)
     return send(tick, sync_producer_next(&tick->sync));
 }
 
-/* If frames of the last tick still wait to be sent, a SYNC would overtake the setpoints among them, and the drives would
- * move the distance of two periods at the next SYNC. So this tick sends nothing, and the program clock is paused. */
+/* If frames of the last tick still wait to be sent, a SYNC would overtake the setpoints among them, and the drives
+ * would move the distance of two periods at the next SYNC. So this tick sends nothing, and the program clock is
+ * paused. */
 static enum machine_sync begin_sync(struct tick *tick)
 {
     if (!port_can_delivered()) {

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * tick: all that the controller does in one period: SYNC, supervision of the drives, one step of the machine, setpoints.
+ * tick: all that the controller does in one period: SYNC, supervision of the drives, one step of the machine,
+ * setpoints.
  *
  * The timer interrupt calls tick_run once a period, under the port's lock. tick.c contains the order on the bus and all
- * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints.
+ * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints. Used by
+ * app/controller.c.
  */
 #ifndef APP_TICK_H
 #define APP_TICK_H
@@ -27,10 +29,10 @@ struct tick {
 
 void tick_init(struct tick *tick, struct machine *machine);
 
-/* One period k. Sends SYNC k, checks the answers of the drives to SYNC k-1, executes one step of the machine, then sends
- * setpoints k, feedforward and changed outputs. For simulated drives it asks the port to wait for their answers, for at
- * most the longer of answer_wait_ms (0x2004 sub 8) and a period. now_us: port_time_us(); late_ns: delay of this tick
- * after its due time. Timer. */
+/* One period k. Sends SYNC k, checks the answers of the drives to SYNC k-1, executes one step of the machine, then
+ * sends setpoints k, feedforward and changed outputs. For simulated drives it requests that the port waits for their
+ * answers, for at most the longer of answer_wait_ms (0x2004 sub 8) and a period. now_us: port_time_us(); late_ns: delay
+ * of this tick after its due time. Timer. */
 void tick_run(struct tick *tick, uint32_t now_us, uint32_t late_ns);
 
 #endif

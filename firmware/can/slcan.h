@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * slcan: CAN frames as lines of text, as LAWICEL's adapters and their many descendants have them.
+ * slcan: CAN frames as lines of text, in the format of LAWICEL's adapters and their many descendants. Used by the
+ * gateway (sim/gateway) and by emulated boards (port/mps2).
  *
  *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
  *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close
- *   C\r             from our bridge to a board: close, that is stop the axes and end; the board's own C reports that it has
+ *   C\r             from our gateway to a board: close, that is stop the axes and end; from a board: it has ended
  *
- * Other lines (extended and remote frames, answers of an adapter) are passed over. A time stamp (four hex digits after
- * the data) is allowed. Pure; the two directions are independent.
+ * Other lines (extended and remote frames, answers of an adapter) are ignored. A time stamp (four hex digits after the
+ * data) is allowed. Pure, any context; the two directions are independent.
  */
 #ifndef CAN_SLCAN_H
 #define CAN_SLCAN_H
@@ -25,7 +26,7 @@ uint32_t slcan_encode(const struct can_msg *message, char line[SLCAN_LINE_MAX]);
 /* Takes characters one by one. All zero is the beginning. */
 struct slcan_decoder {
     char line[SLCAN_LINE_MAX + 4u];
-    uint32_t length;  /* so far; more than fits: the line is passed over */
+    uint32_t length;  /* characters of the line; more than fits: the line is ignored */
     uint32_t refused; /* lines that began like a frame and were none */
     bool closed;      /* a line C has come */
 };

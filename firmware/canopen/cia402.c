@@ -20,7 +20,7 @@ static const struct coding codings[CIA402_STATES] = {
     [CIA402_FAULT] = {"Fault", 0x08},
 };
 
-/* Bit 5 means nothing in four of them. Others are CIA402_NOT_READY, which is 0. */
+/* In four states bit 5 has no meaning. Codes that are not listed are CIA402_NOT_READY, which is 0. */
 const uint8_t cia402_states[CIA402_CODES] = {
     [CIA402_CODE(0x40)] = CIA402_SWITCH_ON_DISABLED,
     [CIA402_CODE(0x60)] = CIA402_SWITCH_ON_DISABLED,

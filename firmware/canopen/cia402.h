@@ -28,7 +28,7 @@ enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP
 /* Bit of 0x6502 (supported drive modes) for a mode 1 ... 32. */
 #define CIA402_SUPPORTS(mode) (UINT32_C(1) << ((mode) - 1))
 
-/* Statusword bits beside those of the state. */
+/* Statusword bits that do not belong to the state. */
 #define CIA402_STATUS_VOLTAGE         0x0010u /* power stage is fed */
 #define CIA402_STATUS_WARNING         0x0080u
 #define CIA402_STATUS_REMOTE          0x0200u /* controlword is followed */
@@ -63,8 +63,8 @@ enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP
 #define CIA402_CODE(status) (((status) & 0xFu) | (((unsigned)(status) >> 1) & 0x30u))
 extern const uint8_t cia402_states[CIA402_CODES];
 
-/* These bits of a state; and the state of a statusword (codings that do not exist give CIA402_NOT_READY), which the
- * tick asks for often. */
+/* These bits of a state; and the state of a statusword (codings that do not exist give CIA402_NOT_READY). The second is
+ * inline, because each tick calls it for each drive. */
 uint16_t cia402_status_bits(enum cia402_state state);
 static inline enum cia402_state cia402_decode(uint16_t statusword)
 {

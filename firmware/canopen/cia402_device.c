@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/cia402_device.h (see there): the drive's side of the CiA 402 state machine. */
 #include "canopen/cia402_device.h"
 
 /* The option codes 0x605A from which on the drive stays in Quick stop active. */
@@ -19,7 +20,7 @@ void cia402_device_init(struct cia402_device *device)
     device->fault_persists = false;
 }
 
-/* Another state: a stop that was under way, or over, belongs to the one before. True when it changed. */
+/* Enters a state; the flags of a stop belong to the previous state and are cleared. True when the state changed. */
 static bool enter(struct cia402_device *device, enum cia402_state state)
 {
     bool changed = device->state != state;
@@ -142,7 +143,7 @@ static bool control_ready(struct cia402_device *device, enum command command)
 {
     switch (command) {
     case COMMAND_SWITCH_ON:
-    case COMMAND_ENABLE_OPERATION: /* by way of Switched on */
+    case COMMAND_ENABLE_OPERATION: /* first to Switched on */
         return enter(device, CIA402_SWITCHED_ON);
     case COMMAND_SHUTDOWN:
         return false;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* cia402_device: the drive's side of the CiA 402 state machine.
- * 
- * The drive reports to the machine what happens inside it (ready, fault, reaction finished), gives it each controlword,
- * and does what cia402_device_action says. Functions return true when the state changed. All in one context (that of
- * the drive's period). */
+/* cia402_device: the drive's side of the CiA 402 state machine. Used by the simulated drives (sim/node/servo).
+ *
+ * The drive reports what happens inside it (ready, fault, reaction finished), passes on each controlword, and executes
+ * the action that cia402_device_action returns. Functions return true when the state changed. They change *device only.
+ * All in one context, that of the drive's period. */
 #ifndef CANOPEN_CIA402_DEVICE_H
 #define CANOPEN_CIA402_DEVICE_H
 
@@ -15,9 +15,8 @@
 /* What the power stage and the motion control have to do now. */
 enum cia402_action {
     CIA402_POWER_OFF, /* no torque */
-    CIA402_HOLD,   /* Switched on: powered, not following; the simulated drive keeps its torque off
-                      here too if it likes */
-    CIA402_FOLLOW, /* Operation enabled: follow the setpoints */
+    CIA402_HOLD, /* Switched on: powered, not following; a drive may keep its torque off here too */
+    CIA402_FOLLOW,        /* Operation enabled: follow the setpoints */
     CIA402_SLOW_DOWN,     /* leaving Operation enabled (0x605B, 0x605C): stop, then
                          cia402_device_stopped */
     CIA402_STOP_QUICKLY,  /* Quick stop active: stop with 0x6085, then cia402_device_stopped */
@@ -37,9 +36,10 @@ struct cia402_device {
     enum cia402_state state;
     struct cia402_options options; /* may change at any time */
     uint16_t controlword;          /* last one, for edges */
-    uint16_t flags; /* CIA402_STATUS_... bits beside the state; the drive sets and clears them */
-    bool stopped;   /* in Quick stop active: the motor has come to rest; bit 10 of the statusword */
-    bool leaving;   /* Operation enabled, on the way to `leaving_to`; enabling again calls it off */
+    uint16_t
+        flags; /* CIA402_STATUS_... bits in addition to the state; the drive sets and clears them */
+    bool stopped; /* in Quick stop active: the motor has come to rest; bit 10 of the statusword */
+    bool leaving; /* Operation enabled, stopping, then `leaving_to`; enabling again cancels that */
     enum cia402_state leaving_to;
     bool fault_persists; /* set by the drive: the cause is still there, a reset has no effect */
 };
@@ -57,8 +57,7 @@ bool cia402_device_control(struct cia402_device *device, uint16_t controlword);
  * stop. */
 bool cia402_device_fault(struct cia402_device *device);
 
-/* The stop that cia402_device_action requested is finished: transitions 5, 8, 14, or 12 when 0x605A
- * says so. */
+/* The stop that cia402_device_action requested is finished: transitions 5, 8, 14, or 12 if 0x605A selects it. */
 bool cia402_device_stopped(struct cia402_device *device);
 
 /* Quick stop from inside (SYNC or heartbeat lost), like transition 11. */

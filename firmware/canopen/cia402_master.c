@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements canopen/cia402_master.h (see there): the controlword that brings a drive nearer to a goal. */
 #include "canopen/cia402_master.h"
 
-/* Upwards one state after the other; at or above the goal the command is the one that keeps it. What is not named is
- * "disable voltage", which is 0: on the way out of every other state. */
+/* Towards the goal one state after the other; at or above the goal the command that keeps it. Entries that are not
+ * listed are "disable voltage", which is 0 and leaves every other state. */
 const uint8_t cia402_master_commands[CIA402_GOALS][CIA402_STATES] = {
     [CIA402_GOAL_READY] = {[CIA402_SWITCH_ON_DISABLED] = CIA402_SHUTDOWN,
                            [CIA402_READY_TO_SWITCH_ON] = CIA402_SHUTDOWN,

@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* cia402_master: the controller's side of the CiA 402 state machine: which controlword brings a
- * drive nearer to a goal.
+/* cia402_master: the controller's side of the CiA 402 state machine: which controlword brings a drive nearer to a goal.
  *
- * Called each tick with the latest state; the answer is the controlword to send. No memory but
- * the controlword sent before (for the rising edge of the fault reset). Pure functions, any
- * context.
+ * Called in each tick with the latest state (app/machine/axis); the result is the controlword to send. The caller keeps
+ * the previous controlword, for the rising edge of the fault reset. Pure functions, any context.
  */
 #ifndef CANOPEN_CIA402_MASTER_H
 #define CANOPEN_CIA402_MASTER_H
@@ -15,11 +13,10 @@
 #include "canopen/cia402.h"
 
 enum cia402_goal {
-    CIA402_GOAL_OFF, /* Switch on disabled; also out of Quick stop active. A Fault is left alone */
+    CIA402_GOAL_OFF, /* Switch on disabled; also out of Quick stop active. It does not change a Fault */
     CIA402_GOAL_READY, /* Ready to switch on */
     CIA402_GOAL_SWITCHED_ON,
-    CIA402_GOAL_ENABLED, /* Operation enabled. From Quick stop active by way of Switch on disabled
-                          */
+    CIA402_GOAL_ENABLED, /* Operation enabled. From Quick stop active through Switch on disabled */
     CIA402_GOAL_QUICK_STOP, /* Quick stop active from Operation enabled; else off. The command does
                                not depend on the statusword, which may be wrong or old */
     CIA402_GOAL_RESET       /* out of Fault, to Switch on disabled */
@@ -39,7 +36,7 @@ static inline uint16_t cia402_master_controlword(enum cia402_goal goal, enum cia
                                                                    : command;
 }
 
-/* Whether the drive has arrived. */
+/* Whether the drive has reached the goal. */
 bool cia402_master_reached(enum cia402_goal goal, uint16_t statusword);
 
 #endif

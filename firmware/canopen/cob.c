@@ -38,6 +38,6 @@ int64_t cob_signed(uint64_t value, uint32_t size)
     if ((value & sign) == 0) {
         return (int64_t)low;
     }
-    /* low - sign without leaving the range of int64_t on the way */
+    /* low - sign, without an intermediate result outside int64_t */
     return -(int64_t)(sign - 1 - low) - 1;
 }

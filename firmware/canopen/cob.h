@@ -12,20 +12,20 @@
 #include "can/can_frame.h"
 
 /* Add the node id (1 ... 127) to those with "+ node". */
-#define COB_NMT        0x000u
-#define COB_SYNC       0x080u
-#define COB_EMCY       0x080u /* + node */
-#define COB_TPDO1      0x180u /* + node */
-#define COB_RPDO1      0x200u /* + node */
-#define COB_TPDO2      0x280u /* + node */
-#define COB_RPDO2      0x300u /* + node */
-#define COB_TPDO3      0x380u /* + node */
-#define COB_RPDO3      0x400u /* + node */
-#define COB_TPDO4      0x480u /* + node */
-#define COB_RPDO4      0x500u /* + node */
-#define COB_SDO_ANSWER 0x580u /* + node: server to client */
-#define COB_SDO_ASK    0x600u /* + node: client to server */
-#define COB_HEARTBEAT  0x700u /* + node */
+#define COB_NMT          0x000u
+#define COB_SYNC         0x080u
+#define COB_EMCY         0x080u /* + node */
+#define COB_TPDO1        0x180u /* + node */
+#define COB_RPDO1        0x200u /* + node */
+#define COB_TPDO2        0x280u /* + node */
+#define COB_RPDO2        0x300u /* + node */
+#define COB_TPDO3        0x380u /* + node */
+#define COB_RPDO3        0x400u /* + node */
+#define COB_TPDO4        0x480u /* + node */
+#define COB_RPDO4        0x500u /* + node */
+#define COB_SDO_RESPONSE 0x580u /* + node: server to client */
+#define COB_SDO_REQUEST  0x600u /* + node: client to server */
+#define COB_HEARTBEAT    0x700u /* + node */
 
 #define NODE_ID_MIN 1u
 #define NODE_ID_MAX 127u
@@ -39,8 +39,8 @@ uint64_t cob_get(const uint8_t *from, uint32_t size);
 /* Stores the low `size` (0 ... 8) bytes of `value` at `to`, least significant first. */
 void cob_put(uint8_t *to, uint64_t value, uint32_t size);
 
-/* The same for what process data are made of, in the tick: written out, so that compilers make one load or store of it
- * where the core has unaligned ones. */
+/* The same for process data, in the tick. Written out, so that compilers make one load or store of each where the core
+ * has unaligned ones. */
 static inline uint16_t cob_get16(const uint8_t *from)
 {
     return (uint16_t)(from[0] | (uint32_t)from[1] << 8);

@@ -25,7 +25,8 @@ void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *e
     emcy_producer_forget(producer);
 }
 
-/* Room for the newest: the oldest of its code has nothing new to say, else the oldest of all goes. */
+/* Makes room for the newest: drops the oldest of the same code, which has the same information, else the oldest of
+ * all. */
 static void make_room(struct emcy_producer *producer, uint16_t code)
 {
     uint8_t victim = 0;

@@ -2,6 +2,9 @@
 /*
  * emcy: emergency messages (CiA 301, 7.2.7), error register 0x1001 and error history 0x1003. The controller and each
  * simulated drive have a producer. The controller reads messages of drives with emcy_decode. No I/O: the caller sends.
+ *
+ * All functions of one producer in one context: the main loop of the controller, the period of a simulated drive. The
+ * functions without a producer are pure, any context.
  */
 #ifndef CANOPEN_EMCY_H
 #define CANOPEN_EMCY_H
@@ -50,14 +53,13 @@ struct emcy {
     uint8_t detail[EMCY_DETAIL_SIZE]; /* manufacturer specific */
 };
 
-/* Producer. The values behind 0x1001 and 0x1003 belong to the object dictionary; the producer
- * writes them. A few messages wait in a queue for the port; when it is full the newest takes the
- * place of the oldest of the same code, else of the oldest: dropped from the bus, not from the
- * history. */
+/* Producer. The values of 0x1001 and 0x1003 belong to the object dictionary; the producer writes them. A few messages
+ * wait in a queue until the caller sends them. If it is full, the newest message replaces the oldest of the same code,
+ * or else the oldest of all. The replaced message is not sent, but stays in the history. */
 struct emcy_producer {
     uint8_t *error_register; /* 0x1001 */
-    uint32_t
-        *history; /* 0x1003 sub 1 ...: newest first; low half code, high half first detail bytes */
+    /* 0x1003 sub 1 ...: newest first; low half code, high half first detail bytes */
+    uint32_t *history;
     uint8_t *history_count; /* 0x1003 sub 0 */
     uint8_t history_size;
     uint8_t node;
@@ -69,23 +71,22 @@ struct emcy_producer {
 void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *error_register,
                         uint32_t *history, uint8_t *history_count, uint8_t history_size);
 
-/* A new error: sets `bits` (and the generic bit) in the error register, enters the history, queues
- * a message. `detail` may be NULL (zeros). Main loop, or the context of _process. */
+/* A new error: sets `bits` (and the generic bit) in the error register, enters the history, queues a message. `detail`
+ * may be NULL (zeros). */
 void emcy_producer_raise(struct emcy_producer *producer, uint16_t code, uint8_t bits,
                          const uint8_t detail[EMCY_DETAIL_SIZE]);
 
-/* Errors of `bits` are gone: clears them; when no error is left, also the generic bit, and queues
- * "no error" (0x0000). */
+/* The errors of `bits` have ended: clears these bits. With the last error it also clears the generic bit and queues "no
+ * error" (0x0000). */
 void emcy_producer_clear(struct emcy_producer *producer, uint8_t bits);
 
 /* The client wrote 0 to 0x1003 sub 0 (CiA 301: other values are refused with SDO_ABORT_VALUE). */
 void emcy_producer_forget(struct emcy_producer *producer);
 
-/* Returns true when *out is to be sent. */
+/* Takes the next message of the queue: true, and *out is to be sent. False: the queue is empty. */
 bool emcy_producer_process(struct emcy_producer *producer, struct can_msg *out);
 
-/* Consumer: node (1 ... 127) and content of an EMCY frame, or 0 when `in` is none. Pure, any
- * context. */
+/* Consumer: node (1 ... 127) and content of an EMCY frame, or 0 when `in` is none. Pure, any context. */
 uint8_t emcy_decode(const struct can_msg *in, struct emcy *emcy);
 
 /* One English phrase for an error code, by its class when the code is not known; never NULL. Pure.

@@ -43,7 +43,7 @@ bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t pe
 void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, uint16_t time_ms)
 {
     consumer->time_us = time_ms * US_PER_MS;
-    consumer->silence_us = 0;
+    consumer->waited_us = 0;
     consumer->presence = HEARTBEAT_UNKNOWN;
     consumer->state = NMT_INITIALISING;
     consumer->node = node;
@@ -81,7 +81,7 @@ enum heartbeat_event heartbeat_consumer_receive(struct heartbeat_consumer *consu
     if (consumer->node == 0 || in->id != COB_HEARTBEAT + consumer->node || in->len != 1) {
         return HEARTBEAT_NOTHING;
     }
-    consumer->silence_us = 0;
+    consumer->waited_us = 0;
     consumer->state = state;
     if (state == NMT_INITIALISING) {
         /* A boot-up frame is no heartbeat: monitoring waits for the first one. */
@@ -98,8 +98,8 @@ enum heartbeat_event heartbeat_consumer_process(struct heartbeat_consumer *consu
     if (consumer->presence != HEARTBEAT_PRESENT || consumer->time_us == 0) {
         return HEARTBEAT_NOTHING;
     }
-    consumer->silence_us = add_saturating(consumer->silence_us, elapsed_us);
-    if (consumer->silence_us <= consumer->time_us) {
+    consumer->waited_us = add_saturating(consumer->waited_us, elapsed_us);
+    if (consumer->waited_us <= consumer->time_us) {
         return HEARTBEAT_NOTHING;
     }
     consumer->presence = HEARTBEAT_MISSING;

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* heartbeat: producer (0x1017) and consumer (0x1016) (CiA 301, 7.2.8.3.2.2). */
+/* heartbeat: sends the heartbeat of a node (producer, 0x1017) and monitors those of others (consumer, 0x1016); CiA 301,
+ * 7.2.8.3.2.2. Used by the controller and by each simulated node. No I/O: the caller sends.
+ *
+ * All functions of one struct in one context: main loop or timer. They change this struct only. */
 #ifndef CANOPEN_HEARTBEAT_H
 #define CANOPEN_HEARTBEAT_H
 
@@ -14,12 +17,10 @@ struct heartbeat_producer {
     uint8_t node;
 };
 
-/* Main loop or timer, one of them. */
 void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node);
 
-/* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in
- * INITIALISING. Returns true when *out is to be sent. Late calls give one frame, not several. Main loop
- * or timer, one of them. */
+/* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in INITIALISING. Returns
+ * true when *out is to be sent. Late calls give one frame, not several. */
 bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
                                 enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
 
@@ -37,10 +38,10 @@ enum heartbeat_presence {
     HEARTBEAT_MISSING
 };
 
-/* Watches one node. */
+/* Monitors one node. */
 struct heartbeat_consumer {
-    uint32_t time_us; /* of 0x1016; 0: not monitored, though states are still followed */
-    uint32_t silence_us;
+    uint32_t time_us;   /* of 0x1016; 0: not monitored, but its states are taken */
+    uint32_t waited_us; /* since the last heartbeat */
     enum heartbeat_presence presence;
     enum nmt_state state; /* last one received */
     uint8_t node;
@@ -51,16 +52,15 @@ void heartbeat_consumer_init(struct heartbeat_consumer *consumer, uint8_t node, 
 /* Splits an entry of 0x1016 (CiA 301: bits 16 ... 23 node, 0 ... 15 time in ms). */
 void heartbeat_consumer_init_entry(struct heartbeat_consumer *consumer, uint32_t entry);
 
-/* Whether another of `count` entries watches the node of this one, which is to be entry `at`: CiA 301 allows only
- * one. */
+/* Whether another of `count` entries monitors the node of this one, which is to be entry `at`: CiA 301 allows only
+ * one. Pure. */
 bool heartbeat_entry_taken(const uint32_t *entries, uint8_t count, uint8_t at, uint32_t entry);
 
-/* Takes a frame; others than this node's heartbeat give HEARTBEAT_NOTHING. Same context as
- * _process. */
+/* Takes a frame; all frames except this node's heartbeat give HEARTBEAT_NOTHING. */
 enum heartbeat_event heartbeat_consumer_receive(struct heartbeat_consumer *consumer,
                                                 const struct can_msg *in);
 
-/* Lets time pass; HEARTBEAT_LOST once when it was too much. */
+/* Lets time pass; HEARTBEAT_LOST once when the consumer time is over. */
 enum heartbeat_event heartbeat_consumer_process(struct heartbeat_consumer *consumer,
                                                 uint32_t elapsed_us);
 

@@ -2,6 +2,9 @@
 /*
  * nmt: network management (CiA 301, 7.2.8 and 7.3.2): the state machine of a slave, and the frames of the master's
  * commands. The controller is master and slave, each simulated drive a slave. No I/O: the caller sends.
+ *
+ * A slave is used by the receive interrupt (nmt_slave_receive) and the main loop (all other functions); both may run at
+ * any time, because the shared fields are single words. The other functions are pure, any context.
  */
 #ifndef CANOPEN_NMT_H
 #define CANOPEN_NMT_H
@@ -37,8 +40,8 @@ enum nmt_error_behaviour {
 /* Called by nmt_slave_process. Each may be NULL. */
 struct nmt_hooks {
     void (*reset_node)(void *context); /* all values back to power-on, then communication */
-    void (*reset_communication)(
-        void *context); /* communication objects 0x1000 ... 0x1FFF back to power-on */
+    /* Communication objects 0x1000 ... 0x1FFF back to power-on. */
+    void (*reset_communication)(void *context);
     void (*changed)(void *context, enum nmt_state state);
 };
 
@@ -64,15 +67,15 @@ bool nmt_slave_receive(struct nmt_slave *slave, const struct can_msg *in);
  * Returns true when *out is to be sent. Main loop. */
 bool nmt_slave_process(struct nmt_slave *slave, struct can_msg *out);
 
-/* A communication error (heartbeat of the master lost, bus off): `behaviour` is the value of
- * 0x1029 sub 1, enum nmt_error_behaviour. Main loop. */
+/* A communication error (heartbeat of the master lost, bus off): `behaviour` is the value of 0x1029 sub 1, enum
+ * nmt_error_behaviour. Main loop. */
 void nmt_slave_error(struct nmt_slave *slave, uint8_t behaviour);
 
-/* Which services a state permits (CiA 301, table 39). Pure. */
+/* Which services a state permits (CiA 301, table 39). */
 bool nmt_permits_sdo(enum nmt_state state); /* SDO, also SYNC, EMCY: pre-operational, operational */
 bool nmt_permits_pdo(enum nmt_state state); /* operational only */
 
-/* The master's command frame; node 0 means all nodes. Any context. */
+/* The master's command frame; node 0 means all nodes. */
 void nmt_master_command(enum nmt_command command, uint8_t node, struct can_msg *out);
 
 #endif

@@ -11,10 +11,10 @@
  *     od_init(&od, &od_controller_table, &values, &hooks, app);
  *
  * By hooks the application computes a value when it is read, refuses a write, is notified of a write, and moves DOMAIN
- * data. Each hook may be NULL and runs in the context of the caller (SDO: main loop). The read hook should copy fields of
- * 64 bits that another context writes, under the port's lock, because the processor loads them in two instructions.
+ * data. Each hook may be NULL and runs in the context of the caller (SDO: main loop). The read hook should copy fields
+ * of 64 bits that another context writes, under the port's lock, because the processor loads them in two instructions.
  *
- * od_find, od_size are pure. The rest: main loop.
+ * od_find, od_size are pure. All other functions: main loop, if not stated otherwise.
  */
 #ifndef CANOPEN_OD_H
 #define CANOPEN_OD_H
@@ -47,7 +47,7 @@ enum od_type {
 struct od_entry {
     uint32_t offset; /* of the value in the storage struct; 0 for a DOMAIN */
     uint16_t index;
-    uint16_t size; /* bytes; of a string: its room; of a DOMAIN: 0 */
+    uint16_t size; /* bytes; of a string: the most that it can have; of a DOMAIN: 0 */
     uint8_t sub;
     uint8_t type;   /* enum od_type */
     uint8_t access; /* OD_READ, OD_WRITE, OD_MAPPABLE */
@@ -75,9 +75,8 @@ struct od_hooks {
     /* Before a value is read: bring its field up to date. Not called for a DOMAIN. */
     uint32_t (*read)(void *context, const struct od_entry *entry);
 
-    /* Before a value is stored: `value` has `size` bytes as they came from the bus (numbers:
-     * little-endian; use cob_get). Type, size and range have been checked. An abort code refuses
-     * the write: nothing changes. */
+    /* Before a value is stored: `value` has `size` bytes as they came from the bus (numbers: little-endian; use
+     * cob_get). Type, size and range have been checked. An abort code refuses the write: nothing changes. */
     uint32_t (*write)(void *context, const struct od_entry *entry, const uint8_t *value,
                       uint32_t size);
 
@@ -88,7 +87,7 @@ struct od_hooks {
     /* After the new value is in its field. */
     void (*written)(void *context, const struct od_entry *entry);
 
-    /* A DOMAIN is to be downloaded: `size` bytes, 0 if the client did not say. */
+    /* A DOMAIN is to be downloaded: `size` bytes, 0 if the client announced none. */
     uint32_t (*domain_begin)(void *context, const struct od_entry *entry, uint32_t size);
 
     /* The next `size` bytes of it, at `offset`: each byte once, in order. */
@@ -99,8 +98,8 @@ struct od_hooks {
      */
     uint32_t (*domain_end)(void *context, const struct od_entry *entry, uint32_t size);
 
-    /* The download ended early (abort, timeout, reset), or a hook above refused it: forget the
-     * bytes. Follows each domain_begin that returned SDO_OK unless domain_end returned SDO_OK. */
+    /* The download ended early (abort, timeout, reset), or a hook above refused it: forget the bytes. Follows each
+     * domain_begin that returned SDO_OK unless domain_end returned SDO_OK. */
     void (*domain_abort)(void *context, const struct od_entry *entry);
 
     /* A DOMAIN is to be uploaded: set *size. It must not change until the upload has ended. */
@@ -125,8 +124,8 @@ void od_init(struct od *od, const struct od_table *table, void *storage,
 
 #define OD_FIRST_MANUFACTURER 0x2000u /* the first index that is no communication object */
 
-/* Gives the communication objects, those below OD_FIRST_MANUFACTURER, the values of the generated `od_<name>_defaults`, as
- * NMT reset communication asks for. Handlers are not called. */
+/* Gives the communication objects, those below OD_FIRST_MANUFACTURER, the values of the generated `od_<name>_defaults`,
+ * as NMT reset communication requires. Hooks are not called. */
 void od_reset_communication(struct od *od, const void *defaults);
 
 /* The entry (index, sub), or NULL. */

@@ -13,7 +13,7 @@ void od_transfer_init(struct od_transfer *t, struct od *od)
     t->od = od;
 }
 
-/* The transfer's entry, with the access that is wanted. */
+/* Finds the transfer's entry and checks the access. */
 static uint32_t find(struct od_transfer *t, uint16_t index, uint8_t sub, uint8_t access,
                      uint32_t refusal)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* od_transfer: writes or reads one object of a dictionary piece by piece. It joins the segments and blocks of sdo_server to
- * the object dictionary (canopen/od).
+/* od_transfer: writes or reads one object of a dictionary piece by piece. It joins the segments and blocks of
+ * sdo_server to the object dictionary (canopen/od).
  *
  *     write: od_transfer_begin_write, od_transfer_put as often as needed, od_transfer_finish_write
  *     read:  od_transfer_begin_read,  od_transfer_get as often as needed
@@ -23,12 +23,12 @@
 /* Longest value that is not a DOMAIN, in bytes. */
 #define OD_VALUE_MAX 64u
 
-/* Read `entry`, `size` and `moved`; the rest is private. */
+/* Read `entry`, `size` and `moved`; all other fields are private. */
 struct od_transfer {
     struct od *od;
     const struct od_entry *entry; /* valid after a begin that gave SDO_OK */
     uint32_t size;  /* bytes; write: as announced, 0: not announced; read: of the whole */
-    uint32_t moved; /* write: bytes put so far; read: the caller's own count, 0 at the beginning */
+    uint32_t moved; /* write: bytes put; read: the caller's own count, 0 at the beginning */
     bool open;      /* a DOMAIN's domain_end or domain_abort is due */
     uint8_t value[OD_VALUE_MAX];
 };
@@ -39,7 +39,7 @@ void od_transfer_init(struct od_transfer *t, struct od *od);
 uint32_t od_transfer_begin_write(struct od_transfer *t, uint16_t index, uint8_t sub,
                                  uint32_t announced);
 
-/* The next `size` bytes. SDO_ABORT_TOO_LONG beyond what was announced, or what the value has room for. */
+/* The next `size` bytes. SDO_ABORT_TOO_LONG beyond the announced size, or the size of the value. */
 uint32_t od_transfer_put(struct od_transfer *t, const uint8_t *data, uint32_t size);
 
 /* All bytes are there: SDO_ABORT_TOO_SHORT when fewer than announced, else the result of the dictionary. */

@@ -31,8 +31,8 @@ struct pdo_actual {
 void pdo_encode_setpoint(uint8_t drive, const struct pdo_setpoint *setpoint, struct can_msg *out);
 int pdo_decode_setpoint(const struct can_msg *in, struct pdo_setpoint *setpoint);
 
-/* The same in steps, for a frame that is kept from tick to tick: identifier and length (with zeros) once; what has
- * changed of it. */
+/* The same in steps, for a frame that is kept from tick to tick: first identifier and length (with zeros), then in each
+ * tick only the values that have changed. */
 void pdo_begin_setpoint(uint8_t drive, struct can_msg *out);
 static inline void pdo_put_controlword(struct can_msg *out, uint16_t controlword)
 {
@@ -63,8 +63,8 @@ int pdo_decode_volts(const struct can_msg *in, int16_t *volts_mv);
 void pdo_encode_inputs(uint8_t drive, uint32_t inputs, struct can_msg *out);
 int pdo_decode_inputs(const struct can_msg *in, uint32_t *inputs);
 
-/* RPDO1 of an I/O module (CiA 401): 0x6200 subs 1, 2 (digital outputs 0 ... 7, 8 ... 15), 0x6411 subs 1, 2 ... (analogue
- * outputs): as many of them as are mapped, 8 bytes at most. */
+/* RPDO1 of an I/O module (CiA 401): 0x6200 subs 1, 2 (digital outputs 0 ... 7, 8 ... 15), 0x6411 subs 1, 2 ...
+ * (analogue outputs): as many of them as are mapped, 8 bytes at most. */
 struct pdo_outputs {
     uint16_t digital;
     const int16_t *analogue;

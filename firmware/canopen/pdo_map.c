@@ -68,19 +68,19 @@ void pdo_map_init(struct pdo_map *map, struct od *od, uint16_t index)
     map->index = index;
     take_communication(map);
     take_mapping(map);
-    pdo_map_rest(map);
+    pdo_map_restart(map);
 }
 
 bool pdo_map_written(struct pdo_map *map, const struct od_entry *entry)
 {
     if (entry->index == map->index) {
         take_communication(map);
-        pdo_map_rest(map);
+        pdo_map_restart(map);
         return true;
     }
     if (entry->index == map->index + TO_MAPPING) {
         take_mapping(map);
-        pdo_map_rest(map);
+        pdo_map_restart(map);
         return true;
     }
     return false;
@@ -263,7 +263,7 @@ static void field_load(const struct pdo_field *field, uint8_t *to)
     }
 }
 
-void pdo_map_rest(struct pdo_map *map)
+void pdo_map_restart(struct pdo_map *map)
 {
     map->waited_us = map->inhibit_us;
     map->syncs = 0;

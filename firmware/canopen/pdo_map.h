@@ -6,8 +6,8 @@
  * its EDS. This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
  * (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of 0x1400 ... are
  * received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object must be readable
- * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application updates
- * fields before packing, and checks received values when it uses them.
+ * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application
+ * updates fields before packing, and checks received values when it uses them.
  * 
  * Rules for writes, with their abort codes:
  *   COB-ID (sub 1)      another identifier while the PDO is valid (bit 31 clear), an identifier of
@@ -43,7 +43,7 @@ struct pdo_field {
     uint8_t size; /* bytes: 1, 2, 4, 8 */
 };
 
-/* Read `valid`, `cob_id`, `type` and `length`; the rest is private. */
+/* Read `valid`, `cob_id`, `type` and `length`; all other fields are private. */
 struct pdo_map {
     struct od *od;
     struct pdo_field fields[PDO_MAP_ENTRIES];
@@ -72,11 +72,11 @@ enum pdo_map_result {
  * after the od got its defaults. Both objects must exist. */
 void pdo_map_init(struct pdo_map *map, struct od *od, uint16_t index);
 
-/* An od write that is about to happen: SDO_OK when it is not about this PDO or permitted. */
+/* Checks a write to the dictionary: SDO_OK if it is permitted, or does not concern this PDO. */
 uint32_t pdo_map_write(const struct pdo_map *map, const struct od_entry *entry,
                        const uint8_t *value, uint32_t size);
 
-/* The write has happened. Returns true when it was about this PDO. */
+/* Applies a write that has been stored. Returns true if it concerns this PDO. */
 bool pdo_map_written(struct pdo_map *map, const struct od_entry *entry);
 
 /* Received PDOs: a frame; types 0 ... 240 wait for pdo_map_sync, others act at once. Longer frames
@@ -90,9 +90,9 @@ bool pdo_map_apply(struct pdo_map *map);
  * frame; it starts with the first frame, and anew with each. */
 bool pdo_map_overdue(struct pdo_map *map, uint32_t elapsed_us);
 
-/* Stops the deadline until the next frame; the counting of SYNCs and the comparison with what was
- * sent begin anew (on leaving or entering OPERATIONAL). */
-void pdo_map_rest(struct pdo_map *map);
+/* On leaving or entering OPERATIONAL: the event timer stops until the next frame; the count of SYNCs and the comparison
+ * with the content sent last begin anew. */
+void pdo_map_restart(struct pdo_map *map);
 
 /* Sent PDOs, at SYNC, fields up to date: returns true when *out is to be sent. */
 bool pdo_map_sync(struct pdo_map *map, struct can_msg *out);

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* sdo_abort: the abort codes of SDO transfers (CiA 301, table 22) that this project sends or
- * explains.
+/* sdo_abort: the abort codes of SDO transfers (CiA 301, table 22) that this project sends or explains, with their
+ * texts.
  *
- * 0 means success everywhere a function returns "an abort code".
+ * Used by SDO server and client, and by all hooks and handlers of the dictionaries, which return such a code; 0 means
+ * success. Constants, and one pure function for any context.
  */
 #ifndef CANOPEN_SDO_ABORT_H
 #define CANOPEN_SDO_ABORT_H
@@ -38,7 +39,7 @@
 #define SDO_ABORT_STATE        UINT32_C(0x08000022) /* ... in the present device state */
 #define SDO_ABORT_NO_DATA      UINT32_C(0x08000024) /* no data available */
 
-/* One English phrase for a code, never NULL ("unknown abort code" for others). Any context. */
+/* One English phrase for a code, never NULL ("unknown abort code" for others). */
 const char *sdo_abort_text(uint32_t code);
 
 #endif

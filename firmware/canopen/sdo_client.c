@@ -19,12 +19,12 @@
 #define ABORT        0x80u
 
 /* First bytes of requests: command specifiers. */
-#define ASK_DOWNLOAD         0x20u
-#define ASK_DOWNLOAD_SEGMENT 0x00u
-#define ASK_UPLOAD           0x40u
-#define ASK_UPLOAD_SEGMENT   0x60u
+#define REQUEST_DOWNLOAD         0x20u
+#define REQUEST_DOWNLOAD_SEGMENT 0x00u
+#define REQUEST_UPLOAD           0x40u
+#define REQUEST_UPLOAD_SEGMENT   0x60u
 
-/* Command specifiers of answers, bits 5 ... 7. */
+/* Command specifiers of responses, bits 5 ... 7. */
 #define SPECIFIER               0xE0u
 #define ANSWER_DOWNLOAD         0x60u
 #define ANSWER_DOWNLOAD_SEGMENT 0x20u
@@ -42,15 +42,16 @@ void sdo_client_init(struct sdo_client *client, uint32_t timeout_us)
 }
 
 /* An empty request with this first byte. */
-static void ask(const struct sdo_client *client, uint8_t command, struct can_msg *out)
+static void make_request(const struct sdo_client *client, uint8_t command, struct can_msg *out)
 {
-    cob_frame(out, COB_SDO_ASK + client->node, SDO_BYTES);
+    cob_frame(out, COB_SDO_REQUEST + client->node, SDO_BYTES);
     out->data[0] = command;
 }
 
-static void ask_about_object(const struct sdo_client *client, uint8_t command, struct can_msg *out)
+static void make_object_request(const struct sdo_client *client, uint8_t command,
+                                struct can_msg *out)
 {
-    ask(client, command, out);
+    make_request(client, command, out);
     cob_put(out->data + 1, client->index, 2);
     out->data[3] = client->sub;
 }
@@ -69,7 +70,7 @@ static int begin(struct sdo_client *client, uint8_t node, uint16_t index, uint8_
     client->index = index;
     client->sub = sub;
     client->abort_code = SDO_OK;
-    client->silence_us = 0;
+    client->waited_us = 0;
     client->moved = 0;
     client->toggle = 0;
     client->empty_segments = 0;
@@ -87,7 +88,7 @@ int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, ui
     client->source = data;
     client->size = size;
     client->step = SDO_CLIENT_DOWNLOAD;
-    ask_about_object(client, ASK_DOWNLOAD | SIZE_GIVEN, out);
+    make_object_request(client, REQUEST_DOWNLOAD | SIZE_GIVEN, out);
     if (size <= EXPEDITED_BYTES) {
         out->data[0] |= (uint8_t)(EXPEDITED | ((EXPEDITED_BYTES - size) << 2));
         memcpy(out->data + 4, data, size);
@@ -110,7 +111,7 @@ int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uin
     client->capacity = capacity;
     client->size = 0;
     client->step = SDO_CLIENT_UPLOAD;
-    ask_about_object(client, ASK_UPLOAD, out);
+    make_object_request(client, REQUEST_UPLOAD, out);
     return 0;
 }
 
@@ -150,7 +151,7 @@ bool sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg 
     }
     client->status = SDO_CLIENT_FAILED;
     client->abort_code = code;
-    ask_about_object(client, ABORT, out);
+    make_object_request(client, ABORT, out);
     cob_put(out->data + 4, code, 4);
     return true;
 }
@@ -160,8 +161,8 @@ bool sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct c
     if (client->status != SDO_CLIENT_BUSY) {
         return false;
     }
-    client->silence_us += elapsed_us < client->timeout_us ? elapsed_us : client->timeout_us;
-    return client->silence_us >= client->timeout_us &&
+    client->waited_us += elapsed_us < client->timeout_us ? elapsed_us : client->timeout_us;
+    return client->waited_us >= client->timeout_us &&
            sdo_client_cancel(client, SDO_ABORT_TIMEOUT, out);
 }
 
@@ -180,20 +181,20 @@ static bool send_segment(struct sdo_client *client, struct can_msg *out)
     if (left == 0) {
         return done(client);
     }
-    ask(client,
-        (uint8_t)(ASK_DOWNLOAD_SEGMENT | client->toggle | ((SEGMENT_BYTES - size) << 1) |
-                  (size == left ? LAST_SEGMENT : 0u)),
-        out);
+    make_request(client,
+                 (uint8_t)(REQUEST_DOWNLOAD_SEGMENT | client->toggle |
+                           ((SEGMENT_BYTES - size) << 1) | (size == left ? LAST_SEGMENT : 0u)),
+                 out);
     memcpy(out->data + 1, client->source + client->moved, size);
     client->moved += size;
     client->step = SDO_CLIENT_DOWNLOAD_SEGMENT;
     return true;
 }
 
-static bool ask_segment(struct sdo_client *client, struct can_msg *out)
+static bool request_segment(struct sdo_client *client, struct can_msg *out)
 {
     client->step = SDO_CLIENT_UPLOAD_SEGMENT;
-    ask(client, (uint8_t)(ASK_UPLOAD_SEGMENT | client->toggle), out);
+    make_request(client, (uint8_t)(REQUEST_UPLOAD_SEGMENT | client->toggle), out);
     return true;
 }
 
@@ -211,7 +212,7 @@ static bool take(struct sdo_client *client, const uint8_t *data, uint32_t size, 
 static bool answer_upload(struct sdo_client *client, const uint8_t *data, struct can_msg *out)
 {
     if ((data[0] & EXPEDITED) == 0) {
-        return ask_segment(client, out);
+        return request_segment(client, out);
     }
     uint32_t unused = (data[0] & SIZE_GIVEN) != 0 ? (data[0] >> 2) & 3u : 0;
     return take(client, data + 4, EXPEDITED_BYTES - unused, out) || done(client);
@@ -233,7 +234,7 @@ static bool answer_upload_segment(struct sdo_client *client, const uint8_t *data
         return sdo_client_cancel(client, SDO_ABORT_NO_DATA, out);
     }
     client->toggle ^= TOGGLE;
-    return ask_segment(client, out);
+    return request_segment(client, out);
 }
 
 static bool is_about_object(const struct sdo_client *client, const uint8_t *data)
@@ -255,7 +256,7 @@ static uint8_t specifier_due(enum sdo_client_step step)
     }
 }
 
-/* An abort code when `data` is not the answer that is due. */
+/* An abort code when `data` is not the response that is due. */
 static uint32_t check(const struct sdo_client *client, const uint8_t *data)
 {
     const bool segment =
@@ -267,8 +268,7 @@ static uint32_t check(const struct sdo_client *client, const uint8_t *data)
     return !segment || (data[0] & TOGGLE) == client->toggle ? SDO_OK : SDO_ABORT_TOGGLE;
 }
 
-/* Late words about an earlier transfer. Aborts of object 0 come from servers that do not know it.
- */
+/* Late responses to an earlier transfer. Aborts of object 0 come from servers that do not know the object. */
 static bool is_stale(const struct sdo_client *client, const uint8_t *data)
 {
     bool names_object = client->step == SDO_CLIENT_DOWNLOAD || client->step == SDO_CLIENT_UPLOAD;
@@ -298,7 +298,7 @@ bool sdo_client_receive(struct sdo_client *client, const struct can_msg *in, str
 {
     uint32_t code;
 
-    if (client->status != SDO_CLIENT_BUSY || in->id != COB_SDO_ANSWER + client->node ||
+    if (client->status != SDO_CLIENT_BUSY || in->id != COB_SDO_RESPONSE + client->node ||
         in->len != SDO_BYTES || is_stale(client, in->data)) {
         return false;
     }
@@ -307,7 +307,7 @@ bool sdo_client_receive(struct sdo_client *client, const struct can_msg *in, str
         client->abort_code = (uint32_t)cob_get(in->data + 4, 4);
         return false;
     }
-    client->silence_us = 0;
+    client->waited_us = 0;
     code = check(client, in->data);
     return code != SDO_OK ? sdo_client_cancel(client, code, out) : go_on(client, in->data, out);
 }

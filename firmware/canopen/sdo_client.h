@@ -28,7 +28,7 @@ enum sdo_client_status {
 #define SDO_CLIENT_ERR_BUSY     (-1)
 #define SDO_CLIENT_ERR_ARGUMENT (-2)
 
-/* The answer that is due. */
+/* The response that is due. */
 enum sdo_client_step {
     SDO_CLIENT_DOWNLOAD,
     SDO_CLIENT_DOWNLOAD_SEGMENT,
@@ -39,10 +39,10 @@ enum sdo_client_step {
 struct sdo_client {
     enum sdo_client_status status;
     enum sdo_client_step step;
-    uint32_t abort_code; /* of REFUSED and FAILED */
-    uint32_t size;       /* bytes of the value; read: known when DONE */
-    uint32_t timeout_us; /* for each answer */
-    uint32_t silence_us;
+    uint32_t abort_code;   /* of REFUSED and FAILED */
+    uint32_t size;         /* bytes of the value; read: known when DONE */
+    uint32_t timeout_us;   /* for each answer */
+    uint32_t waited_us;    /* for the response that is due */
     const uint8_t *source; /* write */
     uint8_t *target;       /* read */
     uint32_t capacity;
@@ -51,15 +51,15 @@ struct sdo_client {
     uint8_t sub;
     uint8_t node;
     uint8_t toggle;
-    uint8_t empty_segments; /* read: in a row; a server that goes on so is given up */
+    uint8_t empty_segments; /* read: in a row; after too many the transfer ends */
     uint8_t number[8];      /* of the _number calls */
 };
 
 void sdo_client_init(struct sdo_client *client, uint32_t timeout_us);
 
-/* Begin a transfer: fill *out with the request, which is to be sent, and return 0; or a negative error with
- * nothing changed: a transfer is under way, node not 1 ... 127, size 0. `data` and `buffer` must
- * stay until status is not BUSY. */
+/* Begin a transfer: fill *out with the request, which is to be sent, and return 0; or a negative error with nothing
+ * changed: a transfer is under way, node not 1 ... 127, size 0. `data` and `buffer` must stay until status is not
+ * BUSY. */
 int sdo_client_write(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
                      const uint8_t *data, uint32_t size, struct can_msg *out);
 int sdo_client_read(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
@@ -71,20 +71,19 @@ int sdo_client_write_number(struct sdo_client *client, uint8_t node, uint16_t in
 int sdo_client_read_number(struct sdo_client *client, uint8_t node, uint16_t index, uint8_t sub,
                            struct can_msg *out);
 
-/* The number that sdo_client_read_number brought (status DONE), as unsigned and as two's complement
- * of its size. */
+/* The number that sdo_client_read_number has read (status DONE), as unsigned and as two's complement of its size. */
 uint64_t sdo_client_unsigned(const struct sdo_client *client);
 int64_t sdo_client_signed(const struct sdo_client *client);
 
-/* Takes a frame; others, and late answers about another object, are ignored. Returns true when *out is
- * to be sent. */
+/* Takes a frame; ignores all except SDO responses, and late responses for another object. Returns true when *out is to
+ * be sent. */
 bool sdo_client_receive(struct sdo_client *client, const struct can_msg *in, struct can_msg *out);
 
 /* Lets time pass. Returns true when *out (an abort after a timeout) is to be sent. */
 bool sdo_client_process(struct sdo_client *client, uint32_t elapsed_us, struct can_msg *out);
 
-/* Gives the transfer up: status FAILED with `code`. Returns true when *out (the abort) is to be sent;
- * false when there was none. */
+/* Aborts the transfer: status FAILED with `code`. Returns true when *out (the abort) is to be sent; false when there
+ * was no transfer. */
 bool sdo_client_cancel(struct sdo_client *client, uint32_t code, struct can_msg *out);
 
 #endif

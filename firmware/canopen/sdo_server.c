@@ -30,17 +30,17 @@ enum client_command {
 #define LAST_IN_BLOCK 0x80u
 
 /* First bytes of the client: bits within a command. Those of a subcommand are 0 where a block transfer is initiated. */
-#define ASK_EXPEDITED             0x02u
-#define ASK_SIZE_GIVEN            0x01u
-#define EXPEDITED_BYTE            0x2Fu /* initiate download: expedited, one byte */
-#define CRC_SUPPORTED             0x04u
-#define ASK_BLOCK_SIZE_GIVEN      0x02u
-#define BLOCK_DOWNLOAD_SUBCOMMAND 0x01u
-#define ASK_DOWNLOAD_END          0x01u
-#define BLOCK_UPLOAD_SUBCOMMAND   0x03u
-#define ASK_UPLOAD_END            0x01u
-#define ASK_UPLOAD_ACKNOWLEDGE    0x02u
-#define ASK_UPLOAD_START          0x03u
+#define REQUEST_EXPEDITED          0x02u
+#define REQUEST_SIZE_GIVEN         0x01u
+#define EXPEDITED_BYTE             0x2Fu /* initiate download: expedited, one byte */
+#define CRC_SUPPORTED              0x04u
+#define REQUEST_BLOCK_SIZE_GIVEN   0x02u
+#define BLOCK_DOWNLOAD_SUBCOMMAND  0x01u
+#define REQUEST_DOWNLOAD_END       0x01u
+#define BLOCK_UPLOAD_SUBCOMMAND    0x03u
+#define REQUEST_UPLOAD_END         0x01u
+#define REQUEST_UPLOAD_ACKNOWLEDGE 0x02u
+#define REQUEST_UPLOAD_START       0x03u
 
 /* First bytes of the server. */
 #define ABORT_BYTE                0x80u
@@ -77,7 +77,7 @@ static uint32_t begin_read(struct sdo_server *s)
 
 static void frame(const struct sdo_server *s, uint8_t command, struct can_msg *out)
 {
-    cob_frame(out, COB_SDO_ANSWER + s->node, SDO_BYTES);
+    cob_frame(out, COB_SDO_RESPONSE + s->node, SDO_BYTES);
     out->data[0] = command;
 }
 
@@ -107,7 +107,7 @@ static uint32_t download_expedited(struct sdo_server *s, const uint8_t *data)
     if (code != SDO_OK) {
         return code;
     }
-    if ((data[0] & ASK_SIZE_GIVEN) == 0) {
+    if ((data[0] & REQUEST_SIZE_GIVEN) == 0) {
         /* The client leaves it to the dictionary how many of the four bytes count. */
         size = s->object.entry->size > 0 && s->object.entry->size < EXPEDITED_BYTES
                    ? s->object.entry->size
@@ -119,13 +119,14 @@ static uint32_t download_expedited(struct sdo_server *s, const uint8_t *data)
 
 static bool download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
-    bool expedited = (data[0] & ASK_EXPEDITED) != 0;
+    bool expedited = (data[0] & REQUEST_EXPEDITED) != 0;
     uint32_t code;
 
     if (expedited) {
         code = download_expedited(s, data);
     } else {
-        code = begin_write(s, (data[0] & ASK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0);
+        code = begin_write(s, (data[0] & REQUEST_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4)
+                                                                  : 0);
     }
     if (code != SDO_OK) {
         return fail(s, code, out);
@@ -225,7 +226,7 @@ uint16_t sdo_block_crc(uint16_t crc, const uint8_t *data, uint32_t size)
 
 static bool block_download_initiate(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
-    uint32_t size = (data[0] & ASK_BLOCK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0;
+    uint32_t size = (data[0] & REQUEST_BLOCK_SIZE_GIVEN) != 0 ? (uint32_t)cob_get(data + 4, 4) : 0;
     uint32_t code = begin_write(s, size);
 
     if (code != SDO_OK) {
@@ -273,7 +274,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
     bool block_ends = last || sequence == s->block_limit;
 
     if (sequence != 0 && sequence == s->sequence) {
-        /* Doubled on the bus, or one of the two is somebody else's. */
+        /* Doubled on the bus, or one of the two is from another client. */
         return memcmp(s->last, data + 1, SEGMENT_BYTES) != 0 && fail(s, SDO_ABORT_SEQUENCE, out);
     }
     s->received = block_ends ? 0 : sequence;
@@ -294,7 +295,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
         return false;
     }
     if (!in_order && s->acknowledged_early) {
-        return false; /* the rest of a block that paused: it has its answer */
+        return false; /* remaining segments of a block that paused: the response was sent */
     }
     if (in_order && last) {
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
@@ -302,7 +303,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
     return block_download_acknowledge(s, out);
 }
 
-/* While idle: true for each segment that is left of a block whose transfer the server broke off. */
+/* While idle: true for each remaining segment of a block whose transfer the server has aborted. */
 static bool block_download_late_segment(struct sdo_server *s, const uint8_t *data)
 {
     uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
@@ -316,7 +317,7 @@ static bool block_download_late_segment(struct sdo_server *s, const uint8_t *dat
 static bool block_download_end(struct sdo_server *s, const uint8_t *data, struct can_msg *out)
 {
     uint32_t unused = (data[0] >> 2) & 7u;
-    uint32_t code = (data[0] & ASK_DOWNLOAD_END) != 0 ? SDO_OK : SDO_ABORT_COMMAND;
+    uint32_t code = (data[0] & REQUEST_DOWNLOAD_END) != 0 ? SDO_OK : SDO_ABORT_COMMAND;
 
     if (code == SDO_OK) {
         code = release_held(s, SEGMENT_BYTES - unused);
@@ -432,16 +433,16 @@ static bool block_upload_command(struct sdo_server *s, const uint8_t *data, stru
 {
     uint8_t subcommand = data[0] & BLOCK_UPLOAD_SUBCOMMAND;
 
-    if (s->state == SDO_SERVER_BLOCK_UPLOAD_READY && subcommand == ASK_UPLOAD_START) {
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_READY && subcommand == REQUEST_UPLOAD_START) {
         s->state = SDO_SERVER_BLOCK_UPLOAD;
         return block_upload_send(s, out);
     }
-    /* A client that sees a gap may answer before the block is complete. */
+    /* A client that detects a gap may answer before the block is complete. */
     if ((s->state == SDO_SERVER_BLOCK_UPLOAD_ACK || s->state == SDO_SERVER_BLOCK_UPLOAD) &&
-        subcommand == ASK_UPLOAD_ACKNOWLEDGE) {
+        subcommand == REQUEST_UPLOAD_ACKNOWLEDGE) {
         return block_upload_acknowledged(s, data, out);
     }
-    if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == ASK_UPLOAD_END) {
+    if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == REQUEST_UPLOAD_END) {
         s->state = SDO_SERVER_IDLE;
         return false;
     }
@@ -469,10 +470,10 @@ void sdo_server_reset(struct sdo_server *server)
 
 bool sdo_server_wants(const struct sdo_server *server, const struct can_msg *in)
 {
-    return in->id == COB_SDO_ASK + server->node && in->len == SDO_BYTES;
+    return in->id == COB_SDO_REQUEST + server->node && in->len == SDO_BYTES;
 }
 
-/* Forgets a transfer under way and notes the object of the new one. */
+/* Drops a transfer under way and stores the object of the new one. */
 static void begin(struct sdo_server *s, const uint8_t *data)
 {
     drop(s);
@@ -538,7 +539,7 @@ static bool go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out
     }
 }
 
-/* A request by all its bits, for an object that there is: few segments that have such a first byte look like one. */
+/* A request by all its bits, for an existing object: few segments with such a first byte have this form. */
 static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t first = data[0];
@@ -548,9 +549,9 @@ static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
     return known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
 }
 
-/* Within a block: no segment of this client, by its number. (After a loss one of its segments may look like this, if
- * its bytes are those of a request.) */
-static bool is_strange(const struct sdo_server *s, const uint8_t *data)
+/* Within a block: by its number not a segment of this client. (After a loss this may also be one of its segments, if
+ * its bytes have the form of a request.) */
+static bool is_foreign(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t sequence = data[0] & (uint8_t)~LAST_IN_BLOCK;
     const bool doubled = sequence == s->sequence && sequence != 0u;
@@ -564,16 +565,16 @@ static bool same_object(const struct sdo_server *s, const uint8_t *data)
     return cob_get(data + 1, 2) == s->index && data[3] == s->sub;
 }
 
-/* The client of this transfer has lost the answer to its first request. */
+/* The client of this transfer has lost the response to its first request. */
 static bool begins_again(const struct sdo_server *s, const uint8_t *data)
 {
     return same_object(s, data) && s->object.moved == 0 && s->held == 0;
 }
 
-/* The same within a block, where a segment may look like it. */
+/* The same within a block, where a segment may have the same form. */
 static bool restarts(const struct sdo_server *s, const uint8_t *data)
 {
-    return begins_again(s, data) && is_strange(s, data);
+    return begins_again(s, data) && is_foreign(s, data);
 }
 
 static bool refuse_other_client(const struct sdo_server *s, const uint8_t *data,
@@ -585,7 +586,7 @@ static bool refuse_other_client(const struct sdo_server *s, const uint8_t *data,
     return true;
 }
 
-/* The entry of a write that waits for nobody; NULL: it is another frame. */
+/* The entry of an urgent write; NULL: the frame is not one. */
 static const struct od_entry *urgent_entry(const struct sdo_server *s, const uint8_t *data)
 {
     const bool whole = data[5] == 0u && data[6] == 0u && data[7] == 0u;
@@ -597,9 +598,9 @@ static const struct od_entry *urgent_entry(const struct sdo_server *s, const uin
     return taken && s->object.od->hooks->urgent(entry, data[4]) ? entry : NULL;
 }
 
-/* Beside the transfer under way, which is not touched. */
-static bool write_beside(const struct sdo_server *s, const struct od_entry *entry,
-                         const uint8_t *data, struct can_msg *out)
+/* Executes a write during the transfer under way, which does not change. */
+static bool write_meanwhile(const struct sdo_server *s, const struct od_entry *entry,
+                            const uint8_t *data, struct can_msg *out)
 {
     const uint32_t code = od_write(s->object.od, entry, data + 4, 1);
     frame(s, code == SDO_OK ? DOWNLOADED_BYTE : ABORT_BYTE, out);
@@ -616,7 +617,7 @@ static bool from_other_client(const struct sdo_server *s, const uint8_t *data)
     if (data[0] == ABORT_BYTE) {
         return false;
     }
-    return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_strange(s, data) : is_initiate(data);
+    return s->state == SDO_SERVER_BLOCK_DOWNLOAD ? is_foreign(s, data) : is_initiate(data);
 }
 
 /* Another client that gives up its own transfer does not end this one. */
@@ -637,12 +638,12 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     const struct od_entry *urgent =
         server->state == SDO_SERVER_IDLE ? NULL : urgent_entry(server, in->data);
     if (urgent != NULL) {
-        return write_beside(server, urgent, in->data, out);
+        return write_meanwhile(server, urgent, in->data, out);
     }
     if (from_other_client(server, in->data)) {
         return refuse_other_client(server, in->data, out);
     }
-    server->silence_us = 0;
+    server->waited_us = 0;
     /* A whole byte: within a block, 0x81 ... 0xFF are last segments. */
     if (in->data[0] == ABORT_BYTE) {
         take_abort(server, in->data);
@@ -660,13 +661,13 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     return go_on(server, in->data, out);
 }
 
-/* A block whose last segment was lost is answered before the client gives up, once. Not when no
- * segment of it has come: a client that only paused would then send the whole block twice. */
+/* A block whose last segment was lost is acknowledged once before the client's timeout. Not if no segment of it has
+ * come: a client that only paused would then send the whole block twice. */
 static bool acknowledge_early(struct sdo_server *s, struct can_msg *out)
 {
     const bool begun = s->sequence != 0 || (s->received != 0 && !s->acknowledged_early);
 
-    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->silence_us < s->timeout_us / 2) {
+    if (s->state != SDO_SERVER_BLOCK_DOWNLOAD || !begun || s->waited_us < s->timeout_us / 2) {
         return false;
     }
     s->acknowledged_early = true;
@@ -679,12 +680,12 @@ bool sdo_server_process(struct sdo_server *server, uint32_t elapsed_us, struct c
         return false;
     }
     if (server->state == SDO_SERVER_BLOCK_UPLOAD) {
-        server->silence_us = 0; /* it is the server that talks */
+        server->waited_us = 0; /* the server sends, so no frame of the client is due */
         return block_upload_send(server, out);
     }
-    server->silence_us =
-        elapsed_us > UINT32_MAX - server->silence_us ? UINT32_MAX : server->silence_us + elapsed_us;
-    if (server->silence_us >= server->timeout_us) {
+    server->waited_us =
+        elapsed_us > UINT32_MAX - server->waited_us ? UINT32_MAX : server->waited_us + elapsed_us;
+    if (server->waited_us >= server->timeout_us) {
         return fail(server, SDO_ABORT_TIMEOUT, out);
     }
     return acknowledge_early(server, out);

@@ -6,15 +6,15 @@
 #include "core/stop_check.h"
 
 #define STEPS 16 /* of a brake, about */
-#define MOST_STEPS                                                                                 \
-    160 /* of a brake, until the remaining states must be within the limits as a whole */
-#define MOST_HALVINGS   3     /* of a step */
-#define MOST_PARTS      14    /* of a piece at a time */
-#define MOST_LOOKS      3000  /* at a stretch of a brake, for a piece and kind, */
-#define LOOKS_PER_S     30000 /* and more for a long piece */
-#define LOW_RATES       4     /* halvings of the rate of the lowest level, each by itself */
-#define PIECE_SLACK_Q40 ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
-#define Q40_BITS        62
+/* of a brake, until the remaining states must be within the limits as a whole */
+#define MOST_STEPS        160
+#define MOST_HALVINGS     3     /* of a step */
+#define MOST_PARTS        14    /* of a piece at a time */
+#define MOST_EVALUATIONS  3000  /* of stretches of brakes, for a piece and kind, */
+#define EVALUATIONS_PER_S 30000 /* and more for a long piece */
+#define LOW_RATES         4     /* halvings of the rate of the lowest level, each by itself */
+#define PIECE_SLACK_Q40   ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
+#define Q40_BITS          62
 
 static const struct real zero = {0, 0};
 
@@ -44,9 +44,9 @@ struct part {
 struct flow {
     const struct numbers *own;
     struct states at;
-    struct span begin;  /* accelerations at the begin, */
+    struct span begin;  /* accelerations at the start, */
     struct real least;  /* and the least at any time; */
-    struct real lowest; /* the least so far */
+    struct real lowest; /* the least up to now */
     struct real slow;   /* least jerk of the release phase; 0: not known */
     struct real period_s;
     struct span late_s; /* when the acceleration begins to fall: at least, at most */
@@ -137,8 +137,8 @@ static int within(struct span value, struct real limit)
     return limit.m == 0 || real_less(limit, real_max(real_negative(value.low), value.high)) == 0;
 }
 
-/* With derivatives c1, c2, c3 of an axis by arc length: velocity c1 v, acceleration c2 v^2 + c1 a, jerk c3 v^3 + 3 c2 v a + c1 j.
- * All combinations of states and jerks, on all of their stretch. */
+/* With derivatives c1, c2, c3 of an axis by arc length: velocity c1 v, acceleration c2 v^2 + c1 a, jerk c3 v^3 + 3 c2 v
+ * a + c1 j. All combinations of states and jerks, on all of their stretch. */
 static int keeps_on(const struct brake_check *check, const struct path_stretch *path,
                     const struct states *at, struct span jerk)
 {
@@ -159,7 +159,7 @@ static int keeps_on(const struct brake_check *check, const struct path_stretch *
 
 static void path_of(struct brake_check *check, const struct states *at, struct path_stretch *path)
 {
-    check->looks++;
+    check->evaluations++;
     path_bounds_of(&check->bounds, check->hint, at->low_q40_mm, at->high_q40_mm, path);
 }
 
@@ -194,8 +194,8 @@ static struct real least_release(const struct flow *flow)
     return real_div(real_mul(flow->own->up, steady), most);
 }
 
-/* The speed that the jerk of the onset makes in a tick, times 2: by so much a brake may lose less whose last tick before the
- * release phase has no jerk. */
+/* The speed that the jerk of the onset makes in a tick, times 2: a brake whose last tick before the release phase has
+ * no jerk may lose less speed by this much. */
 static struct real tick_change(const struct flow *flow)
 {
     return real_mul(flow->own->down, square(flow->period_s));
@@ -307,12 +307,12 @@ static int none_releases(const struct flow *flow, const struct states *swept)
 }
 
 /* By how much an acceleration may be above that of the onset, in the tick without jerk before the release phase. */
-static struct real still_tick(const struct flow *flow, const struct states *swept)
+static struct real jerkless_tick(const struct flow *flow, const struct states *swept)
 {
     return none_releases(flow, swept) != 0 ? zero : real_mul(flow->own->down, flow->period_s);
 }
 
-/* One step on: `swept` are all states on the way there. */
+/* One step on: `swept` are all states during the step. */
 static void flow_step(struct flow *flow, struct real step_s, struct states *swept)
 {
     const struct span v = flow->at.v;
@@ -337,7 +337,7 @@ static void flow_step(struct flow *flow, struct real step_s, struct states *swep
     swept->a.low =
         real_max(onset_low(flow, later_s), release(flow->own->up, real_root(swept->v.high)));
     swept->a.low = real_max(swept->a.low, flow->least);
-    swept->a.high = real_max(real_add(onset_high(flow, flow->time_s), still_tick(flow, swept)),
+    swept->a.high = real_max(real_add(onset_high(flow, flow->time_s), jerkless_tick(flow, swept)),
                              release(flow->slow, real_root(swept->v.low)));
     at->a.low = swept->a.low;
     flow->lowest = real_min(flow->lowest, swept->a.low);
@@ -345,8 +345,8 @@ static void flow_step(struct flow *flow, struct real step_s, struct states *swep
     flow->time_s = later_s;
 }
 
-/* The greatest speed in the release phase at a deceleration up to b: of least jerk all the way, or of one that began with b1
- * and v1 = b1^2 / (2 j2) 1.016 + 2 T b1 at most, and had at most j2 since. */
+/* The greatest speed in the release phase at a deceleration up to b: that of the least jerk, or of a phase that began
+ * with b1 and at most v1 = b1^2 / (2 j2) 1.016 + 2 T b1, and had at most j2 since. */
 static struct real release_speed(const struct flow *flow, struct real b)
 {
     const struct real twice_up = real_scale(flow->own->up, 1);
@@ -358,8 +358,8 @@ static struct real release_speed(const struct flow *flow, struct real b)
     return twice_slow.m == 0 ? began : real_min(began, real_div(square(b), twice_slow));
 }
 
-/* The limits in one step. While the acceleration falls, or is the least, there is no jerk above 0; in the release phase none
- * below, and the speed is low. */
+/* The limits in one step. While the acceleration falls, or is the least, there is no jerk above 0; in the release phase
+ * none below, and the speed is low. */
 static int step_keeps(struct brake_check *check, const struct flow *flow,
                       const struct states *swept, struct real before_s)
 {
@@ -384,9 +384,9 @@ static int step_keeps(struct brake_check *check, const struct flow *flow,
     return real_less(last.v.high, swept->v.low) != 0 || keeps_on(check, &path, &last, up) != 0;
 }
 
-/* Bounds of time and distance from here to rest (core/stop_check). */
-static int to_rest(const struct flow *flow, const struct program_stop *stop, uint32_t period_us,
-                   struct real *time_s, int64_t *distance_q40)
+/* Bounds of time and distance from here to standstill (core/stop_check). */
+static int to_standstill(const struct flow *flow, const struct program_stop *stop,
+                         uint32_t period_us, struct real *time_s, int64_t *distance_q40)
 {
     struct stop_start from = {.speed_um = thousandths(flow->at.v.high),
                               .rising_um = thousandths(flow->at.a.high)};
@@ -411,8 +411,8 @@ static struct real greatest_speed(const struct flow *flow)
     return real_add(flow->at.v.high, real_add(late, falls));
 }
 
-/* All that is left of the brakes at once. */
-static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
+/* The remaining motion of all brakes at once. */
+static int remainder_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
 {
     struct states left = flow->at;
     struct path_stretch path;
@@ -430,7 +430,7 @@ static int rest_keeps(struct brake_check *check, const struct flow *flow, int64_
     return keeps_on(check, &path, &left, jerk);
 }
 
-/* Every brake from these states, all the way to rest. */
+/* Every brake from these states, until standstill. */
 static int brakes_keep(struct brake_check *check, const struct program_stop *stop,
                        const struct numbers *own, const struct states *from)
 {
@@ -441,10 +441,10 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
     int64_t distance_q40 = 0;
     int kept = 0;
     flow_begin(&flow, check, own, from);
-    if (to_rest(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
+    if (to_standstill(&flow, stop, period_us, &time_s, &distance_q40) == 0) {
         return 0;
     }
-    if (rest_keeps(check, &flow, distance_q40) != 0) {
+    if (remainder_keeps(check, &flow, distance_q40) != 0) {
         return 1;
     }
     if (flow.slow.m == 0) {
@@ -470,8 +470,8 @@ static int brakes_keep(struct brake_check *check, const struct program_stop *sto
         /* again when the speed is a quarter less */
         if (real_less(flow.at.v.high, real_mul(tried, real_make(3, -2))) != 0) {
             tried = flow.at.v.high;
-            kept = to_rest(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
-                   rest_keeps(check, &flow, distance_q40) != 0;
+            kept = to_standstill(&flow, stop, period_us, &time_s, &distance_q40) != 0 &&
+                   remainder_keeps(check, &flow, distance_q40) != 0;
         }
     }
     return kept;
@@ -506,7 +506,8 @@ static struct span derivative(const struct feed_polynomial *poly, const struct s
     return out;
 }
 
-/* Speed lambda F', acceleration lambda^2 F'' + lambda' F'; of a hold lambda' F' is at most a quarter of the deceleration. */
+/* Speed lambda F', acceleration lambda^2 F'' + lambda' F'; of a hold lambda' F' is at most a quarter of the
+ * deceleration. */
 static void states_of(const struct feed_polynomial *poly, const struct part *part,
                       struct real most_turned, struct states *out)
 {
@@ -539,7 +540,7 @@ static struct real width(const struct span *a)
     return real_sub(a->high, a->low);
 }
 
-/* Halves a part where its states differ most: by the speed that they make different. */
+/* Halves a part in the direction in which its states differ most in speed. */
 static void split(const struct feed_polynomial *poly, const struct states *at,
                   const struct numbers *own, struct part *low, struct part *high)
 {
@@ -564,7 +565,7 @@ static void split(const struct feed_polynomial *poly, const struct states *at,
     }
 }
 
-/* What is to be proved of a piece. */
+/* The stops of a piece that are to be proved. */
 struct stops {
     const struct program_stop *own;
     struct numbers numbers;
@@ -572,7 +573,7 @@ struct stops {
     const struct feed_polynomial *poly;
 };
 
-/* All of a part, which is halved where need be; depth first. */
+/* All of a part, which is halved where necessary; depth first. */
 static int parts_keep(struct brake_check *check, const struct stops *stops,
                       const struct part *whole)
 {
@@ -587,7 +588,7 @@ static int parts_keep(struct brake_check *check, const struct stops *stops,
         program_limits_attend(check->limits);
         if (brakes_keep(check, stops->own, &stops->numbers, &from) != 0) {
             count--;
-        } else if (count == MOST_PARTS || check->looks > check->most_looks) {
+        } else if (count == MOST_PARTS || check->evaluations > check->most_evaluations) {
             return 0;
         } else {
             split(poly, &from, &stops->numbers, last, last + 1);
@@ -603,8 +604,8 @@ static struct real level_rate(const struct program_override *bounds, uint32_t le
                                        : real_make((int64_t)program_level_q9(level), -9);
 }
 
-/* The greatest slope of the rate up to a rate: that of the level, and what its second derivative q makes from rest,
- * sqrt(2 q rate). */
+/* The greatest override rate up to an override: the lower one of the level's, and sqrt(2 q override), which the
+ * override acceleration q can reach from a constant override of 0. */
 static struct real greatest_slope(const struct program_override *bounds, uint32_t level,
                                   struct real rate)
 {
@@ -648,7 +649,7 @@ void brake_check_begin(struct brake_check *check, const struct program *p,
     check->any = path_motion_limits(&check->limit, limits, p->header.axis_count);
     check->period_s = real_div(real_make((int64_t)p->header.period_us, 0), real_make(1000000, 0));
     check->hint = 0;
-    check->looks = 0;
+    check->evaluations = 0;
 }
 
 int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_stop_kind kind,
@@ -658,12 +659,13 @@ int brake_check_piece(struct brake_check *check, uint32_t piece, enum program_st
     const int fault = kind == PROGRAM_STOP_FAULT;
     struct feed_polynomial poly;
     struct stops stops = {.own = stop, .poly = &poly};
-    check->looks = 0;
+    check->evaluations = 0;
     if (check->any == 0 || stop->deceleration == 0u) {
         return 1;
     }
     path_motion_read_piece(&poly, p, piece);
-    check->most_looks = MOST_LOOKS + (uint32_t)(piece_ms(p, piece) * LOOKS_PER_S / 1000u);
+    check->most_evaluations =
+        MOST_EVALUATIONS + (uint32_t)(piece_ms(p, piece) * EVALUATIONS_PER_S / 1000u);
     while (check->hint > 0u && program_segment_start(p, check->hint) > poly.start_q40_mm) {
         check->hint--;
     }

@@ -15,9 +15,9 @@
 #define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */
 #define CRC_FROM      16u
 #define ARC_LIMIT_Q40 ((int64_t)1 << 62)
-#define MEETS_Q40 ((uint64_t)1 << 16) /* 2^-24 mm: how far an end may be from the start behind it */
-#define REST_FLAGS (CHUNK_REST_STOP | CHUNK_REST_OPTIONAL)
-#define FLAGS      (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST | CHUNK_FLAG_JOINED)
+#define MEETS_Q40     ((uint64_t)1 << 16) /* 2^-24 mm: how far an end may be from the next start */
+#define REST_FLAGS    (CHUNK_REST_STOP | CHUNK_REST_OPTIONAL)
+#define FLAGS         (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST | CHUNK_FLAG_JOINED)
 
 static void read_header(struct chunk *c, const uint8_t *b)
 {
@@ -96,9 +96,9 @@ static int check_first(const struct chunk *c)
                : PROGRAM_ERR_CHUNK_SHARED;
 }
 
-/* --- A later one beside its predecessor --- */
+/* --- A later chunk compared with its predecessor --- */
 
-/* What is known without a look at segments and pieces. */
+/* Rules that need no segments and pieces. */
 static int check_follows(const struct chunk *next, const struct chunk *previous)
 {
     if (next->sequence != previous->sequence + 1u) {
@@ -118,7 +118,7 @@ static int check_follows(const struct chunk *next, const struct chunk *previous)
                : PROGRAM_ERR_CHUNK_PROGRAM;
 }
 
-/* The tail has a piece at least; all segments of the predecessor behind the shift are shared. */
+/* The tail has at least one piece; all segments of the predecessor from the shift on are shared. */
 static int counts_fit(const struct chunk *next, const struct chunk *previous)
 {
     const struct program_header *h = &next->program.header;
@@ -187,8 +187,8 @@ static int same_event(const struct program *p, uint32_t i, const struct program 
            own.channel == old.channel && own.mask == old.mask && own.value == old.value;
 }
 
-/* Up to the predecessor's end both have the same events, so that the next event is the same one whenever the takeover happens.
- * Where those of the next chunk are in disorder, the check of its program finds it. */
+/* Up to the predecessor's end both have the same events, so that the next event is the same one at any time of the
+ * takeover. The check of the program finds events of the next chunk in the wrong order. */
 static int check_events(const struct chunk *next, const struct chunk *previous, uint32_t *index)
 {
     const struct program *before = &previous->program;
@@ -211,8 +211,8 @@ static int check_events(const struct chunk *next, const struct chunk *previous, 
 
 /* --- One that begins at rest --- */
 
-/* The start is not checked yet, so it may be any number: the difference is one of unsigned numbers, which may wrap. An end
- * has a magnitude below 2^62, so a difference that wraps is far from 0. */
+/* The start is not checked yet, so it may be any number: the difference is one of unsigned numbers, which may wrap. An
+ * end has a magnitude below 2^62, so a difference that wraps is far from 0. */
 static int meets(int64_t start_q40, int64_t end_q40)
 {
     const uint64_t off_q40 = (uint64_t)start_q40 - (uint64_t)end_q40;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/coefficient_cache.h (see there): coefficient records near the motion, in two halves of a memory. */
 #include "core/coefficient_cache.h"
 
 #include <string.h>
@@ -7,7 +8,7 @@
 
 /* Records of pieces stand at the start of a half, in order, those of segments at its end, the first one last. */
 
-/* What a window is made of. */
+/* A window that is being made. */
 struct making {
     const struct program *program;
     const struct coefficients_window *have; /* records that may be copied; NULL: none */
@@ -46,7 +47,7 @@ static uint64_t piece_start_q42_s(const struct program *p, uint32_t piece)
     return qmath_q42_of_q32(sum_q32_s);
 }
 
-/* The record of the next piece, behind the last one. */
+/* Adds the record of the next piece after the last one. */
 static void add_piece(struct making *m)
 {
     struct coefficients_window *w = m->out;
@@ -73,7 +74,7 @@ static void add_piece(struct making *m)
     m->room -= m->piece_size;
 }
 
-/* The record of the next segment, before the last one. */
+/* Adds the record of the next segment, in memory before the last one. */
 static void add_segment(struct making *m)
 {
     struct coefficients_window *w = m->out;
@@ -100,7 +101,7 @@ static void add_segment(struct making *m)
     m->room -= m->segment_size;
 }
 
-/* Adds a piece, or a segment: what the records come less far with along the path. 0: there is no more of it, or no room. */
+/* Adds a piece or a segment: the kind whose records end earlier on the path. 0: there is no further one, or no room. */
 static int add_next(struct making *m)
 {
     const struct program_header *h = &m->program->header;
@@ -124,7 +125,8 @@ static int add_next(struct making *m)
     return 1;
 }
 
-/* As many records from these numbers on as there is room for: of each kind some at least, where there are so many. */
+/* As many records from these numbers on as there is room for; of each kind at least COEFFICIENT_CACHE_LEAST, if the
+ * program has so many. */
 static void make_window(struct making *m)
 {
     const struct program_header *h = &m->program->header;
@@ -188,7 +190,7 @@ static int is_all(const struct coefficients_window *w, const struct program *p)
            w->first_segment + w->segment_count == p->header.segment_count;
 }
 
-/* Nothing would be gained: it begins there, or comes to the end of the program. */
+/* A new window would have no further records: the present one begins there, or reaches the end of the program. */
 static int has_all(const struct coefficients_window *w, const struct program *p, uint32_t piece,
                    uint32_t segment)
 {

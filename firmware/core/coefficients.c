@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/coefficients.h (see there): what a kernel needs of a program, computed once: coefficient
- * records. */
+/* Implements core/coefficients.h (see there): makes the coefficient records of a program. */
 #include "core/coefficients.h"
 
 #include <string.h>
@@ -23,14 +22,14 @@ uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
 static void look_ahead(struct coefficients_piece *out, const struct program *p, uint32_t i)
 {
     uint64_t end_q32_s = qmath_q32_of_q42(out->start_q42_s);
-    uint32_t behind = i;
+    uint32_t after = i;
     for (uint32_t k = 0; k < OVERRIDE_WINDOWS; k++) {
         const uint32_t pieces = override_window_pieces(k);
         override_bounds_of(&out->ahead[k], p, i, pieces);
-        for (; behind - i < pieces && behind < p->header.piece_count; behind++) {
-            end_q32_s += program_piece_duration(p, behind);
+        for (; after - i < pieces && after < p->header.piece_count; after++) {
+            end_q32_s += program_piece_duration(p, after);
         }
-        out->ahead_end_q32_s[k] = behind < p->header.piece_count ? end_q32_s : UINT64_MAX;
+        out->ahead_end_q32_s[k] = after < p->header.piece_count ? end_q32_s : UINT64_MAX;
     }
 }
 

@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A program made ready for one kernel: records that the tick reads where they are, so that it expands nothing when it
- * crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Precomputed coefficients").
+ * coefficients: coefficient records of a program for one kernel. The tick reads them in place, so it computes nothing
+ * anew when it crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Precomputed
+ * coefficients"). Made by app/program_table, core/coefficient_cache and host tools; read by interpolator and program
+ * clock.
  *
- * The records are made by the controller itself from a program that has passed program_check; they are never uploaded.
- * They hold native structs: for the binary that made them and no other. Any context but where it says otherwise.
+ * The controller itself makes the records from a program that has passed program_check; they are never uploaded. They
+ * hold native structs, so they are valid only for the binary that made them. Any context, if not stated otherwise.
  *
- * A tick goes from record to record by the links in them. So it needs a window of records round its place, and no more:
- * all of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). Where a window ends before
- * the program does, the link is 0, and a tick that would have to go on is refused (INTERPOLATOR_ERR_JUMP).
+ * A tick goes from record to record by the links in them. So it needs a window of records around its place: all records
+ * of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). If a window ends before
+ * the program, its last link is 0, and a tick that needs the next record fails (INTERPOLATOR_ERR_JUMP).
  */
 #ifndef HODOGRAPH_CORE_COEFFICIENTS_H
 #define HODOGRAPH_CORE_COEFFICIENTS_H
@@ -28,11 +30,11 @@
 
 #define COEFFICIENTS_ERR_SIZE (-1) /* the memory is too small */
 
-/* A record ends behind the kernel's own part. */
+/* A record ends with the kernel's own part, which may be shorter than the union. */
 struct coefficients_piece {
     uint64_t start_q42_s;
     uint64_t end_q42_s; /* of the last piece the duration */
-    int32_t next;       /* bytes from this record to that of the next piece; 0: it is not there */
+    int32_t next;       /* bytes from this record to that of the next piece; 0: there is none */
     uint32_t number;    /* of the piece */
     uint64_t ahead_end_q32_s[OVERRIDE_WINDOWS]; /* of the windows that begin with it: their end,
                                                         UINT64_MAX with the last piece, */
@@ -46,9 +48,9 @@ struct coefficients_piece {
 struct coefficients_segment {
     int64_t from_q40_mm; /* arc lengths that belong to it: from here, INT64_MIN in the first, */
     int64_t to_q40_mm;   /* to below here, INT64_MAX in the last */
-    int16_t next;    /* bytes from this record to that of the next segment; 0: it is not there; */
-    int16_t back;    /* and to that of the one before */
-    uint32_t number; /* of the segment */
+    int16_t next;        /* bytes from this record to that of the next segment; 0: there is none; */
+    int16_t back;        /* and to that of the one before */
+    uint32_t number;     /* of the segment */
     union {
         struct kernel_fixed_segment fixed;
         struct kernel_float_segment floats;
@@ -78,11 +80,12 @@ uint64_t coefficients_size(const struct program *p, const struct kernel *kernel)
 /* Takes the next bytes of the records; 0 or a negative error. */
 typedef int coefficients_sink(void *context, const uint8_t *bytes, uint32_t size);
 
-/* Makes all records, in order: those of the pieces, then those of the segments, each of one size. Gives the sink's first error, or 0. Main loop; linear. */
+/* Makes all records, in order: those of the pieces, then those of the segments, each of one size. Gives the sink's
+ * first error, or 0. Main loop; linear. */
 int coefficients_make(const struct program *p, const struct kernel *kernel, coefficients_sink *sink,
                       void *context);
 
-/* From now on the program has these records, which must stay; aligned to COEFFICIENTS_ALIGNMENT. */
+/* Gives the program these records, which must stay; aligned to COEFFICIENTS_ALIGNMENT. */
 void coefficients_attach(struct program *p, const struct kernel *kernel, const uint8_t *records);
 
 /* Makes all records in this memory, aligned to COEFFICIENTS_ALIGNMENT, and attaches them. Returns 0, or
@@ -133,7 +136,7 @@ coefficients_segment_back(const struct coefficients_segment *segment)
 
 struct coefficients_window {
     const struct kernel *kernel;
-    const uint8_t *pieces;   /* the record of the first piece, the others behind it; */
+    const uint8_t *pieces;   /* the record of the first piece, followed by the others; */
     const uint8_t *segments; /* of the first segment, */
     int32_t segment_step;    /* and bytes from each to the next one */
     uint32_t first_piece;

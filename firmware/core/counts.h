@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * From mm to bus counts. Pure, any context.
+ * counts: converts positions from mm to bus counts. Used by the tick and by the host tools. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_COUNTS_H
 #define HODOGRAPH_CORE_COUNTS_H
@@ -9,9 +9,9 @@
 
 #include "core/qmath.h"
 
-/* Position in counts: floor(q40 * counts_per_mm / 2^40 + 1/2), that is round half up (towards plus
- * infinity), in exact arithmetic; saturates at the ends of i32. Python does the same with
- * (q40 * counts_per_mm + 2**39) >> 40. Two 32x32 multiplies, no division. Any q40 is allowed. */
+/* Position in counts: floor(q40 * counts_per_mm / 2^40 + 1/2), that is round half up (towards plus infinity), in exact
+ * arithmetic; saturates at the ends of i32. Python does the same with (q40 * counts_per_mm + 2**39) >> 40. Two 32x32
+ * multiplies, no division. Any q40 is allowed. */
 static inline int32_t counts_from_q40_mm(int64_t q40_mm, uint32_t counts_per_mm)
 {
     /* floor(q40 counts / 2^32), exact: the half of 2^40 is added there, the other 2^8 shifted off.

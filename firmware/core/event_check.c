@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/event_check.h (see there): the checks of the events of a program. */
 #include "core/event_check.h"
 
 #include "core/segment_length_check.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Checks the events of a program: outputs that switch on the path (docs/reference/protocol.md 1.8). A part of
- * program_check. Pure, main loop. */
+/* event_check: checks the events of a program, which switch outputs on the path (docs/reference/protocol.md 1.8). A
+ * part of program_check. Pure, main loop. */
 #ifndef HODOGRAPH_CORE_EVENT_CHECK_H
 #define HODOGRAPH_CORE_EVENT_CHECK_H
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/extra_axis.h (see there): coefficients of an extra axis for the kernels fixed and float. */
 #include "core/extra_axis.h"
 
-/* By how much coefficients in q48 are shifted down, so that the sum of all powers but the linear one, of which less than
- * 2^31 is left, fits 31 bits after any rounding. */
+/* By how much coefficients in q48 are shifted down, so that the sum of all powers fits 31 bits after any rounding. Of
+ * the linear one only the remainder counts, which is below 2^31. */
 static int shift_of(const int64_t c_q48[6])
 {
     int64_t sum = (int64_t)1 << 31;

@@ -8,8 +8,8 @@
 #include "core/bernstein.h"
 #include "core/qmath.h"
 
-/* What the rounding of powers of tau and of the coefficients' lower bits can take from a Bernstein coefficient, in q36:
- * 4 bits dropped and 3 units a power, times the binomials, over the scale. */
+/* The most by which rounding of powers of tau and of the coefficients' lower bits changes a Bernstein coefficient, in
+ * q36: 4 bits dropped and 3 units a power, times the binomials, over the scale. */
 #define COEFFICIENT_ROUNDING 64
 
 /* tau at the end of the piece in q64; exactly 1 is 0. */
@@ -128,7 +128,8 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
                             scaled_bound(high_q24, scale, order, e));
 }
 
-/* One of the scaled Bernstein coefficients (q36, tau) in 2^-24 physical units, not below; a unit more than rounding takes. */
+/* One of the scaled Bernstein coefficients (q36, tau) in 2^-24 physical units, not below; a unit more than rounding
+ * takes. */
 static int64_t unscaled_above(int64_t b, int64_t scale, int order, int exponent)
 {
     int64_t size = (int64_t)qmath_div_u64((uint64_t)qmath_magnitude(b), (uint64_t)scale);

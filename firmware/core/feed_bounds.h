@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Feed, acceleration and jerk of a piece: values at its ends and bounds over it, in integers of
- * physical units. Derivation: docs/theory/numerics.md section 9, "Checking". Main loop.
+ * feed_bounds: feed, acceleration and jerk of a feed piece: values at its ends and bounds over it, in integers of
+ * physical units. Used by the checks of a program. Derivation: docs/theory/numerics.md section 9, "Checking". Pure,
+ * main loop.
  */
 #ifndef HODOGRAPH_CORE_FEED_BOUNDS_H
 #define HODOGRAPH_CORE_FEED_BOUNDS_H
@@ -10,7 +11,7 @@
 
 #include "core/program.h"
 
-/* Values beyond 2^62 units are held there. */
+/* Values beyond 2^62 units are limited to 2^62. */
 struct feed_state {
     int64_t arc_length_q44_mm; /* relative to the piece's start */
     int64_t feed_q24_mm_s;
@@ -41,12 +42,12 @@ int feed_bounds_within(const struct program_piece *piece, enum feed_derivative d
 void feed_bounds_parts(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24[FEED_PARTS], int64_t high_q24[FEED_PARTS]);
 
-/* The distance that a piece may go back before its start or beyond its end: 2^-14 mm. The exponential ramp begins with
- * a step back of some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
+/* By this distance the arc length of a piece may be below that of its start or above that of its end: 2^-14 mm. The
+ * exponential ramp begins with a step back of some 2e-8 of feed times ramp time (docs/theory/numerics.md section 9). */
 #define FEED_PIECE_SLACK_Q36 ((int64_t)1 << 22)
 
-/* 1 when F stays between its values at both ends of the piece, to that slack: a feed that is nowhere far below 0 may
- * still creep back for long. For a piece of at most 32 mm. */
+/* 1 when F stays between its values at both ends of the piece, to that slack. This is checked by itself, because a feed
+ * that is a little below 0 for long also moves back. For a piece of at most 32 mm. */
 int feed_bounds_contained(const struct program_piece *piece);
 
 #endif

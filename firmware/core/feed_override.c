@@ -10,22 +10,22 @@
 
 enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 
-/* A state that others see as FEED_RUNNING: at rest at the end of a tail. */
+/* A state that feed_override_state reports as FEED_RUNNING: rest at the end of a tail. */
 #define STATE_WAITING ((uint32_t)FEED_HELD + 1u)
 
 #define TICK_Q30          ((int64_t)1 << 30)
 #define SPARE_TICKS       2        /* of the deadline: rounding */
 #define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
 #define END_TICKS         2u       /* until a command counts, and until the end is a setpoint */
-#define SEARCH_STEPS      2        /* in a tick at rest */
+#define SEARCH_STEPS      2        /* in a tick at standstill */
 #define NO_NUMBERS        2u
 #define MOST_FEED_Q32     ((int64_t)1 << 45)
-#define MOST_SLOPE_Q56                                                                             \
-    (((int64_t)1 << 57) - 1)         /* 2^57, the greatest, less a unit: it is made an int32_t */
-#define REACH_Q40 ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
-#define MS_Q40    1099511628u        /* 2^40 / 1000 */
-#define UM_PER_MM 1000u
-#define US_PER_S  1000000u
+/* 2^57, the greatest, less a unit: it is made an int32_t */
+#define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
+#define REACH_Q40      ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */
+#define MS_Q40         1099511628u        /* 2^40 / 1000 */
+#define UM_PER_MM      1000u
+#define US_PER_S       1000000u
 
 /* The clock has been set. */
 static void begin(struct feed_override *f, const struct program *p)
@@ -53,7 +53,7 @@ static uint32_t state_at_tail_end(uint32_t state)
     return state == FEED_HOLDING || state == FEED_HELD ? FEED_HELD : FEED_STOPPED;
 }
 
-/* The end of the program is known beforehand, so that the tick that comes to it takes no longer for it. */
+/* The state at the end of the program is set beforehand, so that the last tick takes no more time. */
 static void set_state(struct feed_override *f, uint32_t state)
 {
     f->state = state;
@@ -79,7 +79,7 @@ void feed_override_begin_job(struct feed_override *f, const struct chunk *first,
 
 /* --- Commands --- */
 
-/* At the end of a tail the plan is what goes on, and goes nowhere. */
+/* At the end of a tail the nominal motion is still the source of setpoints, and stays at its end. */
 int feed_override_waits(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN && (f->state == STATE_WAITING || f->state == FEED_HELD);
@@ -90,7 +90,7 @@ static int rests(const struct feed_override *f)
     return f->phase == PHASE_REST || feed_override_waits(f);
 }
 
-static int comes_to_rest(const struct feed_override *f)
+static int comes_to_standstill(const struct feed_override *f)
 {
     return f->state == FEED_HOLDING || f->state == FEED_STOPPING;
 }
@@ -119,8 +119,8 @@ static void read_numbers(struct feed_override *f)
         path_brake_numbers_of(&f->numbers, &stop, f->clock.period_us) ? f->kind : NO_NUMBERS;
 }
 
-/* A brake under way keeps the time that it had. */
-static void ask(struct feed_override *f, enum program_stop_kind kind)
+/* The deadline of a brake under way stays. */
+static void request_stop(struct feed_override *f, enum program_stop_kind kind)
 {
     const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
     f->kind = (uint32_t)kind;
@@ -132,7 +132,7 @@ void feed_override_hold(struct feed_override *f)
 {
     if (f->state == FEED_RUNNING || f->state == STATE_WAITING) {
         set_state(f, rests(f) ? FEED_HELD : FEED_HOLDING);
-        ask(f, PROGRAM_STOP_HOLD);
+        request_stop(f, PROGRAM_STOP_HOLD);
     }
 }
 
@@ -164,7 +164,7 @@ void feed_override_stop(struct feed_override *f)
         return;
     }
     if (f->state == FEED_RUNNING) {
-        ask(f, PROGRAM_STOP_HOLD);
+        request_stop(f, PROGRAM_STOP_HOLD);
     }
     set_state(f, FEED_STOPPING);
 }
@@ -178,12 +178,12 @@ void feed_override_fault_stop(struct feed_override *f)
         set_state(f, FEED_STOPPED);
         return;
     }
-    ask(f, PROGRAM_STOP_FAULT);
+    request_stop(f, PROGRAM_STOP_FAULT);
     f->replace = f->phase == PHASE_BRAKE ? 1u : 0u;
     set_state(f, FEED_STOPPING);
 }
 
-/* --- Where the plan is --- */
+/* --- State of the nominal motion --- */
 
 static uint32_t override_q30(const struct feed_override *f)
 {
@@ -196,7 +196,7 @@ static uint32_t time_of_tick_q40(const struct feed_override *f)
     return (uint32_t)(qmath_product_unsigned(override_q30(f), MS_Q40) >> 30);
 }
 
-/* With v the override: v F' and v^2 F'' + v' F' as way of a tick. */
+/* With v the override: speed v F' and acceleration v^2 F'' + v' F', in units of a tick. */
 int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56)
 {
@@ -233,11 +233,11 @@ static int plan_tick(struct feed_override *f, struct interpolator *it)
     return result;
 }
 
-static void come_to_rest(struct feed_override *f, uint32_t found)
+static void come_to_standstill(struct feed_override *f, uint32_t found)
 {
     f->phase = PHASE_REST;
     f->found = found;
-    if (comes_to_rest(f)) {
+    if (comes_to_standstill(f)) {
         f->state = f->state == FEED_STOPPING ? FEED_STOPPED : FEED_HELD;
     }
 }
@@ -250,7 +250,7 @@ static int interpolate_brake(struct feed_override *f, struct interpolator *it)
                                       &f->point);
 }
 
-/* The tick that leaves the plan. */
+/* The tick that leaves the nominal motion. */
 static int first_brake_tick(struct feed_override *f, struct interpolator *it)
 {
     f->left_q30 -= TICK_Q30;
@@ -263,9 +263,9 @@ static int brake_tick(struct feed_override *f, struct interpolator *it)
     f->left_q30 -= TICK_Q30;
     path_brake_step(&f->brake);
     const int result = interpolate_brake(f, it);
-    if (result == INTERPOLATOR_OK && path_brake_rests(&f->brake)) {
+    if (result == INTERPOLATOR_OK && path_brake_ended(&f->brake)) {
         interpolator_search_begin(&f->place, f->clock.piece, f->point.arc_length_q40_mm);
-        come_to_rest(f, 0);
+        come_to_standstill(f, 0);
     }
     return result;
 }
@@ -278,8 +278,8 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether any brake of the stop table would rest before the end of the path, and before the program does. The remainder is
- * rounded down, to micrometres and microseconds. */
+/* Whether every brake of the stop table would end before the end of the path, and before the program does. The
+ * remainder is rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
     const struct program_header *h = &f->clock.program->header;
@@ -293,10 +293,10 @@ static int is_far_from_end(const struct feed_override *f, const struct path_stat
            qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 
-/* --- From the plan to the brake --- */
+/* --- From the nominal motion to the brake --- */
 
-/* Leaves the plan, if a brake may begin here. Not for a hold or a stop while the override rises so fast that the jerk of the
- * program's limits would have to take away more than a quarter of the deceleration first: the rise is cut instead. */
+/* Leaves the nominal motion, if a brake may begin here. A hold or a stop does not begin while a rising override adds
+ * more than a quarter of the deceleration to the acceleration: the rise is cut instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
     if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
@@ -311,33 +311,35 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
-/* The plan goes on for another tick. At a low override, at which it may be long until the place of the next brake, the
- * override goes to 0; at a high one its fall would add to the deceleration that the plan itself has. */
+/* The nominal motion continues for another tick. At a low override it may take long to the place of the next brake, so
+ * the override goes to 0. At a high one the fall of the override would add to the deceleration of the nominal motion.
+ * */
 static void wait_slowly(struct feed_override *f)
 {
     if (f->plan.now.override_q57 < OVERRIDE_ONE / 2) {
         override_plan_hold(&f->plan);
     } else {
-        override_plan_rise_no_more(&f->plan);
+        override_plan_end_rise(&f->plan);
     }
 }
 
-/* The plan is left, or it is known to rest. */
-static int leaves_or_rests(struct feed_override *f, const struct interpolator *it)
+/* Leaves the nominal motion, or finds that it ends at standstill by itself. */
+static int leaves_or_ends(struct feed_override *f, const struct interpolator *it)
 {
     struct path_state state;
     int64_t turned_q56 = 0;
     const int known = feed_override_motion(f, it, &state, &turned_q56);
     const int rests = (f->plan.now.override_q57 | f->plan.now.slope_q56) == 0;
     if (rests || (known && state.speed_q56 < PATH_BRAKE_NO_SPEED && state.acceleration_q56 >= 0)) {
-        come_to_rest(f, 1);
+        come_to_standstill(f, 1);
         return 1;
     }
     return known && f->numbers_kind == f->kind && leave_plan(f, &state, turned_q56);
 }
 
-/* The plan has gone on into another piece, whose stop parameters count from now on. A hold or a stop may have waited for the end of a
- * rise of the override, which the bound of the piece before does not know of: then the bound of this piece counts. */
+/* The nominal motion is in another piece, whose stop parameters are valid from now on. A hold or a stop may have waited
+ * for the end of a rise of the override, which the bound of the previous piece does not include: then the bound of this
+ * piece counts. */
 static void enter_piece(struct feed_override *f)
 {
     read_numbers(f);
@@ -346,14 +348,14 @@ static void enter_piece(struct feed_override *f)
     }
 }
 
-/* A stop has been requested, and the plan is still what goes on: it is left, or it goes on for another tick. */
+/* A stop has been requested during the nominal motion: leaves it, or continues it for another tick. */
 static int wait_tick(struct feed_override *f, struct interpolator *it)
 {
     if (f->plan.started != 0) {
         if (f->numbers_piece != f->clock.piece) {
             enter_piece(f);
         }
-        if (leaves_or_rests(f, it)) {
+        if (leaves_or_ends(f, it)) {
             return f->phase == PHASE_BRAKE ? first_brake_tick(f, it) : INTERPOLATOR_OK;
         }
         f->left_q30 -= qmath_lesser(override_q30(f), TICK_Q30);
@@ -362,7 +364,7 @@ static int wait_tick(struct feed_override *f, struct interpolator *it)
     return plan_tick(f, it);
 }
 
-/* A fault stop gives its own numbers to the brake of a hold or a stop, where that then rests on the path. */
+/* A fault stop gives its own numbers to the brake of a hold or a stop, if the brake then still ends on the path. */
 static void replace_brake(struct feed_override *f)
 {
     const struct path_state at = f->brake.at;
@@ -372,14 +374,15 @@ static void replace_brake(struct feed_override *f)
     f->replace = 0;
 }
 
-/* On from the place of rest when that is known, and wanted. */
-static void look_for_place(struct feed_override *f, const struct interpolator *it)
+/* At standstill: searches the program time of the place; continues from there when it is found and the motion is
+ * resumed. */
+static void search_place(struct feed_override *f, const struct interpolator *it)
 {
     for (int i = 0; i < SEARCH_STEPS && f->found == 0; i++) {
         if (interpolator_search_step(it, &f->place)) {
             f->found = 1;
             program_clock_set(&f->clock, f->place.time_q42_s, f->place.piece_index, f->place.piece);
-            override_plan_rest(&f->plan);
+            override_plan_restart(&f->plan);
         }
     }
     if (f->found != 0 && f->state == FEED_RUNNING) {
@@ -398,14 +401,14 @@ int feed_override_stop_tick(struct feed_override *f, struct interpolator *it)
         }
         return brake_tick(f, it);
     }
-    look_for_place(f, it);
+    search_place(f, it);
     return f->phase == PHASE_PLAN ? plan_tick(f, it) : INTERPOLATOR_OK;
 }
 
 int feed_override_next(struct feed_override *f, struct interpolator *it,
                        struct interpolator_point *out)
 {
-    const int aside = f->phase != PHASE_PLAN || comes_to_rest(f);
+    const int aside = f->phase != PHASE_PLAN || comes_to_standstill(f);
     const int result = aside ? feed_override_stop_tick(f, it) : plan_tick(f, it);
     if (result < 0) {
         return result;
@@ -416,8 +419,8 @@ int feed_override_next(struct feed_override *f, struct interpolator *it,
 
 /* --- The next chunk --- */
 
-/* In motion: the last setpoint and all up to the joint are the same in both programs. A piece that reaches beyond an end of
- * one of them is not: it is held inside there (core/interpolator). */
+/* In motion: the last setpoint and all up to the joint are the same in both programs. A piece that reaches beyond an
+ * end of one of them is not: it is held inside there (core/interpolator). */
 static int is_shared(const struct feed_override *f, const struct chunk *next)
 {
     const struct program *p = f->clock.program;
@@ -432,7 +435,7 @@ static int is_shared(const struct feed_override *f, const struct chunk *next)
            p->header.length_q40_mm - program_piece_start(p, joint) >= REACH_Q40;
 }
 
-/* The plan goes on, and an override ramp that is under way ends before the joint. */
+/* The nominal motion continues, and an override ramp under way ends before the joint. */
 static int may_take_over_moving(const struct feed_override *f, const struct chunk *next)
 {
     return f->state == FEED_RUNNING && is_shared(f, next) &&
@@ -445,7 +448,7 @@ static int may_take_over_resting(const struct feed_override *f, const struct chu
                               program_piece_start(&next->program, 0);
 }
 
-/* A chunk behind a rest: at the end of its predecessor. A path that is held waits. */
+/* A chunk that begins at rest: at the end of its predecessor. A held path waits. */
 static int may_begin_next(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN && f->state == STATE_WAITING;
@@ -460,8 +463,8 @@ static int may_take_over(const struct feed_override *f, const struct chunk *next
            (rests(f) ? may_take_over_resting(f, next) : may_take_over_moving(f, next));
 }
 
-/* Behind a rest its start. In motion the same place of the next program; at rest the search for it begins with the first
- * piece. */
+/* For a chunk that begins at rest its start. In motion the same place in the next program; at standstill the search for
+ * it begins with the first piece. */
 static void place_in_next(const struct feed_override *f, const struct interpolator *it,
                           const struct chunk *next, struct feed_place *place)
 {
@@ -484,8 +487,8 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
     return may_take_over(f, next);
 }
 
-/* At rest: on from the same arc length, once its time is found. */
-static void rest_in_next(struct feed_override *f)
+/* At standstill: continues from the same arc length when its time is found. */
+static void stand_in_next(struct feed_override *f)
 {
     interpolator_search_begin(&f->place, 0, f->point.arc_length_q40_mm);
     f->phase = PHASE_REST;
@@ -493,7 +496,7 @@ static void rest_in_next(struct feed_override *f)
     f->state = f->state == STATE_WAITING ? FEED_RUNNING : f->state;
 }
 
-/* As a program begins. */
+/* Begins the next program as a program begins. */
 static void begin_next(struct feed_override *f, const struct chunk *next,
                        const struct coefficients_piece *first)
 {
@@ -506,13 +509,13 @@ static void go_on_in_next(struct feed_override *f, const struct chunk *next,
                           const struct feed_place *at, const struct coefficients_piece *record)
 {
     const int resting = at->by_arc != 0u;
-    /* at rest at its start until the place is found */
+    /* standstill at its start until the place is found */
     program_clock_carry(&f->clock, &next->program,
                         resting ? f->clock.time_q42_s : qmath_q42_of_q32(next->time_shift_q32_s),
                         at->piece, record);
     override_plan_carry(&f->plan, &next->least, next->time_shift_q32_s);
     if (resting) {
-        rest_in_next(f);
+        stand_in_next(f);
     }
 }
 
@@ -540,7 +543,7 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 
 /* --- Its records --- */
 
-/* The program clock is where the motion is: not in a brake, nor until the place of its rest is found. */
+/* 1: the program clock is at the place of the motion: not in a brake, nor until the place of standstill is found. */
 static int clock_is_here(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
@@ -556,7 +559,7 @@ void feed_override_place(const struct feed_override *f, const struct interpolato
     place->by_arc = here ? 0u : 1u;
 }
 
-/* While it is looked for where the motion rests, no piece is needed but that which is bisected; in a brake, none. */
+/* While the place of standstill is searched only the bisected piece is needed; in a brake, none. */
 int feed_override_use(struct feed_override *f, struct interpolator *it,
                       const struct coefficients_window *window)
 {
@@ -567,14 +570,14 @@ int feed_override_use(struct feed_override *f, struct interpolator *it,
         coefficients_window_segment(window, it->segment->number) == NULL) {
         return 0;
     }
-    override_plan_let_go(&f->plan);
+    override_plan_forget_records(&f->plan);
     f->clock.record = record;
     f->place.piece = record;
     interpolator_use(it, window);
     return 1;
 }
 
-/* --- What is so --- */
+/* --- State --- */
 
 enum feed_state feed_override_state(const struct feed_override *f)
 {
@@ -583,7 +586,7 @@ enum feed_state feed_override_state(const struct feed_override *f)
 
 int feed_override_late(const struct feed_override *f)
 {
-    return comes_to_rest(f) && f->left_q30 < 0;
+    return comes_to_standstill(f) && f->left_q30 < 0;
 }
 
 uint64_t feed_override_time_q42(const struct feed_override *f)
@@ -622,5 +625,5 @@ uint32_t feed_override_actual_q30(const struct feed_override *f)
 int feed_override_saturated(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN &&
-           (f->plan.saturated != 0 || f->plan.asked_q57 > f->plan.most_q57);
+           (f->plan.saturated != 0 || f->plan.requested_q57 > f->plan.most_q57);
 }

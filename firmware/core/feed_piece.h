@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Evaluates a feed piece in integers: arc length, feed and acceleration at a time (docs/theory/numerics.md section 9,
- * "Feed"). Part of the fixed and the float kernel: feed_piece_set when coefficients are precomputed (main loop), the
- * others in the tick. Pure.
+ * feed_piece: evaluates a feed piece in integers: arc length, feed and acceleration at a time (docs/theory/numerics.md
+ * section 9, "Feed"). Part of the fixed and the float kernel: feed_piece_set when coefficients are precomputed (main
+ * loop), the others in the tick. Pure.
  */
 #ifndef HODOGRAPH_CORE_FEED_PIECE_H
 #define HODOGRAPH_CORE_FEED_PIECE_H
@@ -32,12 +32,12 @@ struct feed_point {
 
 void feed_piece_set(void *piece, const struct program_piece *from);
 
-/* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit
- * and the Horner steps), feed within 14 units of `slope`, 2^-30 of the sum of its
- * coefficients. Seven wide products and eight narrow ones, no division. */
+/* At local time t, 0 <= t < duration. Arc length within 2^-40.4 mm of the polynomial (half a unit and the Horner
+ * steps), feed within 14 units of `slope`, 2^-30 of the sum of its coefficients. Seven wide products and eight narrow
+ * ones, no division. */
 void feed_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s);
 
-/* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the begin of a brake (core/feed_override). Within
+/* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the start of a brake (core/feed_override). Within
  * 2^-27 of the greatest F' of the coefficients, divided by the time scale of the piece. */
 int64_t feed_piece_acceleration(const void *piece, uint64_t t_q42_s);
 

@@ -5,7 +5,7 @@
 
 #include "core/qmath.h"
 
-/* Way of one period, and its change, beyond which no machine goes: 32 mm and 1 mm. They keep the
+/* The greatest distance in a period, and its greatest change, of any machine: 32 mm and 1 mm. They keep the
  * products below inside 62 bits. */
 #define DISTANCE_MAX_Q40_MM (INT64_C(1) << 45)
 #define CHANGE_MAX_Q40_MM   (INT64_C(1) << 40)

@@ -10,8 +10,8 @@
  * Setpoint k is latched at SYNC k+1 and reached, by linear interpolation, at SYNC k+2, so velocity(k) is
  * exactly that of the period in which the drive has the offset. acceleration(k) is that of SYNC k+1, the
  * beginning of that period: half a period old in its middle. Offsets are rounded to nearest and saturate; they are zero
- * at standstill (equal points). Integers only: the controller and a simulation without a bus give
- * the same. Pure but for the axis' own state; any context.
+ * at standstill (equal points). Integers only: the controller (app/machine/offsets) and the offline simulation give the
+ * same offsets. Changes the struct of the axis only; any context.
  */
 #ifndef HODOGRAPH_CORE_FEEDFORWARD_H
 #define HODOGRAPH_CORE_FEEDFORWARD_H
@@ -36,7 +36,7 @@ struct feedforward {
     int64_t before_q40_mm; /* p(k-2) */
 };
 
-/* At rest at a point: that of the first setpoint of a motion. */
+/* Standstill at a point: that of the first setpoint of a motion. */
 void feedforward_begin(struct feedforward *axis, int64_t point_q40_mm);
 
 /* The offset that goes with the next setpoint, which is at this point. */

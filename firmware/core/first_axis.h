@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * first_axis: which axes of a machine a program moves (docs/reference/protocol.md 1.1.1). Axis i of the program is axis
- * first_axis + i of the machine's path. All others hold their position. 0: a path of x, y, z and the axes that follow
- * it. More than 0: axes that turn alone draw the path, and its unit of length is the degree. Pure, any context.
+ * first_axis + i of the machine's path. All others hold their position. 0: a path of x, y, z and the extra axes. More
+ * than 0: a path of rotary axes alone, whose unit of length is the degree. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_FIRST_AXIS_H
 #define HODOGRAPH_CORE_FIRST_AXIS_H

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The core: from a program image to one setpoint in each period. This header is its manual, and includes what an
- * application needs. Each function is described in the header that declares it.
+ * hodograph: the core, from a program image to one setpoint in each period. This header is its manual, and includes
+ * what an application needs. Each function is described in the header that declares it.
  *
  * ## What to call, in this order
  *
  *   main loop   program_open                 reads the image: sizes, magic, version, CRC
  *               program_check                all rules of the format, and the limits of this controller
  *               kernel_find                  fixed, float or double; NULL where it is not linked
- *               coefficients_make_in         what a tick needs of each segment and piece, in memory
+ *               coefficients_make_in         coefficient records of each segment and piece, in memory
  *               (or coefficients_make and coefficients_attach: by a sink, for flash)
  *               interpolator_begin           the cursor on the curve
  *               feed_override_begin          the motion: at rest, at a program time, override 100 %
@@ -16,7 +16,7 @@
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
  *   of a job in chunks, in place of program_open, program_check and feed_override_begin (core/chunk.h):
- *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it goes on from its predecessor
+ *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it continues its predecessor
  *               feed_override_begin_job      with the first chunk
  *               feed_override_take_over      the next chunk for the program under way; needs the tick held off
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
@@ -32,10 +32,10 @@
  * ## Path axes
  *
  * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section
- * 1). program.header.axis_count says how many; positions, limits and offsets are arrays of PROGRAM_AXES, of which the
- * first axis_count count. A controller that serves another number says so in program_limits.axis_count, and
- * program_check refuses the program, and each program whose first axis is not the machine's first axis
- * (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to look at first_axis().
+ * 1). program.header.axis_count is their number; positions, limits and offsets are arrays of PROGRAM_AXES, of which the
+ * first axis_count count. A controller with a fixed number of axes sets program_limits.axis_count. program_check then
+ * refuses programs with another number, and programs whose first axis is not the machine's first axis
+ * (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to evaluate first_axis().
  *
  * ## Cost
  *
@@ -48,10 +48,10 @@
  * ## Errors
  *
  * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and
- * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in: COEFFICIENTS_ERR_SIZE.
- * interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed program_check a tick
- * never fails. Only program_check validates: what a header demands of the caller is not checked again. Questions with
- * two answers return an int, 1 or 0.
+ * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in:
+ * COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed
+ * program_check a tick never fails. Only program_check validates: what a header demands of the caller is not checked
+ * again. Questions with two answers return an int, 1 or 0.
  *
  * ## Numbers
  *

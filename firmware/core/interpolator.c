@@ -106,8 +106,8 @@ void interpolator_exact_end(const struct program *p, struct interpolator_point *
     }
 }
 
-void interpolator_point_copy_rest(struct interpolator_point *out,
-                                  const struct interpolator_point *from, uint32_t axis_count)
+void interpolator_point_copy_others(struct interpolator_point *out,
+                                    const struct interpolator_point *from, uint32_t axis_count)
 {
     for (uint32_t axis = PROGRAM_PLANE; axis < axis_count && axis < PROGRAM_AXES; axis++) {
         out->position_q40[axis] = from->position_q40[axis];

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/joint_check.h (see there): whether a path goes on smoothly from a segment to the next. */
+/* Implements core/joint_check.h (see there): whether the direction of a path is continuous from a segment to the next.
+ * */
 #include "core/joint_check.h"
 
 #include "core/qwide.h"
@@ -75,8 +76,8 @@ static struct real five_per_speed(const struct program_segment *g, int coefficie
                     real_add(real_make(sigma.high, 50 - 88), real_make(sigma.low, -88)));
 }
 
-/* The slopes of the extra axes by arc length go on: within 2^-20 of one and the slope itself, and what four units of the
- * coefficients make of it. */
+/* The slopes of the extra axes by arc length are continuous: within 2^-20 of (1 + slope), and the effect of four units
+ * of the coefficients. */
 static int same_slopes(const struct program_segment *a, const struct program_segment *b)
 {
     const struct real per_end = five_per_speed(a, 2);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interface of a kernel: it precomputes the coefficients of segments and feed pieces, and evaluates them. Its callers
- * are core/coefficients (precomputing, main loop) and core/interpolator (evaluating, tick).
+ * kernel: the interface of a kernel, which precomputes the coefficients of segments and feed pieces, and evaluates
+ * them. Its callers are core/coefficients (precomputing, main loop) and core/interpolator (evaluating, tick).
  *
- * `kernels_linked` lists the kernels of an image: core/kernels_all.c on a host, one of firmware/targets/kernels_*.c on a
- * microcontroller. Pure, any context.
+ * `kernels_linked` lists the kernels of an image: core/kernels_all.c on a host, one of firmware/targets/kernels_*.c on
+ * a microcontroller. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_H
 #define HODOGRAPH_CORE_KERNEL_H
@@ -25,8 +25,8 @@ enum kernel_number {
 
 #define KERNELS 3u
 
-/* KERNEL_INLINE: for code that the planar and the spatial version of a kernel share. It is inlined into both, so a tick has
- * no additional call. KERNEL_APART: for code of one version only, which stays a function. */
+/* KERNEL_INLINE: for code that the planar and the spatial version of a kernel share. It is inlined into both, so a tick
+ * has no additional call. KERNEL_APART: for code of one version only, which stays a function. */
 #if defined(__GNUC__)
 #define KERNEL_INLINE static inline __attribute__((always_inline))
 #define KERNEL_APART  __attribute__((noinline))
@@ -35,8 +35,8 @@ enum kernel_number {
 #define KERNEL_APART
 #endif
 
-/* Precomputed coefficients are private to the kernel: `*_size` bytes, aligned to 8. Result parameters come before 64-bit
- * arguments, so that a 32-bit Arm passes all of them in registers. */
+/* Precomputed coefficients are private to the kernel: `*_size` bytes, aligned to 8. Result parameters come before
+ * 64-bit arguments, so that a 32-bit Arm passes all of them in registers. */
 
 /* How a kernel evaluates the path of a program. */
 struct kernel_path {

@@ -91,13 +91,13 @@ static void set_arc(struct kernel_double_arc *k, const struct ph_segment *ph)
     int64_t end_q48[PH_AXES];
     ph_segment_end(ph, end_q48);
     double before = k->c_mm[0];
-    double behind = (double)end_q48[PH_S] / Q48 - before;
+    double after = (double)end_q48[PH_S] / Q48 - before;
     double sigma[3];
     for (int i = 0; i < 3; i++) {
         sigma[i] = (double)ph->sigma_q50_mm[i] / Q50;
     }
     set_inverse(k->inverse[0], before, sigma[1], sigma[0]);
-    set_inverse(k->inverse[1], behind, sigma[1], sigma[2]);
+    set_inverse(k->inverse[1], after, sigma[1], sigma[2]);
 }
 
 static void set_axis(struct kernel_double_axis *k, const struct ph_segment *ph, int axis)

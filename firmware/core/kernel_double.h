@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The double kernel: IEEE double, the host's reference; docs/theory/numerics.md section 11.
- * Only + - * / and conversions, so with -ffp-contract=off its bits are the same on every IEEE host.
- * Pure, tick context.
+ * kernel_double: the double kernel, IEEE double, the host's reference; docs/theory/numerics.md section 11. Only + - * /
+ * and conversions, so with -ffp-contract=off its bits are the same on every IEEE host. Called through struct kernel
+ * (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_DOUBLE_H
 #define HODOGRAPH_CORE_KERNEL_DOUBLE_H
@@ -57,8 +57,8 @@ void kernel_double_piece_at(const void *piece, struct feed_point *out, uint64_t 
 
 void kernel_double_segment_set(void *segment, const struct ph_segment *ph);
 
-/* Point at an arc length of this segment (counted from the start of the program; a little outside
- * is allowed: the curve is continued). Within 1e-9 mm. Three Newton steps, always. */
+/* Point at an arc length of this segment (counted from the start of the program; a little outside is allowed: the curve
+ * is continued). Within 1e-9 mm. Three Newton steps, always. */
 void kernel_double_segment_at(const void *segment, int64_t position_q40[],
                               int64_t arc_length_q40_mm);
 

@@ -33,13 +33,13 @@ static void set_inverses(struct kernel_fixed_arc *k, const struct ph_segment *ph
     ph_segment_end(ph, end_q48);
     int shift = -18 - ph->exponent;
     int32_t before = (int32_t)qmath_shift(ph->c_q48_mm[PH_S][0], shift);
-    int32_t behind = (int32_t)qmath_shift(end_q48[PH_S] - ph->c_q48_mm[PH_S][0], shift);
+    int32_t after = (int32_t)qmath_shift(end_q48[PH_S] - ph->c_q48_mm[PH_S][0], shift);
     int32_t sigma_q30[3];
     for (int i = 0; i < 3; i++) {
         sigma_q30[i] = (int32_t)qmath_shift(ph->sigma_q50_mm[i], shift - 2);
     }
     set_inverse(&k->inverse[0], before, sigma_q30[1], sigma_q30[0]);
-    set_inverse(&k->inverse[1], behind, sigma_q30[1], sigma_q30[2]);
+    set_inverse(&k->inverse[1], after, sigma_q30[1], sigma_q30[2]);
 }
 
 static void set_arc(struct kernel_fixed_arc *k, const struct ph_segment *ph)
@@ -157,12 +157,12 @@ static void tangent(const struct kernel_fixed_segment *k, int32_t z, int32_t rec
     tangent_q25[1] = qmath_mul_hi(2 * qmath_mul_hi(u, v), inverse_q27);
 }
 
-/* Where an arc length is on its segment. */
+/* The place of an arc length on its segment. */
 struct place {
     int32_t z_q31;
-    int64_t rest_q48_mm;    /* the remainder of the arc length there, */
-    int32_t rest_q44_mm;    /* and the same in a word */
-    int32_t reciprocal_q15; /* 1 / (sigma / 2) nearby, normalised */
+    int64_t remainder_q48_mm; /* the remainder of the arc length there, */
+    int32_t remainder_q44_mm; /* and the same in a word */
+    int32_t reciprocal_q15;   /* 1 / (sigma / 2) nearby, normalised */
 };
 
 KERNEL_INLINE struct place find(const struct kernel_fixed_arc *k, int64_t arc_length_q40_mm)
@@ -177,15 +177,15 @@ KERNEL_INLINE struct place find(const struct kernel_fixed_arc *k, int64_t arc_le
         z = newton_step(k, s_q30, z, place.reciprocal_q15);
     }
     place.z_q31 = z;
-    place.rest_q48_mm = s_q48 - horner(k->c_q48_mm, z);
-    place.rest_q44_mm = qmath_clamp32(place.rest_q48_mm >> 4);
+    place.remainder_q48_mm = s_q48 - horner(k->c_q48_mm, z);
+    place.remainder_q44_mm = qmath_clamp32(place.remainder_q48_mm >> 4);
     return place;
 }
 
 KERNEL_INLINE int64_t coordinate_q40(const struct kernel_fixed_axis *k, const struct place *place,
                                      int32_t tangent_q25)
 {
-    int64_t along = qmath_product(place->rest_q44_mm, tangent_q25) >> 21;
+    int64_t along = qmath_product(place->remainder_q44_mm, tangent_q25) >> 21;
     int64_t local = horner(k->c_q48_mm, place->z_q31) + along;
     return k->origin_q40_mm + qmath_round(local, 8);
 }
@@ -236,14 +236,14 @@ static void tangent_in_space(const struct kernel_fixed_space *k, int32_t z, int3
     tangent_q25[2] = qmath_mul_hi(z_q30, inverse_q27);
 }
 
-/* How far the rest of the arc length is in z. */
-static int32_t rest_in_z_q44(const struct kernel_fixed_arc *k, const struct place *place)
+/* The remainder of the arc length, as a difference in z. */
+static int32_t remainder_in_z_q44(const struct kernel_fixed_arc *k, const struct place *place)
 {
-    int32_t rest_q44 = qmath_clamp32(qmath_shift(place->rest_q48_mm, -4 - k->exponent));
-    return qmath_clamp32(qmath_product(rest_q44, place->reciprocal_q15) >> 15);
+    int32_t remainder_q44 = qmath_clamp32(qmath_shift(place->remainder_q48_mm, -4 - k->exponent));
+    return qmath_clamp32(qmath_product(remainder_q44, place->reciprocal_q15) >> 15);
 }
 
-/* Not in the line of a tick without extra axes. */
+/* A function of its own, so that a tick without extra axes does not contain its code. */
 static KERNEL_APART void extras_at(const struct kernel_fixed_space *k, int64_t position_q40[],
                                    int32_t z_q31, int32_t dz_q44)
 {
@@ -262,7 +262,7 @@ void kernel_fixed_space_at(const void *segment, int64_t position_q40[], int64_t 
         position_q40[axis] = coordinate_q40(&k->axes[axis], &place, tangent_q25[axis]);
     }
     if (k->extras != 0) {
-        extras_at(k, position_q40, place.z_q31, rest_in_z_q44(&k->arc, &place));
+        extras_at(k, position_q40, place.z_q31, remainder_in_z_q44(&k->arc, &place));
     }
 }
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The fixed kernel: integers only, for targets without an FPU; the same bits everywhere.
- * Derivation, ranges and the error bound: docs/theory/numerics.md sections 9 and 12. Feed pieces are
- * core/feed_piece.h. Pure, tick context.
+ * kernel_fixed: the fixed kernel, integers only, for targets without an FPU; the same bits everywhere. Derivation,
+ * ranges and the error bound: docs/theory/numerics.md sections 9 and 12. Feed pieces are evaluated by
+ * core/feed_piece.h. Called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop,
+ * the others in the tick.
  *
  * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials
  * in z keep their coefficient k times 2^k, because a product of the upper halves with z in q31 is
@@ -57,9 +58,9 @@ struct kernel_fixed_space {
 
 void kernel_fixed_segment_set(void *segment, const struct ph_segment *ph);
 
-/* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside
- * is allowed: the curve is continued by its tangent). Within 2^-32 mm by the bound that needs no
- * numerics, 2^-37 mm measured. Two Newton steps with one 32-bit division each, 15 wide products. */
+/* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside is allowed: the curve
+ * is continued by its tangent). Within 2^-32 mm by the bound that needs no numerics, 2^-37 mm measured. Two Newton
+ * steps with one 32-bit division each, 15 wide products. */
 void kernel_fixed_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);
 

@@ -47,10 +47,11 @@ static void set_inverses(struct kernel_float_arc *k)
     }
 }
 
-/* By how much polynomials in q48 are shifted down: what the sums of all powers but the linear one need beyond 31 bits. */
+/* By how much polynomials in q48 are shifted down: the bits beyond 31 that the sums of all powers but the linear one
+ * need. */
 static int shift_of(const struct ph_segment *ph)
 {
-    int64_t most = (int64_t)1 << 31; /* the linear one leaves less than that */
+    int64_t most = (int64_t)1 << 31; /* the remainder of the linear one is below it */
     for (int axis = PH_S; axis <= ph_last_axis(ph->axis_count); axis++) {
         int64_t sum = (int64_t)1 << 31;
         for (int i = 2; i < 6; i++) {
@@ -79,7 +80,7 @@ static void kernel_float_set_arc(struct kernel_float_arc *k, const struct ph_seg
     k->shift = 18 + n;
     set_polynomial(&k->p, ph->c_q48_mm[PH_S], shift);
     k->middle_q40_mm = ph->origin_q40_mm[PH_S] + (ph->c_q48_mm[PH_S][0] >> 8);
-    k->middle_rest_q48 = (int32_t)(ph->c_q48_mm[PH_S][0] & 255);
+    k->middle_remainder_q48 = (int32_t)(ph->c_q48_mm[PH_S][0] & 255);
     for (int i = 0; i < 6; i++) {
         k->s[i] = from_q30(qmath_shift(ph->c_q48_mm[PH_S][i], -18 - n));
     }
@@ -92,7 +93,7 @@ static void set_axis(struct kernel_float_axis *k, const struct ph_segment *ph, i
     k->middle_q48_mm = ph->origin_q40_mm[axis] * 256 + ph->c_q48_mm[axis][0];
 }
 
-/* A component of the preimage, normalised. In powers of z it can reach 1.25: a quarter of it fits q30 with room. */
+/* A component of the preimage, normalised. In powers of z it can reach 1.25, so a quarter of it fits q30. */
 static void kernel_float_set_component(float a[3], const int64_t a_q44[3], int exponent)
 {
     for (int i = 0; i < 3; i++) {
@@ -159,8 +160,8 @@ static int64_t polynomial(const struct kernel_float_polynomial *p, int32_t scale
     return qmath_product(value, scale) + qmath_product(p->linear_q17_mm, z_q31);
 }
 
-/* rest times the unit tangent w^2 / |w|^2. */
-static void move_along(const struct kernel_float_segment *k, float z, float rest,
+/* `remainder` (of the arc length) times the unit tangent w^2 / |w|^2. */
+static void move_along(const struct kernel_float_segment *k, float z, float remainder,
                        float move[PROGRAM_PLANE])
 {
     float u = k->u[0] + z * (k->u[1] + z * k->u[2]);
@@ -168,27 +169,27 @@ static void move_along(const struct kernel_float_segment *k, float z, float rest
     float uu = u * u;
     float vv = v * v;
     float sigma = uu + vv;
-    float scale = rest / sigma;
+    float scale = remainder / sigma;
     move[0] = (uu - vv) * scale;
     move[1] = 2.0f * u * v * scale;
 }
 
-/* Where an arc length is on its segment. */
+/* The place of an arc length on its segment. */
 struct place {
     float z;
-    int32_t z_q31;    /* the same, rounded */
-    int32_t rest_q44; /* the remainder of the arc length there */
+    int32_t z_q31;         /* the same, rounded */
+    int32_t remainder_q44; /* the remainder of the arc length there */
 };
 
 KERNEL_INLINE struct place find(const struct kernel_float_arc *k, int64_t arc_length_q40_mm)
 {
     struct place place;
-    int64_t s_q48 = (arc_length_q40_mm - k->middle_q40_mm) * 256 - k->middle_rest_q48;
+    int64_t s_q48 = (arc_length_q40_mm - k->middle_q40_mm) * 256 - k->middle_remainder_q48;
     float s = from_q30(k->shift > 0 ? s_q48 >> k->shift
                                     : qmath_clamp32(s_q48 * ((int64_t)1 << -k->shift)));
     place.z = newton_step(k->s, s, first_guess(k, s));
     place.z_q31 = quantise(place.z);
-    place.rest_q44 = qmath_clamp32((s_q48 - polynomial(&k->p, k->scale, place.z_q31)) >> 4);
+    place.remainder_q44 = qmath_clamp32((s_q48 - polynomial(&k->p, k->scale, place.z_q31)) >> 4);
     return place;
 }
 
@@ -205,7 +206,7 @@ void kernel_float_segment_at(const void *segment, int64_t position_q40[], int64_
     const struct kernel_float_segment *k = segment;
     const struct place place = find(&k->arc, arc_length_q40_mm);
     float move_q44[PROGRAM_PLANE];
-    move_along(k, place.z, (float)place.rest_q44, move_q44);
+    move_along(k, place.z, (float)place.remainder_q44, move_q44);
     for (uint32_t axis = 0; axis < PROGRAM_PLANE; axis++) {
         position_q40[axis] =
             coordinate_q40(&k->axes[axis], k->arc.scale, place.z_q31, move_q44[axis]);
@@ -248,8 +249,8 @@ KERNEL_INLINE float quadratic(const float c[3], float z)
     return c[0] + z * (c[1] + z * c[2]);
 }
 
-/* rest times the unit tangent A i A* / |A|^2; returns rest / |A|^2. */
-static float move_in_space(const struct kernel_float_space *k, float z, float rest,
+/* `remainder` (of the arc length) times the unit tangent A i A* / |A|^2; returns remainder / |A|^2. */
+static float move_in_space(const struct kernel_float_space *k, float z, float remainder,
                            float move[PROGRAM_SPACE])
 {
     float u = quadratic(k->a[PROGRAM_U], z);
@@ -258,7 +259,7 @@ static float move_in_space(const struct kernel_float_space *k, float z, float re
     float q = quadratic(k->a[PROGRAM_Q], z);
     float uv = u * u + v * v;
     float pq = p * p + q * q;
-    float scale = rest / (uv + pq);
+    float scale = remainder / (uv + pq);
     float twice = scale + scale;
     move[0] = (uv - pq) * scale;
     move[1] = (u * q + v * p) * twice;
@@ -275,7 +276,7 @@ KERNEL_INLINE int32_t word(float a)
     return (int32_t)a;
 }
 
-/* Not in the line of a tick without extra axes. */
+/* A function of its own, so that a tick without extra axes does not contain its code. */
 static KERNEL_APART void extras_at(const struct kernel_float_space *k, int64_t position_q40[],
                                    int32_t z_q31, int32_t dz_q44)
 {
@@ -289,7 +290,7 @@ void kernel_float_space_at(const void *segment, int64_t position_q40[], int64_t 
     const struct kernel_float_space *k = segment;
     const struct place place = find(&k->arc, arc_length_q40_mm);
     float move_q44[PROGRAM_SPACE];
-    float scale = move_in_space(k, place.z, (float)place.rest_q44, move_q44);
+    float scale = move_in_space(k, place.z, (float)place.remainder_q44, move_q44);
     for (uint32_t axis = 0; axis < PROGRAM_SPACE; axis++) {
         position_q40[axis] =
             coordinate_q40(&k->axes[axis], k->arc.scale, place.z_q31, move_q44[axis]);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The float kernel, for processors with single precision in hardware. The inverse of arc length and the tangent are
- * computed in single precision, everything else in 32-bit integers with a scale for each segment. It uses no double, and
- * converts only int32 to float and back. Derivation and error bound: docs/theory/numerics.md section 10. Feed pieces are
- * evaluated by core/feed_piece.h.
+ * kernel_float: the float kernel, for processors with single precision in hardware. The inverse of arc length and the
+ * tangent are computed in single precision, everything else in 32-bit integers with a scale for each segment. It uses
+ * no double, and converts only int32 to float and back. Derivation and error bound: docs/theory/numerics.md section 10.
+ * Feed pieces are evaluated by core/feed_piece.h.
  *
- * Only + - * / are used, with -ffp-contract=off: the same bits on every target with IEEE single precision. Called through
- * struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.
+ * Only + - * / are used, with -ffp-contract=off: the same bits on every target with IEEE single precision. Called
+ * through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_FLOAT_H
 #define HODOGRAPH_CORE_KERNEL_FLOAT_H
@@ -14,8 +14,8 @@
 #include "core/extra_axis.h"
 #include "core/ph_segment.h"
 
-#define KERNEL_FLOAT_PARTS                                                                         \
-    4 /* parts of a segment, equal in z, each with its own first guess of the inverse */
+/* parts of a segment, equal in z, each with its own first guess of the inverse */
+#define KERNEL_FLOAT_PARTS 4
 
 /* A coordinate: middle + linear z 2^-31 (q48) + (c1 z + ... + c5 z^5) times the segment's scale. */
 struct kernel_float_polynomial {
@@ -33,10 +33,10 @@ struct kernel_float_inverse {
 
 /* Arc length and its inverse. */
 struct kernel_float_arc {
-    int64_t middle_q40_mm;   /* arc length at z = 0, rounded down, */
-    int32_t middle_rest_q48; /* the part below that rounding */
-    int32_t scale;           /* 2^(48 - q of the polynomials) */
-    int32_t shift;           /* arc length in q48 by this to q30 normalised */
+    int64_t middle_q40_mm;        /* arc length at z = 0, rounded down, */
+    int32_t middle_remainder_q48; /* the part below that rounding */
+    int32_t scale;                /* 2^(48 - q of the polynomials) */
+    int32_t shift;                /* arc length in q48 by this to q30 normalised */
     struct kernel_float_polynomial p;
     float s[6]; /* normalised arc length from the middle */
     struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];

@@ -7,11 +7,11 @@
 #include "core/path_motion.h"
 #include "core/real.h"
 
-#define MOST_PARTS    32u
+#define PARTS_LOG2    5
 #define MOST_HALVINGS 20 /* of a cell */
 #define CUT_STEPS     30
 
-/* A function that stays one, so that its frame is not on the stack while the caller attends to the main loop's work. */
+/* Never inlined, so that its frame is not on the stack while the caller calls program_limits_attend(). */
 #if defined(__GNUC__)
 #define CHECK_APART __attribute__((noinline))
 #else
@@ -19,93 +19,133 @@
 #endif
 
 static const struct real zero = {0, 0};
+static const int32_t factorials[QUANTITIES] = {1, 2, 6};
 
 /* A stretch of a piece on a segment, u from middle - half to middle + half. */
 struct cell {
-    const struct feed_polynomial *poly;
     const struct path *path;
-    struct real
-        c[FEED_DEGREE + 1]; /* F from the piece's start in powers of x = (u - middle) / half */
-    struct real per_s;      /* d x / d t */
-    struct real offset_mm;  /* start of the piece from the start of the segment */
+    /* F from the piece's start in powers of x = (u - middle) / half */
+    struct real c[FEED_DEGREE + 1];
+    struct real per_s;     /* d x / d t */
+    struct real offset_mm; /* start of the piece from the start of the segment */
+};
+
+/* The override bounds of one level, and what follows from them. */
+struct level {
+    struct real f2, f3; /* powers of f, the greatest override */
+    struct real rate;   /* R, 1/s */
+    struct real mixed;  /* 3 f R */
+    struct real second; /* S, 1/s^2 */
+};
+
+/* The override bounds of one piece: those levels that no other one contains. */
+struct levels {
+    struct real greatest; /* override */
+    struct level of[PROGRAM_LEVELS];
+    uint32_t count;
 };
 
 struct check {
     const struct program *program;
     const struct program_limits *limits;
     uint32_t axis_count;
+    struct levels levels;   /* of the present piece */
     struct motion limit;    /* m = 0: none */
     struct real per_period; /* 1/s */
-    struct motion last;     /* at the end of the stretch before; at rest before the first, */
+    struct motion last;     /* at the end of the previous stretch; standstill before the first, */
     int unknown;            /* or not known: before a program that begins in motion */
 };
 
 /* --- The motion at an instant --- */
 
-/* Derivatives 1 to 3 of F in time. */
-static void feed_at(const struct cell *cell, struct real x, struct real f[QUANTITIES])
+static void motion_at(const struct cell *cell, struct real x, struct motion *out)
 {
-    struct real per_s = cell->per_s;
     struct real c[FEED_DEGREE + 1];
+    struct real f[QUANTITIES];
+    struct real per_s = cell->per_s;
     for (int k = 0; k <= FEED_DEGREE; k++) {
         c[k] = cell->c[k];
     }
-    for (int order = 0; order < QUANTITIES; order++) {
-        const int degree = FEED_DEGREE - 1 - order;
-        for (int k = 0; k <= degree; k++) {
-            c[k] = real_times(c[k + 1], k + 1);
+    /* Horner's rule again and again: c[0] to c[3] become the Taylor coefficients at x. */
+    for (int order = 0; order <= QUANTITIES; order++) {
+        for (int k = FEED_DEGREE - 1; k >= order; k--) {
+            c[k] = real_add(real_mul(c[k + 1], x), c[k]);
         }
-        f[order] = real_mul(path_motion_horner(c, degree, x), per_s);
+    }
+    for (int order = 0; order < QUANTITIES; order++) {
+        f[order] = real_times(real_mul(c[order + 1], per_s), factorials[order]);
         per_s = real_mul(per_s, cell->per_s);
     }
-}
-
-static void motion_at(const struct cell *cell, struct real x, struct motion *out)
-{
-    struct real f[QUANTITIES];
-    feed_at(cell, x, f);
-    path_motion_at(cell->path,
-                   real_add(path_motion_horner(cell->c, FEED_DEGREE, x), cell->offset_mm), f, out);
+    path_motion_at(cell->path, real_add(c[0], cell->offset_mm), f, out);
 }
 
 /* --- Against the limits --- */
 
-/* The greatest of a quantity in one level. */
-static void in_level(const struct program_override *own, uint32_t level,
-                     const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
+static int64_t factor_q14(const struct program_override *own, uint32_t level)
 {
-    const int64_t f_q14 =
-        level == PROGRAM_LEVEL_FULL ? own->factor_q14 : (int64_t)program_level_q9(level) * 32;
-    const struct real f = real_make(f_q14, -14);
-    const struct real f2 = real_make(f_q14 * f_q14, -28);
-    const struct real f3 = real_make(f_q14 * f_q14 * f_q14, -42);
-    const struct real rate = real_make((int64_t)program_number(own->rate[level]), -32);
-    const struct real second = real_make((int64_t)program_number(own->second[level]), -24);
-    const struct real mixed = real_times(real_mul(real_mul(f, rate), at_one[ACCELERATION]), 3);
-    out[VELOCITY] = real_mul(f, at_one[VELOCITY]);
-    out[ACCELERATION] =
-        real_add(real_mul(f2, at_one[ACCELERATION]), real_mul(rate, at_one[VELOCITY]));
-    out[JERK] =
-        real_add(real_add(real_mul(f3, at_one[JERK]), mixed), real_mul(second, at_one[VELOCITY]));
+    return level == PROGRAM_LEVEL_FULL ? own->factor_q14 : (int64_t)program_level_q9(level) * 32;
+}
+
+/* 1 when another level allows all that this one allows; of equal levels the first one stays. */
+static int is_contained(const struct program_override *own, uint32_t level)
+{
+    const int64_t f_q14 = factor_q14(own, level);
+    for (uint32_t other = 0; other < PROGRAM_LEVELS; other++) {
+        const int64_t other_q14 = factor_q14(own, other);
+        const int covers = other_q14 >= f_q14 && own->rate[other] >= own->rate[level] &&
+                           own->second[other] >= own->second[level];
+        const int equal = other_q14 == f_q14 && own->rate[other] == own->rate[level] &&
+                          own->second[other] == own->second[level];
+        if (other != level && covers && (!equal || other < level)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static void read_levels(struct levels *levels, const struct program_override *own)
+{
+    levels->count = 0;
+    levels->greatest = zero;
+    for (uint32_t i = 0; i < PROGRAM_LEVELS; i++) {
+        if (is_contained(own, i) != 0) {
+            continue;
+        }
+        struct level *level = &levels->of[levels->count];
+        const int64_t f_q14 = factor_q14(own, i);
+        const struct real f = real_make(f_q14, -14);
+        level->f2 = real_make(f_q14 * f_q14, -28);
+        level->f3 = real_make(f_q14 * f_q14 * f_q14, -42);
+        level->rate = real_make((int64_t)program_number(own->rate[i]), -32);
+        level->mixed = real_times(real_mul(f, level->rate), 3);
+        level->second = real_make((int64_t)program_number(own->second[i]), -24);
+        levels->greatest = real_max(levels->greatest, f);
+        levels->count++;
+    }
 }
 
 /* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
- * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes in, magnitudes out.
+ * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes out.
  * docs/theory/numerics.md section 7. */
-static void at_all_overrides(const struct feed_polynomial *poly,
-                             const struct real at_one[QUANTITIES], struct real out[QUANTITIES])
+static void at_all_overrides(const struct levels *levels, struct real of[QUANTITIES])
 {
-    struct real magnitude[QUANTITIES];
-    struct real own[QUANTITIES];
-    for (int k = 0; k < QUANTITIES; k++) {
-        magnitude[k] = real_abs(at_one[k]);
-        out[k] = zero;
+    const struct real v = real_abs(of[VELOCITY]);
+    const struct real a = real_abs(of[ACCELERATION]);
+    const struct real j = real_abs(of[JERK]);
+    if (v.m == 0 && a.m == 0 && j.m == 0) {
+        return;
     }
-    for (uint32_t level = 0; level < PROGRAM_LEVELS; level++) {
-        in_level(&poly->override, level, magnitude, own);
-        for (int k = 0; k < QUANTITIES; k++) {
-            out[k] = real_max(out[k], own[k]);
-        }
+    of[VELOCITY] = real_mul(levels->greatest, v);
+    of[ACCELERATION] = zero;
+    of[JERK] = zero;
+    for (uint32_t i = 0; i < levels->count; i++) {
+        const struct level *level = &levels->of[i];
+        const struct real acceleration = real_add(real_mul(level->f2, a), real_mul(level->rate, v));
+        const struct real jerk =
+            real_add(real_add(real_mul(level->f3, j), real_mul(level->mixed, a)),
+                     real_mul(level->second, v));
+        of[ACCELERATION] = real_max(of[ACCELERATION], acceleration);
+        of[JERK] = real_max(of[JERK], jerk);
     }
 }
 
@@ -117,76 +157,78 @@ static int passes(struct real value, struct real limit)
 static const int codes[QUANTITIES] = {PROGRAM_ERR_AXIS_VELOCITY, PROGRAM_ERR_AXIS_ACCELERATION,
                                       PROGRAM_ERR_AXIS_JERK};
 
-/* Takes a sample into the peaks. 0, or the code of the limit that it passes. */
+/* 0, or the code of the limit that a quantity with this bound above its sample may pass. */
+static int judge(const struct check *check, const struct motion *sample, const struct motion *bend,
+                 int32_t scale)
+{
+    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
+        for (int k = 0; k < QUANTITIES; k++) {
+            const struct real above = real_scale(bend->of[axis][k], scale);
+            if (passes(real_add(sample->of[axis][k], above), check->limit.of[axis][k])) {
+                return codes[k];
+            }
+        }
+    }
+    return 0;
+}
+
+/* The motion at x, at all overrides. Returns 0, or the code of a limit that it passes. */
 static int take_sample(const struct check *check, const struct cell *cell, struct real x,
-                       struct motion *peak)
+                       struct motion *out)
 {
-    struct motion found;
-    path_motion_clear(&found);
-    motion_at(cell, x, &found);
-    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
-        struct real values[QUANTITIES];
-        at_all_overrides(cell->poly, found.of[axis], values);
-        for (int k = 0; k < QUANTITIES; k++) {
-            if (passes(values[k], check->limit.of[axis][k])) {
-                return codes[k];
-            }
-            peak->of[axis][k] = real_max(peak->of[axis][k], values[k]);
+    int code = 0;
+    path_motion_clear(out);
+    motion_at(cell, x, out);
+    for (uint32_t axis = 0; axis < check->axis_count && code == 0; axis++) {
+        at_all_overrides(&check->levels, out->of[axis]);
+        for (int k = QUANTITIES - 1; k >= 0; k--) {
+            code = passes(out->of[axis][k], check->limit.of[axis][k]) ? codes[k] : code;
         }
     }
-    return 0;
+    return code;
 }
 
-/* 0 when nothing between samples 2 / parts apart in x can pass a limit, else the code of what may. */
-static int judge(const struct check *check, const struct motion *peak, const struct motion *rise,
-                 uint32_t parts_log2)
+/* The bounds of |q''| in a cell, at all overrides. */
+static void bend_of(const struct check *check, const struct cell *cell, struct motion *bend)
 {
+    path_motion_clear(bend);
+    path_motion_bend(cell->path, cell->c, cell->per_s, cell->offset_mm, bend);
     for (uint32_t axis = 0; axis < check->axis_count; axis++) {
-        for (int k = 0; k < QUANTITIES; k++) {
-            /* M h^2 / 8 with h = 2 / parts */
-            const struct real between = real_scale(rise->of[axis][k], -1 - 2 * (int32_t)parts_log2);
-            if (passes(real_add(peak->of[axis][k], between), check->limit.of[axis][k])) {
-                return codes[k];
-            }
-        }
+        at_all_overrides(&check->levels, bend->of[axis]);
     }
-    return 0;
 }
 
-/* One cell without halving: 0 kept, a code with *certain set when a sample passes a limit, else a code. */
+/* One cell without halving, from sample to sample, each as far from the previous one as the limits allow. 0: the limits
+ * are kept; else a code, with *certain set if a sample exceeds the limit. */
 static int check_cell(const struct check *check, const struct cell *cell, int *certain)
 {
     struct motion bend;
-    struct motion peak;
-    int code = 0;
-    path_motion_clear(&peak);
-    path_motion_clear(&bend);
-    path_motion_bend(cell->path, cell->c, cell->per_s, cell->offset_mm, &bend);
-    for (uint32_t axis = 0; axis < check->axis_count; axis++) {
-        struct real values[QUANTITIES];
-        at_all_overrides(cell->poly, bend.of[axis], values);
-        for (int k = 0; k < QUANTITIES; k++) {
-            bend.of[axis][k] = values[k];
-        }
-    }
+    struct motion samples[2];
+    int last = 0;               /* which of the samples the next interval begins with */
+    int32_t at = 0;             /* it begins at -1 + at / 2^(PARTS_LOG2 - 1) */
+    int32_t width = PARTS_LOG2; /* log2 of its width in these parts */
+    bend_of(check, cell, &bend);
+    int code = take_sample(check, cell, real_make(-1, 0), &samples[last]);
     *certain = 1;
-    for (uint32_t log2 = 0; (1u << log2) <= MOST_PARTS; log2++) {
-        const uint32_t parts = 1u << log2;
-        for (uint32_t i = 0; i <= parts; i++) {
-            if (log2 == 0u || (i & 1u) != 0u) { /* the others have been looked at */
-                const int32_t at = 2 * (int32_t)i - (int32_t)parts;
-                code = take_sample(check, cell, real_make(at, -(int32_t)log2), &peak);
-                if (code != 0) {
-                    return code;
-                }
-            }
+    while (code == 0 && at < 1 << PARTS_LOG2) {
+        /* M h^2 / 8 with h = 2^(1 + width - PARTS_LOG2) */
+        const int32_t scale = 2 * (width - PARTS_LOG2) - 1;
+        int open = judge(check, &samples[last], &bend, scale);
+        if (open == 0) {
+            const int32_t next = 2 * (at + (1 << width)) - (1 << PARTS_LOG2);
+            code = take_sample(check, cell, real_make(next, -PARTS_LOG2), &samples[1 - last]);
+            open = code != 0 ? 0 : judge(check, &samples[1 - last], &bend, scale);
         }
-        code = judge(check, &peak, &bend, log2);
-        if (code == 0) {
-            return 0;
+        if (open != 0) {
+            *certain = width > 0;
+            code = width > 0 ? 0 : open;
+            width -= 1;
+        } else {
+            at += 1 << width;
+            last = 1 - last;
+            width += (at & ((2 << width) - 1)) == 0 && width < PARTS_LOG2;
         }
     }
-    *certain = 0;
     return code;
 }
 
@@ -194,7 +236,6 @@ static void set_cell(struct cell *cell, const struct feed_polynomial *poly, cons
                      struct real low, struct real high)
 {
     const struct real half = real_scale(real_sub(high, low), -1);
-    cell->poly = poly;
     cell->path = path;
     for (int k = 0; k <= FEED_DEGREE; k++) {
         cell->c[k] = poly->c[k];
@@ -205,8 +246,8 @@ static void set_cell(struct cell *cell, const struct feed_polynomial *poly, cons
     cell->offset_mm = real_make(poly->start_q40_mm - path->start_q40_mm, -40);
 }
 
-/* Steps from the end of the cell before to the begin of this one: to a drive a step of velocity is an acceleration of step / period, and
- * so on. */
+/* Steps from the end of the previous cell to the start of this one: to a drive a step of velocity is an acceleration of
+ * step / period, and so on. */
 static int check_step(const struct check *check, const struct motion *now)
 {
     const struct real share = real_div(real_make(LIMIT_CHECK_STEP_PERMILLE, 0), real_make(1000, 0));
@@ -225,7 +266,7 @@ static int check_step(const struct check *check, const struct motion *now)
     return 0;
 }
 
-/* The begin of a stretch against the end of the one before. */
+/* The start of a stretch compared with the end of the previous one. */
 static CHECK_APART int check_begin(struct check *check, const struct feed_polynomial *poly,
                                    const struct path *path, struct real low, struct real high)
 {
@@ -250,7 +291,7 @@ static CHECK_APART int check_part(const struct check *check, const struct feed_p
     return check_cell(check, &cell, certain);
 }
 
-/* The stretch of a piece on one segment, halved where need be. */
+/* The stretch of a piece on one segment, halved where necessary. */
 static int check_stretch(struct check *check, const struct feed_polynomial *poly,
                          const struct path *path, struct real low, struct real high)
 {
@@ -279,7 +320,7 @@ static int check_stretch(struct check *check, const struct feed_polynomial *poly
     return code;
 }
 
-/* u at which the piece has come this far from its start, between `low` and 1. */
+/* u at which the piece is at this distance from its start, between `low` and 1. */
 static struct real time_of(const struct feed_polynomial *poly, struct real mm, struct real low)
 {
     struct real high = real_make(1, 0);
@@ -310,6 +351,7 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
     struct path path;
     int code = 0;
     path_motion_read_piece(&poly, p, piece);
+    read_levels(&check->levels, &poly.override);
     while (next_start(p, *segment) <= poly.start_q40_mm) {
         (*segment)++;
     }

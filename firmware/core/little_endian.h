@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Little-endian integers at any alignment, as images and chunks have them. Pure, any context. */
+/* little_endian: reads little-endian integers at any alignment, as images and chunks have them. Used by core/program
+ * and core/chunk. Pure, any context. */
 #ifndef HODOGRAPH_CORE_LITTLE_ENDIAN_H
 #define HODOGRAPH_CORE_LITTLE_ENDIAN_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/override_plan.h (see there): which override ramp comes next on the way to the commanded
+/* Implements core/override_plan.h (see there): which override ramp comes next towards the commanded
  * override, and a tick of it. */
 #include "core/override_plan.h"
 
@@ -9,17 +9,18 @@
 
 #define SMALL   ((int64_t)1 << 28) /* a slope that all bounds allow */
 #define NOWHERE UINT32_MAX
-#define EARLY   16u /* ticks before a rest in which the next ramp is looked for */
+#define EARLY   16u /* ticks before the end of a ramp in which the next one is searched */
 /* Half of a ramp above guaranteed_q57: it leaves less than OVERRIDE_SPARE. */
 #define MOST_TICKS ((uint32_t)1 << 18)
-/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the rest. */
+/* Periods: three ticks from decision to ramp, at twice the override, and rounding; and those until the end of a ramp.
+ * */
 #define MARGIN 8u
 
 static const struct ramp_ticks SHORTEST = {1, 1};
 
 /* --- Commands --- */
 
-static void come_to_rest(struct override_plan *plan)
+static void begin_from_0(struct override_plan *plan)
 {
     memset(&plan->ramp, 0, sizeof plan->ramp);
     plan->now.override_q57 = 0;
@@ -37,15 +38,15 @@ void override_plan_begin(struct override_plan *plan, const struct program *p)
     memset(plan, 0, sizeof *plan);
     override_bounds_of(&plan->guaranteed, p, 0, p->header.piece_count);
     plan->guaranteed_q57 = override_of_factor(plan->guaranteed.factor_q14);
-    plan->asked_q57 = OVERRIDE_ONE;
+    plan->requested_q57 = OVERRIDE_ONE;
     plan->most_q57 = OVERRIDE_MOST;
     plan->commanded_q57 = OVERRIDE_ONE;
-    come_to_rest(plan);
+    begin_from_0(plan);
 }
 
 void override_plan_limit(struct override_plan *plan, int64_t most_q57)
 {
-    const int64_t counts_q57 = qmath_lesser(plan->asked_q57, most_q57);
+    const int64_t counts_q57 = qmath_lesser(plan->requested_q57, most_q57);
     plan->most_q57 = most_q57;
     if (plan->commanded_q57 != counts_q57) {
         plan->commanded_q57 = counts_q57;
@@ -68,12 +69,12 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     plan->guaranteed = *least;
     plan->guaranteed_q57 = override_of_factor(least->factor_q14);
     plan->ahead.bounds =
-        &plan->guaranteed; /* of a window of the program before: not looked at again */
+        &plan->guaranteed; /* of a window of the previous program: not evaluated again */
     plan->ends_q32_s -= plan->ends_q32_s < shift_q32_s ? plan->ends_q32_s : shift_q32_s;
     plan->searched = NOWHERE;
 }
 
-void override_plan_let_go(struct override_plan *plan)
+void override_plan_forget_records(struct override_plan *plan)
 {
     if (plan->ahead.bounds != NULL) {
         plan->kept = *plan->ahead.bounds;
@@ -84,20 +85,20 @@ void override_plan_let_go(struct override_plan *plan)
 void override_plan_begin_next(struct override_plan *plan, const struct program_override *least)
 {
     override_plan_carry(plan, least, 0);
-    come_to_rest(plan);
+    begin_from_0(plan);
     plan->started = 0;
 }
 
-void override_plan_rest(struct override_plan *plan)
+void override_plan_restart(struct override_plan *plan)
 {
     plan->started = 1;
-    come_to_rest(plan);
+    begin_from_0(plan);
 }
 
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
     const uint32_t used = percent < OVERRIDE_MOST_PERCENT ? percent : OVERRIDE_MOST_PERCENT;
-    plan->asked_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
+    plan->requested_q57 = (int64_t)qmath_div_u64(((uint64_t)OVERRIDE_ONE >> 2) * used, 25u);
     override_plan_limit(plan, plan->most_q57);
 }
 
@@ -113,7 +114,7 @@ void override_plan_release(struct override_plan *plan)
     plan->steady = 0;
 }
 
-void override_plan_rise_no_more(struct override_plan *plan)
+void override_plan_end_rise(struct override_plan *plan)
 {
     if (plan->ramp.step_q56 > 0) {
         override_ramp_cut(&plan->ramp);
@@ -139,8 +140,8 @@ static int64_t factor_q57(const struct override_window *w)
     return override_of_factor(w->bounds->factor_q14);
 }
 
-/* Where the override rests next: the end of a ramp that falls to it. */
-static int64_t next_rest(const struct override_plan *plan)
+/* The next constant override: the end of a ramp under way. */
+static int64_t next_constant(const struct override_plan *plan)
 {
     return override_ramp_moves(&plan->ramp) ? plan->ramp.end_q57 : plan->now.override_q57;
 }
@@ -156,14 +157,14 @@ static void begin_search(struct override_plan *plan, enum override_kind kind, in
 {
     plan->task = OVERRIDE_SEARCHES;
     plan->kind = kind;
-    plan->ends_q32_s = UINT64_MAX; /* until one is found that ends where the override may stay */
+    plan->ends_q32_s = UINT64_MAX; /* until a ramp is found that ends at a permitted override */
     plan->target_q57 = target_q57;
-    plan->step = OVERRIDE_LOOKS;
+    plan->step = OVERRIDE_EVALUATES;
     plan->window = 0;
 }
 
-/* The ramp back that was found before the override went up. */
-static void go_back(struct override_plan *plan)
+/* Begins the return ramp, which was found before the override rose. */
+static void begin_return(struct override_plan *plan)
 {
     plan->ticks = plan->back;
     plan->kind = OVERRIDE_RETURN;
@@ -172,8 +173,8 @@ static void go_back(struct override_plan *plan)
     plan->task = OVERRIDE_BEGINS;
 }
 
-/* No window will do for what was looked for, which was not to settle. */
-static void give_up(struct override_plan *plan)
+/* No window allows what was searched, which was not OVERRIDE_SETTLE. */
+static void search_failed(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
     plan->task = OVERRIDE_DECIDES;
@@ -181,14 +182,15 @@ static void give_up(struct override_plan *plan)
         begin_search(plan, OVERRIDE_CLIMB, plan->wanted_q57);
     } else if (now_q57 > plan->guaranteed_q57) {
         if (plan->kind == OVERRIDE_RETURN || now_q57 > plan->wanted_q57 + OVERRIDE_SPARE) {
-            go_back(plan);
+            begin_return(plan);
         }
     } else if (now_q57 != plan->guaranteed_q57) {
         begin_search(plan, OVERRIDE_SETTLE, plan->guaranteed_q57);
     }
 }
 
-/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window: then `target_q57` is it. */
+/* Whether a ramp up to an override above guaranteed_q57 is useful, and allowed in the window. Sets `target_q57` to that
+ * override. */
 static int may_climb(struct override_plan *plan)
 {
     const int64_t now_q57 = plan->now.override_q57;
@@ -198,24 +200,25 @@ static int may_climb(struct override_plan *plan)
            qmath_magnitude(plan->target_q57 - now_q57) > OVERRIDE_SPARE;
 }
 
-/* What the window allows, for an override above guaranteed_q57. */
+/* Limits the target to the factor of the window, for an override above guaranteed_q57. */
 static void check_factor(struct override_plan *plan)
 {
     if (plan->kind == OVERRIDE_CLIMB) {
         if (!may_climb(plan)) {
-            give_up(plan);
+            search_failed(plan);
         }
     } else if (factor_q57(&plan->ahead) < plan->now.override_q57) {
         if (plan->kind == OVERRIDE_STAY) {
-            give_up(plan);
+            search_failed(plan);
         } else {
-            plan->step = OVERRIDE_LOOKS;
+            plan->step = OVERRIDE_EVALUATES;
         }
     }
 }
 
-/* The next window. Behind the last, below guaranteed_q57, the least bounds of the program, which always do. */
-static void look(struct override_plan *plan, const struct program_clock *clock)
+/* Evaluates the next window. After the last one, below guaranteed_q57, the least bounds of the program, which are
+ * always enough. */
+static void evaluate_window(struct override_plan *plan, const struct program_clock *clock)
 {
     plan->step = OVERRIDE_STAGES;
     if (plan->window < OVERRIDE_WINDOWS) {
@@ -228,14 +231,15 @@ static void look(struct override_plan *plan, const struct program_clock *clock)
         plan->ahead.bounds = &plan->guaranteed;
         plan->ahead.end_q32_s = UINT64_MAX;
     } else {
-        give_up(plan);
+        search_failed(plan);
     }
     if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY) {
-        override_change_of(&plan->change, next_rest(plan), plan->target_q57);
+        override_change_of(&plan->change, next_constant(plan), plan->target_q57);
     }
 }
 
-/* How far one ramp may go with the bounds of the window. Above guaranteed_q57 it goes all the way, or not at all. */
+/* How far one ramp may go with the bounds of the window. Above guaranteed_q57 one ramp makes the whole change, or none.
+ * */
 static void find_stage(struct override_plan *plan)
 {
     plan->step = OVERRIDE_MEASURES;
@@ -248,13 +252,13 @@ static void find_stage(struct override_plan *plan)
     if (plan->kind == OVERRIDE_CLIMB) {
         plan->stage.level = PROGRAM_LEVEL_FULL;
         if (plan->stage.end_q57 != plan->target_q57) {
-            give_up(plan);
+            search_failed(plan);
         }
     }
 }
 
-/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above guaranteed_q57 the ramp
- * back. */
+/* Greatest change of the override that the same ticks have to be enough for: the ramp, and above guaranteed_q57 the
+ * ramp back. */
 static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
 {
     const int64_t back_q57 = plan->high_q57 - plan->guaranteed_q57 + OVERRIDE_SPARE;
@@ -268,7 +272,7 @@ static int64_t change_q57(const struct override_plan *plan, int64_t from_q57)
 /* How long the ramp takes. */
 static void measure(struct override_plan *plan, const struct program_clock *clock)
 {
-    const int64_t from_q57 = next_rest(plan);
+    const int64_t from_q57 = next_constant(plan);
     struct ramp_limits limits;
     plan->step = OVERRIDE_FITS;
     plan->high_q57 = from_q57;
@@ -291,8 +295,8 @@ static int fits(struct override_plan *plan, const struct program_clock *clock)
            (plan->kind == OVERRIDE_SETTLE || plan->ticks.half < MOST_TICKS);
 }
 
-/* Until when an override above guaranteed_q57 may last: the ramp back, at most at this override, ends inside the window.
- * 0: not at all. */
+/* Until when an override above guaranteed_q57 may last, so that the return ramp, at most at this override, ends inside
+ * the window. 0: not at all. */
 static uint64_t return_by(const struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t span = margin_q32(plan, clock) +
@@ -301,13 +305,13 @@ static uint64_t return_by(const struct override_plan *plan, const struct program
     return plan->ticks.half < MOST_TICKS && span < end_q32_s ? end_q32_s - span : 0;
 }
 
-/* The present override stays, for longer than is known; or a ramp up begins, for which the window has the time of the ramp
- * back too. */
+/* The present override may stay for a longer time than before; or a ramp up begins, if the window has time for the
+ * return ramp as well. */
 static void fit_above(struct override_plan *plan, const struct program_clock *clock)
 {
     const uint64_t by_q32_s = return_by(plan, clock);
     const int stays = plan->kind == OVERRIDE_STAY;
-    /* by then, if the ramp up takes what the ramp back may take */
+    /* latest end of the ramp up, if it takes as long as the return ramp */
     const uint64_t there_q32_s = plan->ahead.end_q32_s - by_q32_s;
     if (stays ? by_q32_s <= plan->return_q32_s
               : by_q32_s == 0 || qmath_q32_of_q42(clock->time_q42_s) + there_q32_s > by_q32_s) {
@@ -323,14 +327,14 @@ static void fit_above(struct override_plan *plan, const struct program_clock *cl
 
 void override_plan_search(struct override_plan *plan, const struct program_clock *clock)
 {
-    if (plan->step == OVERRIDE_LOOKS) {
-        look(plan, clock);
+    if (plan->step == OVERRIDE_EVALUATES) {
+        evaluate_window(plan, clock);
     } else if (plan->step == OVERRIDE_STAGES) {
         find_stage(plan);
     } else if (plan->step == OVERRIDE_MEASURES) {
         measure(plan, clock);
     } else {
-        plan->step = OVERRIDE_LOOKS;
+        plan->step = OVERRIDE_EVALUATES;
         if (plan->kind == OVERRIDE_STAY || plan->kind == OVERRIDE_CLIMB) {
             fit_above(plan, clock);
         } else if (fits(plan, clock)) {
@@ -339,7 +343,7 @@ void override_plan_search(struct override_plan *plan, const struct program_clock
     }
 }
 
-/* --- At rest --- */
+/* --- At a constant override --- */
 
 static void begin_ramp(struct override_plan *plan, int64_t step_q56)
 {
@@ -389,12 +393,12 @@ static void decide(struct override_plan *plan, const struct program_clock *clock
     }
 }
 
-/* At rest, and not steady: one step of deciding what to do next. */
+/* At a constant override that is not the commanded one: one step of the decision. */
 static void tick_of_decision(struct override_plan *plan, const struct program_clock *clock)
 {
     if (plan->now.override_q57 > plan->guaranteed_q57 &&
         qmath_q32_of_q42(clock->time_q42_s) >= plan->return_q32_s) {
-        go_back(plan);
+        begin_return(plan);
     }
     if (plan->task == OVERRIDE_BEGINS) {
         const int64_t change_q57 = qmath_magnitude(plan->stage.end_q57 - plan->now.override_q57);
@@ -406,8 +410,8 @@ static void tick_of_decision(struct override_plan *plan, const struct program_cl
     }
 }
 
-/* 1 when the override is where it is wanted and may stay there whatever the pieces are. Then the next tick is like this
- * one, and what was planned is off. */
+/* 1 if the override is the commanded one and all pieces allow it. Then the next tick is like this one, and a plan is
+ * dropped. */
 static int comes_steady(struct override_plan *plan)
 {
     const int64_t wanted_q57 = wanted_override(plan);
@@ -423,8 +427,8 @@ static int comes_steady(struct override_plan *plan)
 
 /* --- On a ramp --- */
 
-/* Another override is wanted: the ramp goes on until a cut would end there, or beyond it. Not above guaranteed_q57 on the
- * way down, where nothing says how to return. */
+/* Another override is commanded: the ramp continues until a cut would end there, or beyond. Above guaranteed_q57 a
+ * falling ramp is not cut, because no return ramp would be known. */
 static void change_target(struct override_plan *plan, int64_t wanted_q57)
 {
     struct override_ramp *ramp = &plan->ramp;
@@ -436,7 +440,7 @@ static void change_target(struct override_plan *plan, int64_t wanted_q57)
     }
 }
 
-/* A stage ends soon: the next one is looked for, so that the rest between them is short. */
+/* A stage ends soon: searches the next one, so that the time of constant override between them is short. */
 static void search_early(struct override_plan *plan, const struct program_clock *clock,
                          int64_t wanted_q57)
 {
@@ -467,7 +471,7 @@ static int64_t next_slope(struct override_plan *plan, const struct program_clock
 
 /* --- Tick --- */
 
-/* A program begins with feed and acceleration zero: there the override may step. */
+/* A program begins with feed and acceleration 0: there the override may change in a step. */
 static void first_tick(struct override_plan *plan, struct program_clock *clock)
 {
     plan->started = 1;
@@ -499,7 +503,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
         tick_of_ramp(plan, clock);
         return;
     }
-    if (clock->even_q62_s == 0) { /* after a ramp: not in its last tick, which takes long itself */
+    if (clock->even_q62_s == 0) { /* after a ramp; its last tick has no time for it */
         clock->even_q62_s = program_clock_step_q62_s(clock, &plan->now, 0);
     }
     if (!comes_steady(plan)) {
@@ -512,7 +516,7 @@ void override_plan_change(struct override_plan *plan, struct program_clock *cloc
 
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock)
 {
-    if (plan->steady != 0) { /* nothing is on its way: the same again */
+    if (plan->steady != 0) { /* no ramp and no search: as in the last tick */
         program_clock_advance_even(clock, plan->now.override_q57);
     } else {
         override_plan_change(plan, clock);

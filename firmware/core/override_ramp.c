@@ -20,10 +20,10 @@ void override_bounds_of(struct program_override *out, const struct program *p, u
                         uint32_t count)
 {
     const uint32_t left = p->header.piece_count - first;
-    const uint32_t behind = first + least(count, left);
+    const uint32_t after = first + least(count, left);
     struct program_override own;
     program_piece_override(p, first, out);
-    for (uint32_t i = first + 1u; i < behind; i++) {
+    for (uint32_t i = first + 1u; i < after; i++) {
         program_piece_override(p, i, &own);
         out->factor_q14 = (uint16_t)least(out->factor_q14, own.factor_q14);
         for (uint32_t k = 0; k < PROGRAM_LEVELS; k++) {
@@ -51,7 +51,7 @@ static uint32_t level_of(int64_t override_q57)
     return level;
 }
 
-/* The bounds of the higher level are not much below those of the lower one: a rest between them would gain nothing. */
+/* The bounds of the higher level are not much below those of the lower one: two ramps would not be faster than one. */
 static int alike(const struct program_override *bounds, uint32_t high, uint32_t low)
 {
     return bounds->rate[high] + ALIKE >= bounds->rate[low] &&
@@ -81,7 +81,7 @@ static void stage_up(struct ramp_stage *out, const struct program_override *boun
     out->end_q57 = level < change->last ? override_of(level) : change->to_q57;
 }
 
-/* To rest just inside the first level below whose bounds are not alike. */
+/* The stage ends just inside the first lower level with different bounds. */
 static void stage_down(struct ramp_stage *out, const struct program_override *bounds,
                        const struct ramp_change *change)
 {
@@ -108,8 +108,8 @@ void override_stage_of(struct ramp_stage *out, const struct program_override *bo
 
 /* --- Bounds of a level --- */
 
-/* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms:
- * R = number 2^21 h / 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
+/* A code above 0 is T 2^s / 2^16 octaves, T from 2^16 (program_number). With h the period in ms: R = number 2^21 h /
+ * 125, so 2^61 / R = (125 2^40 / T) 2^-s / h; S = number 2^26 h^2 / 15625. */
 void override_limits_of(struct ramp_limits *out, const struct program_override *bounds,
                         uint32_t level, uint32_t period_log2)
 {
@@ -130,7 +130,7 @@ void override_limits_of(struct ramp_limits *out, const struct program_override *
     const uint32_t down = 25u + 32u + period_log2 - (apart >> 3);
     out->inverse_slope = (slopes[rate & 7u] >> ((rate >> 3) + period_log2)) + 1u;
     out->inverse_root = (roots[second & 15u] >> ((second >> 4) + period_log2)) + 1u;
-    out->turns = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
+    out->rate_ticks = (down < 32u ? ratios[apart & 7u] >> down : 0u) + 1u;
 }
 
 /* --- Duration --- */
@@ -141,11 +141,11 @@ void override_ticks_of(struct ramp_ticks *ticks, const struct ramp_limits *limit
     const uint32_t change_q30 = (uint32_t)(change_q57 >> 27) + 1u;
     const int shift = qmath_clz32(change_q30) & ~1;
     const uint32_t root = qmath_root_above(change_q30 << shift);
-    const uint32_t turns =
+    const uint32_t rate_ticks =
         ((uint32_t)(qmath_product_unsigned(root, limits->inverse_root) >> 32) >> (shift / 2)) + 1u;
     const uint32_t half =
         ((uint32_t)(qmath_product_unsigned(change_q30, limits->inverse_slope) >> 32) >> 3) + 1u;
-    ticks->rise = turns < limits->turns ? turns : limits->turns;
+    ticks->rise = rate_ticks < limits->rate_ticks ? rate_ticks : limits->rate_ticks;
     ticks->half = half > ticks->rise ? half : ticks->rise;
 }
 

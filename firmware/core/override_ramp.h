@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Ramps of the feed override: how the override goes from one value to another, at rest at both.
+ * override_ramp: ramps of the feed override from one constant value to another. Used by core/override_plan.
  *
- * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"), 1 as
- * planned. On a ramp its second derivative is constant in each tick, so the override is piecewise quadratic in time.
- * What the feed pieces of a program allow its two derivatives is given by level of the override
- * (docs/reference/protocol.md 1.3); a ramp keeps the bounds of the level of its greatest override, so a change through
+ * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"); 1 is the
+ * nominal motion. On a ramp its second derivative is constant in each tick, so the override is piecewise quadratic in
+ * time. The feed pieces of a program bound its first two derivatives, for each level of the override
+ * (docs/reference/protocol.md 1.3). A ramp keeps the bounds of the level of its greatest override. So a change through
  * several levels is made in stages (section 12, "Levels").
  *
  * Units: override in 2^-57, its slope in 2^-56 a tick, its second difference in 2^-56 a tick squared. A tick that takes
@@ -57,7 +57,7 @@ struct ramp_stage {
     uint32_t level;
 };
 
-/* A change of the override, whatever the bounds are: its ends, and the levels of its first part and of its last. */
+/* A change of the override, independent of bounds: its ends, and the levels of its first part and of its last. */
 struct ramp_change {
     int64_t from_q57;
     int64_t to_q57;
@@ -67,14 +67,14 @@ struct ramp_change {
 
 void override_change_of(struct ramp_change *out, int64_t from_q57, int64_t to_q57);
 
-/* The first stage of a change. Levels whose bounds are alike are one. */
+/* The first stage of a change. Levels with nearly equal bounds count as one. */
 void override_stage_of(struct ramp_stage *out, const struct program_override *bounds,
                        const struct ramp_change *change);
 
 /* Bounds of a level as a tick uses them. With R and S the bounds of slope and second difference, in 2^-56 a tick and a
  * tick squared; R from 2^30, S from 2^28, both up to 2^56. */
 struct ramp_limits {
-    uint32_t turns;         /* at least R / S: ticks in which the slope comes to R */
+    uint32_t rate_ticks;    /* at least R / S: ticks in which the slope reaches R */
     uint32_t inverse_slope; /* 2^61 / R, rounded up */
     uint32_t inverse_root;  /* 2^45 / sqrt(S), rounded up */
 };
@@ -85,8 +85,8 @@ void override_limits_of(struct ramp_limits *out, const struct program_override *
 
 /* --- Duration --- */
 
-/* How long a ramp takes: the slope rises for `rise` ticks, at most for `half`; it is `half` ticks from the first to
- * where it begins to fall, and falls as it rose. rise + half ticks in all. */
+/* Duration of a ramp in ticks: the slope rises for `rise` ticks and begins to fall after `half` ticks (rise <= half).
+ * It falls as it rose: rise + half ticks in all. */
 struct ramp_ticks {
     uint32_t rise;
     uint32_t half;
@@ -105,22 +105,22 @@ uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uin
 
 /* --- A ramp under way --- */
 
-/* All zero but `end_q57`: the override is at rest. */
+/* All zero but `end_q57`: the override is constant. */
 struct override_ramp {
     int64_t step_q56; /* signed */
-    int64_t end_q57;  /* where the override would come to rest if the ramp were cut now */
+    int64_t end_q57;  /* where the override would end if the ramp were cut now */
     uint32_t rise;    /* ticks left of each part, */
     uint32_t even;
-    uint32_t fall; /* of what has risen so far */
+    uint32_t fall; /* as many as have risen up to now */
 };
 
 void override_ramp_begin(struct override_ramp *ramp, int64_t from_q57,
                          const struct ramp_ticks *ticks, int64_t step_q56);
 
-/* Comes to rest before the end, if it would have an even slope for long. Before the first tick. */
+/* Shortens a ramp with a long part of constant slope: it ends before its target. Before the first tick. */
 void override_ramp_shorten(struct override_ramp *ramp);
 
-/* Brings the slope to 0 from now on, as fast as it rose. */
+/* Early ramp end: the slope falls to 0 from now on, as fast as it rose. */
 void override_ramp_cut(struct override_ramp *ramp);
 
 static inline int override_ramp_moves(const struct override_ramp *ramp)
@@ -128,7 +128,7 @@ static inline int override_ramp_moves(const struct override_ramp *ramp)
     return (ramp->rise | ramp->even | ramp->fall) != 0u;
 }
 
-/* Slope at the end of the next tick, which has this one at its begin. */
+/* Slope at the end of the next tick, which has this one at its start. */
 int64_t override_ramp_slope(struct override_ramp *ramp, int64_t slope_q56);
 
 /* One tick that ends with this slope. */

@@ -16,7 +16,7 @@ struct part {
     int log2;
 };
 
-/* Of each derivative: at the begin of the part, at its end, and how far from the straight line at most. */
+/* Of each derivative: at the start of the part, at its end, and the greatest distance from the straight line. */
 enum number { BEGIN, END, ASIDE, NUMBERS };
 
 void path_bounds_begin(struct path_bounds *bounds, const struct program *p)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Bounds of the first three derivatives of each axis by arc length, on a stretch of the path. Used by the proof of the
- * stops (core/brake_check, for `hodograph verify`).
+ * path_bounds: bounds of the first three derivatives of each axis by arc length, on a stretch of the path. Used by the
+ * proof of the stops (core/brake_check, for `hodograph verify`).
  *
  * Each segment is cut into 8 to 64 equal parts. A shorter stretch takes smaller parts. Stored for each part are the
  * derivatives at both ends and their greatest difference from the straight line between the ends. This difference
@@ -39,16 +39,16 @@ struct path_bounds {
     struct path path;                   /* segment number `segment`, */
     uint32_t segment;                   /* the one read last; UINT32_MAX: none */
     uint32_t size;                      /* numbers of a part, */
-    uint32_t kept;                      /* and how many parts there is room for */
-    uint32_t part_of[PATH_BOUNDS_KEPT]; /* which part is kept there; 0: none */
+    uint32_t kept;                      /* and how many parts can be stored */
+    uint32_t part_of[PATH_BOUNDS_KEPT]; /* which part is stored there; 0: none */
     struct path_bounds_number numbers[PATH_BOUNDS_KEPT * 3u * PROGRAM_PLANE * QUANTITIES];
 };
 
 /* For a program whose segments have passed their checks. */
 void path_bounds_begin(struct path_bounds *bounds, const struct program *p);
 
-/* The stretch from one arc length to another, which lie on the path or are taken as its ends. `segment`: one at or
- * before the segment of the first. Sets the program's axes. */
+/* Bounds on the stretch from one arc length to another; arc lengths beyond the ends of the path count as its ends.
+ * `segment`: the segment of the first, or one before it. Sets the program's axes only. */
 void path_bounds_of(struct path_bounds *bounds, uint32_t segment, int64_t from_q40_mm,
                     int64_t to_q40_mm, struct path_stretch *out);
 

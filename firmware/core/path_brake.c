@@ -13,7 +13,7 @@
 #define ONE_TICK_Q16 65536u
 #define RISE_BITS    7 /* of an acceleration at which a brake begins, over its deceleration */
 #define LEAST        (1 << 22) /* 2^-34 mm a tick squared, or cubed */
-#define FITS_BITS    57        /* of a deceleration that path_brake_fits knows */
+#define FITS_BITS    57        /* of a deceleration in path_brake_fits */
 
 enum phase { FALLING, READY, SETTLING, RESTING };
 
@@ -87,7 +87,7 @@ static int within(uint64_t need, struct rough a, struct rough b, int up)
     return shift >= -63 && have >> -shift >= need;
 }
 
-/* Whether there are whole ticks for the way to rest: b^2 <= 2 j (v - b); for v less b, also a tick later
+/* Whether whole ticks are enough for the release phase: b^2 <= 2 j (v - b); for v less b, also a tick later
  * (docs/theory/numerics.md section 12). */
 static int may_settle(int64_t speed_q56, int64_t fall_q56, int64_t jerk_q56)
 {
@@ -112,7 +112,7 @@ static int in_range(const struct path_state *from, const struct path_brake_numbe
            rise <= MOST_Q56 && (rise >> 30) * (rise >> 30) <= n->jerk_down_q56;
 }
 
-/* Whether the next tick may fall from here: after one without jerk there is still a way to rest. */
+/* Whether the acceleration may fall in the next tick: a release phase is still possible after one more without jerk. */
 static int may_fall(const struct path_state *at, int64_t jerk_up_q56)
 {
     const int64_t a = at->acceleration_q56;
@@ -197,11 +197,11 @@ static int64_t speed_of_rise(int64_t a_q56, int64_t jerk_q56)
     return over_ticks(a_q56, ramp_ticks_q16(a_q56, jerk_q56)) / 2;
 }
 
-/* x^2 + 3/8 y^2 <= 2 a distance, for the distance to rest from an onset `fall` that is behind a speed. */
-static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
-                        int64_t fall_q56, int64_t most_q56, int64_t distance_q40_mm)
+/* x^2 + 3/8 y^2 <= 2 a distance, for the distance to standstill from the end of an onset `fall`. */
+static int ends_within(const struct path_brake_numbers *numbers, int64_t speed_q56,
+                       int64_t fall_q56, int64_t most_q56, int64_t distance_q40_mm)
 {
-    /* what the first jerk leaves of the speed in t ticks, a t / 2, and of the distance, a t^2 / 6 */
+    /* the parts of speed, a t / 2, and distance, a t^2 / 6, of the first jerk in t ticks */
     const uint32_t exact_q16 = ramp_ticks_q16(fall_q56, numbers->jerk_down_q56);
     const uint32_t first_q16 = exact_q16 > ONE_TICK_Q16 ? exact_q16 : ONE_TICK_Q16;
     const int64_t early = over_ticks(fall_q56, first_q16) / 2;
@@ -214,7 +214,7 @@ static int rests_within(const struct path_brake_numbers *numbers, int64_t speed_
                           distance_q40_mm + (saved >> FINE_BITS));
 }
 
-/* The distance is at most that with the deceleration alone from a higher speed, and what the last jerk takes
+/* The distance is at most that with the deceleration alone from a higher speed, and that of the last jerk
  * (docs/theory/numerics.md section 12); the deceleration is one that is about reached. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t distance_q40_mm)
@@ -238,7 +238,7 @@ int path_brake_fits(const struct path_state *from, const struct path_brake_numbe
     if (left_q40_mm <= 0 || most >> FITS_BITS != 0) {
         return 0;
     }
-    return rests_within(numbers, speed, qmath_greater(most + a, 0), most, left_q40_mm);
+    return ends_within(numbers, speed, qmath_greater(most + a, 0), most, left_q40_mm);
 }
 
 /* --- Tick --- */
@@ -260,7 +260,7 @@ static int64_t sixth_of(int64_t a)
     return a < 0 ? -qmath_mul_unsigned(-a, SIXTH_Q32) : qmath_mul_unsigned(a, SIXTH_Q32);
 }
 
-/* Towards the deceleration; or as far as rest can still be reached from. */
+/* Towards the deceleration, as far as a release phase is still possible. */
 static void fall_tick(struct path_brake *brake)
 {
     const struct path_brake_numbers *n = &brake->numbers;
@@ -279,8 +279,8 @@ static void fall_tick(struct path_brake *brake)
     brake->phase = READY;
 }
 
-/* The way to rest: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration are reduced
- * by what rounding takes (docs/theory/numerics.md section 12). */
+/* The release phase: n ticks, n >= 2 v / b, with the jerks 6 (p - q i), i = 0 ... n - 1. Speed and acceleration are
+ * reduced by the rounding error (docs/theory/numerics.md section 12). */
 static void settle(struct path_brake *brake)
 {
     const uint64_t speed = (uint64_t)brake->at.speed_q56;
@@ -328,7 +328,7 @@ void path_brake_step(struct path_brake *brake)
     }
 }
 
-int path_brake_rests(const struct path_brake *brake)
+int path_brake_ended(const struct path_brake *brake)
 {
     return brake->phase == RESTING;
 }

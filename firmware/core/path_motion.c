@@ -1,22 +1,27 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, as numbers that bounds
- * can be proved of. */
+/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, and bounds of it. */
 #include "core/path_motion.h"
 
 #include "core/ph_segment.h"
 
-#define ORDERS        5 /* of time, in majorants: jerk'' is the fifth derivative of the point */
-#define NEWTON_STEPS  4
+#define ORDERS        5     /* of time, in majorants: jerk'' is the fifth derivative of the point */
+#define NEWTON_STEPS  4     /* at most */
+#define SMALL_STEP    (-18) /* log2 of a Newton step after which the error is below the rounding */
 #define ROUNDING_BITS 14
 
 static const struct real zero = {0, 0};
 
+static void clear_axis(struct motion *out, uint32_t axis)
+{
+    for (int k = 0; k < QUANTITIES; k++) {
+        out->of[axis][k] = zero;
+    }
+}
+
 void path_motion_clear(struct motion *out)
 {
     for (uint32_t axis = 0; axis < PROGRAM_AXES; axis++) {
-        for (int k = 0; k < QUANTITIES; k++) {
-            out->of[axis][k] = zero;
-        }
+        clear_axis(out, axis);
     }
 }
 
@@ -70,7 +75,7 @@ void path_motion_stretch(struct real *c, int degree, struct real by)
     }
 }
 
-/* --- What is read from the image --- */
+/* --- Reading the image --- */
 
 /* From Bernstein coefficients of degree 2 to powers. */
 static void to_powers(struct real out[3], const int64_t w_q44[3])
@@ -139,7 +144,8 @@ static void read_space(struct path *path, const struct program_segment *segment)
     }
 }
 
-/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at least. */
+/* Length and the least Bernstein coefficient of sigma; the middle one comes times 3. It is half of the greatest at
+ * least. */
 static void read_speed(struct path *path, const struct program_segment *segment)
 {
     int64_t e_q50[5][PH_AXES];
@@ -203,8 +209,12 @@ static struct real parameter(const struct path *path, struct real s_mm)
     struct real xi = real_div(s_mm, path->length_mm);
     for (int step = 0; step < NEWTON_STEPS; step++) {
         const struct real s = real_mul(path_motion_horner(path->arc, PATH_DEGREE, xi), xi);
-        xi = real_sub(
-            xi, real_div(real_sub(s, s_mm), path_motion_horner(path->sigma, PATH_DEGREE, xi)));
+        const struct real by =
+            real_div(real_sub(s, s_mm), path_motion_horner(path->sigma, PATH_DEGREE, xi));
+        xi = real_sub(xi, by);
+        if (real_less(real_abs(by), real_make(1, SMALL_STEP)) != 0) {
+            break;
+        }
     }
     return xi;
 }
@@ -249,6 +259,16 @@ static void motion_in_plane(const struct path *path, struct real xi,
     out->of[1][JERK] = real_add(real_mul(along, ty), real_mul(across, tx));
 }
 
+/* 1 when an axis does not move on the segment. */
+static int is_still(const struct path *path, uint32_t axis)
+{
+    int32_t any = 0;
+    for (int k = 0; k <= PATH_DEGREE; k++) {
+        any |= path->direction[axis][k].m;
+    }
+    return any == 0 ? 1 : 0;
+}
+
 /* A polynomial of PATH_DEGREE and its first two derivatives. */
 static void taylor(const struct real c[PATH_DEGREE + 1], struct real x, struct real out[3])
 {
@@ -265,7 +285,8 @@ static void taylor(const struct real c[PATH_DEGREE + 1], struct real x, struct r
     out[2] = real_times(half_second, 2);
 }
 
-/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its motion. */
+/* By the chain rule: sigma(xi) xi' = F' gives the derivatives of xi in time, and these with those of each axis its
+ * motion. */
 static void motion_in_space(const struct path *path, struct real xi,
                             const struct real f[QUANTITIES], struct motion *out)
 {
@@ -280,6 +301,10 @@ static void motion_in_space(const struct path *path, struct real xi,
     const struct real bent = real_add(real_mul(d[2], cube), real_mul(d[1], mixed));
     const struct real x3 = real_mul(real_sub(f[2], bent), per_sigma);
     for (uint32_t axis = 0; axis < path->axis_count; axis++) {
+        if (is_still(path, axis) != 0) {
+            clear_axis(out, axis);
+            continue;
+        }
         taylor(path->direction[axis], xi, d);
         out->of[axis][VELOCITY] = real_mul(d[0], x1);
         out->of[axis][ACCELERATION] = real_add(real_mul(d[1], square), real_mul(d[0], x2));
@@ -301,8 +326,8 @@ void path_motion_at(const struct path *path, struct real s_mm, const struct real
 
 /* --- Majorants: coefficients that bound those of the Taylor series at every instant of a cell --- */
 
-/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the distance from the
- * instant. */
+/* Of a polynomial c, at every instant within `half` of `middle`: out[k] bounds the coefficient of the power k of the
+ * distance from the instant. */
 static void majorant(struct real *out, const struct real *c, int degree, struct real middle,
                      struct real half)
 {
@@ -326,44 +351,69 @@ static struct real product_at(const struct real *a, const struct real *b, int n)
     return sum;
 }
 
-/* Sum of polynomial[k] inner^k up to the power `orders`; inner has no constant term. */
-static void compose(struct real out[ORDERS + 1], const struct real polynomial[PATH_DEGREE + 1],
-                    const struct real inner[ORDERS + 1], int orders)
+/* Of the feed polynomial, at every instant from x = -1 to 1. */
+static void feed_majorant(struct real out[FEED_DEGREE + 1], const struct real c[FEED_DEGREE + 1])
 {
-    for (int n = 0; n <= orders; n++) {
-        out[n] = zero;
+    for (int k = 0; k <= FEED_DEGREE; k++) {
+        out[k] = real_abs(c[k]);
     }
-    out[0] = polynomial[PATH_DEGREE];
-    for (int k = PATH_DEGREE - 1; k >= 0; k--) {
-        for (int n = orders; n >= 0; n--) { /* from above: it needs those below only */
-            out[n] = product_at(out, inner, n);
+    for (int k = 0; k < FEED_DEGREE; k++) {
+        for (int i = FEED_DEGREE - 1; i >= k; i--) {
+            out[i] = real_add(out[i], out[i + 1]);
         }
-        out[0] = real_add(out[0], polynomial[k]);
     }
 }
 
-/* Of xi(x), counted from the instant: sigma(xi) xi' = F'. */
-static void parameter_majorant(struct real xi[ORDERS + 1], const struct real poly[FEED_DEGREE + 1],
+/* Of xi(x), counted from the instant, and of its powers: of[m][n] is the coefficient n of the power m. It has none below m. */
+struct parameter_powers {
+    struct real of[PATH_DEGREE + 1][ORDERS + 1];
+};
+
+/* The coefficients n of the powers from the second one on; those below n, and n of the first power, are known. */
+static void powers_at(struct parameter_powers *xi, int n)
+{
+    for (int m = 2; m <= n && m <= PATH_DEGREE; m++) {
+        struct real sum = zero;
+        for (int i = 1; i <= n - m + 1; i++) {
+            sum = real_add(sum, real_mul(xi->of[1][i], xi->of[m - 1][n - i]));
+        }
+        xi->of[m][n] = sum;
+    }
+}
+
+/* Coefficient n of a polynomial of xi(x). */
+static struct real composed_at(const struct real polynomial[PATH_DEGREE + 1],
+                               const struct parameter_powers *xi, int n)
+{
+    struct real sum = n == 0 ? polynomial[0] : zero;
+    for (int m = 1; m <= n && m <= PATH_DEGREE; m++) {
+        sum = real_add(sum, real_mul(polynomial[m], xi->of[m][n]));
+    }
+    return sum;
+}
+
+/* xi(x) from sigma(xi) xi' = F'. */
+static void parameter_majorant(struct parameter_powers *xi, const struct real poly[FEED_DEGREE + 1],
                                const struct real sigma[PATH_DEGREE + 1], struct real per_sigma)
 {
-    struct real inverse[ORDERS];
-    struct real speed[ORDERS + 1];
-    xi[0] = zero;
+    struct real inverse[ORDERS]; /* of sigma */
+    struct real own[ORDERS];     /* of sigma(xi) */
     for (int order = 0; order < ORDERS; order++) {
+        struct real sum = zero;
         inverse[order] = per_sigma;
         if (order > 0) {
-            struct real sum = zero;
-            compose(speed, sigma, xi, order);
+            powers_at(xi, order);
+            own[order] = composed_at(sigma, xi, order);
             for (int k = 1; k <= order; k++) {
-                sum = real_add(sum, real_mul(speed[k], inverse[order - k]));
+                sum = real_add(sum, real_mul(own[k], inverse[order - k]));
             }
             inverse[order] = real_mul(per_sigma, sum);
+            sum = zero;
         }
-        struct real sum = zero;
         for (int k = 0; k <= order; k++) {
             sum = real_add(sum, real_mul(real_times(poly[k + 1], k + 1), inverse[order - k]));
         }
-        xi[order + 1] = real_div(sum, real_make(order + 1, 0));
+        xi->of[1][order + 1] = real_div(sum, real_make(order + 1, 0));
     }
 }
 
@@ -389,27 +439,33 @@ void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE +
     const struct real one = real_make(1, 0);
     struct real poly[FEED_DEGREE + 1];
     struct real polynomial[PATH_DEGREE + 1];
-    struct real xi[ORDERS + 1];
+    struct parameter_powers xi;
     struct real slope[ORDERS];
-    majorant(poly, c, FEED_DEGREE, zero, one);
+    feed_majorant(poly, c);
     const struct real low =
         parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, real_make(-1, 0)), offset_mm));
     const struct real high =
         parameter(path, real_add(path_motion_horner(c, FEED_DEGREE, one), offset_mm));
     const struct real middle = real_scale(real_add(low, high), -1);
-    /* 2^-10 of it more, and 2^-20 of the segment: a feed may creep back by its slack */
+    /* 2^-10 of it more, and 2^-20 of the segment: a feed may go back by its slack */
     struct real half = real_abs(real_scale(real_sub(high, low), -1));
     half = real_add(real_mul(half, real_make(1025, -10)), real_make(1, -20));
     majorant(polynomial, path->sigma, PATH_DEGREE, middle, half);
-    parameter_majorant(xi, poly, polynomial, real_div(one, least_sigma(path, middle, half)));
+    parameter_majorant(&xi, poly, polynomial, real_div(one, least_sigma(path, middle, half)));
     for (int k = 0; k < ORDERS; k++) {
-        slope[k] = real_times(xi[k + 1], k + 1);
+        slope[k] = real_times(xi.of[1][k + 1], k + 1);
     }
+    const struct real per_s2 = real_mul(per_s, per_s);
     for (uint32_t axis = 0; axis < path->axis_count; axis++) {
-        struct real direction[ORDERS + 1];
+        struct real direction[ORDERS];
+        if (is_still(path, axis) != 0) {
+            clear_axis(out, axis);
+            continue;
+        }
         majorant(polynomial, path->direction[axis], PATH_DEGREE, middle, half);
-        compose(direction, polynomial, xi, ORDERS - 1);
-        const struct real per_s2 = real_mul(per_s, per_s);
+        for (int n = 0; n < ORDERS; n++) {
+            direction[n] = composed_at(polynomial, &xi, n);
+        }
         out->of[axis][VELOCITY] = real_mul(real_times(product_at(direction, slope, 2), 2), per_s);
         out->of[axis][ACCELERATION] =
             real_mul(real_times(product_at(direction, slope, 3), 6), per_s2);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The motion of the path axes on one segment, as numbers that bounds can be proved of: velocity, acceleration and jerk of
- * each axis at an instant, and a bound of their second derivatives over a stretch. For the checks of axis limits
- * (core/limit_check.h, core/brake_check.h); docs/theory/numerics.md section 16 has the formulas.
+ * path_motion: the motion of the path axes on one segment: velocity, acceleration and jerk of each axis at an instant,
+ * and a bound of their second derivatives over a stretch. Used by the proofs of axis limits (core/limit_check.h,
+ * core/brake_check.h); docs/theory/numerics.md section 16 has the formulas.
  *
- * A feed polynomial gives arc length in powers of x, which stands for time from -1 to 1 in some unit; `per_s` is dx/dt. With
- * s = middle + half x and per_s = 1 / half the motion is that at 1 mm/s: velocity, acceleration and jerk then are the
- * first three derivatives of the axis by arc length.
+ * A feed polynomial gives arc length in powers of x, which stands for time from -1 to 1 in some unit; `per_s` is dx/dt.
+ * With s = middle + half x and per_s = 1 / half the motion is that at 1 mm/s: velocity, acceleration and jerk then are
+ * the first three derivatives of the axis by arc length.
  *
  * Integers only (core/real.h). Pure functions, main loop.
  */
@@ -48,8 +48,8 @@ struct motion {
     struct real of[PROGRAM_AXES][QUANTITIES];
 };
 
-/* Limits of the path axes of a program in mm and s; m = 0: none. Less 2^-14 of each, for the rounding of numbers here. Returns
- * 0 where there is none at all. */
+/* Limits of the path axes of a program in mm and s; m = 0: none. Less 2^-14 of each, for the rounding of numbers here.
+ * Returns 0 where there is none at all. */
 int path_motion_limits(struct motion *out, const struct program_limits *limits,
                        uint32_t axis_count);
 
@@ -69,13 +69,13 @@ void path_motion_read(struct path *path, const struct program *p, uint32_t i);
 /* Feed piece i of a program that keeps the rules of protocol.md 1.3. */
 void path_motion_read_piece(struct feed_polynomial *poly, const struct program *p, uint32_t i);
 
-/* At an arc length of the segment, with the first three derivatives of arc length in time; the curve is continued beyond its
- * ends. Sets the program's axes. */
+/* At an arc length of the segment, with the first three derivatives of arc length in time; the curve is continued
+ * beyond its ends. Sets the program's axes. */
 void path_motion_at(const struct path *path, struct real s_mm, const struct real f[QUANTITIES],
                     struct motion *out);
 
-/* Bounds of |q''| in x of velocity, acceleration and jerk of each axis, in their units of time, for the feed polynomial c from
- * x = -1 to 1; `offset_mm` is what c is counted from, on the segment. */
+/* Bounds of |q''| in x of velocity, acceleration and jerk of each axis, in their units of time, for the feed polynomial
+ * c from x = -1 to 1; `offset_mm` is what c is counted from, on the segment. */
 void path_motion_bend(const struct path *path, const struct real c[FEED_DEGREE + 1],
                       struct real per_s, struct real offset_mm, struct motion *out);
 

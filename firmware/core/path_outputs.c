@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/path_outputs.h (see there): the outputs of the path at each setpoint. */
 #include "core/path_outputs.h"
 
 #include <string.h>
@@ -12,8 +13,8 @@ void path_outputs_clear(struct path_outputs *outputs)
     memset(outputs, 0, sizeof *outputs);
 }
 
-/* Event number `next` is the next one, if there is such a one. */
-static void look_at_next(struct path_outputs *outputs, const struct program *program)
+/* Reads the place of event number `next`, if it exists. */
+static void read_next(struct path_outputs *outputs, const struct program *program)
 {
     const int is_left = outputs->next < program->header.event_count;
     outputs->program = is_left ? program : NULL;
@@ -44,7 +45,7 @@ static int acts_until(struct path_outputs *outputs, int64_t arc_length_q40_mm)
     program_event_get(program, outputs->next, &event);
     act(outputs, &event);
     outputs->next++;
-    look_at_next(outputs, program);
+    read_next(outputs, program);
     return 1;
 }
 
@@ -73,7 +74,7 @@ void path_outputs_begin(struct path_outputs *outputs, const struct program *prog
                         int64_t arc_length_q40_mm)
 {
     path_outputs_clear(outputs);
-    look_at_next(outputs, program);
+    read_next(outputs, program);
     while (acts_until(outputs, arc_length_q40_mm)) {
     }
 }
@@ -83,13 +84,13 @@ void path_outputs_carry(struct path_outputs *outputs, const struct program *befo
 {
     const uint32_t left_out = program_first_event_from(before, arc_shift_q40_mm);
     outputs->next = outputs->next > left_out ? outputs->next - left_out : 0u;
-    look_at_next(outputs, program);
+    read_next(outputs, program);
 }
 
 void path_outputs_begin_next(struct path_outputs *outputs, const struct program *program)
 {
     outputs->next = 0;
-    look_at_next(outputs, program);
+    read_next(outputs, program);
 }
 
 void path_outputs_step(struct path_outputs *outputs, int64_t arc_length_q40_mm,

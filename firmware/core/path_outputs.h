@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Outputs on the path: which outputs are on, and the values of the analogue ones, at each setpoint of a program.
+ * path_outputs: which outputs of the path are on, and the values of the analogue ones, at each setpoint of a program.
+ * Used by app/machine/motion, app/machine/outputs and the simulations without a bus.
  *
  * An event (docs/reference/protocol.md 1.8) acts in the tick whose setpoint is the first at or past its place. So the
  * outputs depend on the program and the place alone, not on override, holds or the place of the start. A value in
@@ -24,7 +25,7 @@ struct path_outputs_values {
 
 /* Fields but `values` are private. */
 struct path_outputs {
-    const struct program *program; /* NULL: no event is left that could act */
+    const struct program *program; /* NULL: no event follows that could act */
     int64_t next_place_q40_mm;     /* of event `next` */
     uint32_t next;
     uint32_t proportional;               /* bit i: analogue value i follows the feed, */
@@ -32,22 +33,22 @@ struct path_outputs {
     struct path_outputs_values values;
 };
 
-/* All outputs off, and no events. */
+/* All outputs off, and no events. Any context. */
 void path_outputs_clear(struct path_outputs *outputs);
 
-/* From all outputs off: what all events at or before an arc length make of them; a negative one: of a program whose first
- * setpoint is to come. Main loop; linear in the number of events. */
+/* Outputs at an arc length: all off, then switched by the events at or before it. A negative arc length is that of a
+ * program before its first setpoint. Main loop; linear in the number of events. */
 void path_outputs_begin(struct path_outputs *outputs, const struct program *program,
                         int64_t arc_length_q40_mm);
 
-/* Takeover of the next chunk in motion: the outputs stay, and the next event stays the same one. `program` begins at arc
- * length arc_shift_q40_mm of `before` and has the events of `before` from there on (core/chunk.h). Some 32 steps at
- * most. */
+/* Takeover of the next chunk in motion: the outputs stay, and the next event stays the same one. `program` begins at
+ * arc length arc_shift_q40_mm of `before` and has the events of `before` from there on (core/chunk.h). At most some 32
+ * steps. Main loop with the tick held off. */
 void path_outputs_carry(struct path_outputs *outputs, const struct program *before,
                         const struct program *program, int64_t arc_shift_q40_mm);
 
-/* Takeover at rest, of a program whose first setpoint is still to come: the outputs stay, and all its events are to come.
- * Constant time. */
+/* Takeover at rest, before the first setpoint of `program`: the outputs stay, and all its events follow. Main loop with
+ * the tick held off; constant time. */
 void path_outputs_begin_next(struct path_outputs *outputs, const struct program *program);
 
 /* The outputs at a setpoint, at this arc length and with this feed along the path. Tick context; at most

@@ -97,7 +97,7 @@ static int even_exponent(int64_t e_q50[5][PH_AXES])
     return bits + (bits & 1);
 }
 
-/* Keeps what divides by sigma away from 0. */
+/* Replaces a tiny segment, so that no division by a sigma near 0 follows. */
 static void make_straight(struct ph_segment *ph)
 {
     int64_t sigma_q48 = (int64_t)1 << (48 + PH_LEAST_EXPONENT - 1);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A PH segment expanded for evaluation: the one exact-integer step that all kernels start from.
+ * ph_segment: expands a PH segment for evaluation: the one exact-integer step that all kernels start from. Used by the
+ * kernels, core/coefficients and the checks of segments.
  *
  * The image holds the preimage in Bernstein form. Products of its coefficients are formed exactly (25-bit
  * limbs) and give x, y, z and the arc length s as polynomials in z = 2 xi - 1, z from -1 to 1:
@@ -30,8 +31,8 @@ static inline int ph_last_axis(uint32_t axis_count)
  * within 2^-34 mm. */
 #define PH_LEAST_EXPONENT (-34)
 
-/* By how much, relative, 2^exponent is above sigma: |A| in 2^(exponent/2) stays below 1 - 2^-25, so that it is below 1 in
- * the kernels' words after any rounding. */
+/* By how much, relative, 2^exponent is above sigma: |A| in 2^(exponent/2) stays below 1 - 2^-25, so that it is below 1
+ * in the kernels' words after any rounding. */
 #define PH_MARGIN_BITS 24
 
 /* An extra axis in powers of z, exact; the first coefficient contains its start. */
@@ -42,8 +43,8 @@ struct ph_extra {
 /* Needs a segment that keeps the rules of protocol.md 1.2. */
 struct ph_segment {
     int64_t origin_q40_mm[PH_AXES]; /* s, x, y and z at its start, as in the image */
-    /* Powers of z, relative to the origin, by enum ph_axis: value = sum of c[k] z^k. Each
-     * coefficient is within 2^-47 mm of the exact one. */
+    /* Powers of z, relative to the origin, by enum ph_axis: value = sum of c[k] z^k. Each coefficient is within 2^-47
+     * mm of the exact one. */
     int64_t c_q48_mm[PH_AXES][6];
     int64_t sigma_q50_mm[3]; /* parametric speed ds/dxi at xi = 0, 1/2, 1; within 2^-47 */
     /* The preimage in powers of z, times 4: (4 A = a[0] + a[1] z + a[2] z^2), exact; by enum program_component. */

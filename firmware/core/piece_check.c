@@ -153,8 +153,8 @@ static int lasts_long_enough(const struct program *p, uint64_t two_pieces_q32)
     return cut * 15625u > (uint64_t)p->header.period_us << 27;
 }
 
-static int check_neighbours(const struct program *p, uint32_t i, const struct program_piece *before,
-                            const struct program_piece *c)
+static int check_adjacent(const struct program *p, uint32_t i, const struct program_piece *before,
+                          const struct program_piece *c)
 {
     if (i == 0) {
         return check_first(p, c);
@@ -176,7 +176,7 @@ int piece_check_all(const struct program *p, const struct program_limits *limits
     for (*index = 0; *index < p->header.piece_count; (*index)++) {
         program_piece_get(p, *index, &c);
         int code = check_one(&c, limits);
-        code = code != 0 ? code : check_neighbours(p, *index, &before, &c);
+        code = code != 0 ? code : check_adjacent(p, *index, &before, &c);
         if (code != 0) {
             return code;
         }

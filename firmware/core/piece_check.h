@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rules of docs/reference/protocol.md 1.3.
- * Used by program_check. Main loop.
+ * piece_check: checks the rules of feed pieces (docs/reference/protocol.md 1.3). A part of program_check. Pure, main
+ * loop.
  */
 #ifndef HODOGRAPH_CORE_PIECE_CHECK_H
 #define HODOGRAPH_CORE_PIECE_CHECK_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The uploaded program image: reading its header, segments, feed pieces and stops.
+ * program: reads the program image: its header, segments, feed pieces, stop table and events.
  *
  * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The image is
  * never copied; it must stay unchanged as long as a struct program or a struct interpolator refers to it.
@@ -18,10 +18,10 @@
 
 struct kernel; /* core/kernel.h */
 
-#define PROGRAM_PLANE 2u /* path axes of a planar program: x, y */
-#define PROGRAM_SPACE 3u /* at least, of a spatial one: x, y, z; those behind them are extra axes */
-#define PROGRAM_EXTRAS               (PROGRAM_AXES - PROGRAM_SPACE)
-#define PROGRAM_HEADER_SIZE          128u /* and 8 for each path axis behind y */
+#define PROGRAM_PLANE  2u /* path axes of a planar program: x, y */
+#define PROGRAM_SPACE  3u /* at least, of a spatial one: x, y, z; those after z are extra axes */
+#define PROGRAM_EXTRAS (PROGRAM_AXES - PROGRAM_SPACE)
+#define PROGRAM_HEADER_SIZE          128u /* and 8 for each path axis after y */
 #define PROGRAM_SEGMENT_SIZE         72u  /* of a planar program */
 #define PROGRAM_SPACE_SIZE           104u /* of a segment of a spatial one, */
 #define PROGRAM_EXTRA_SIZE           38u  /* and for each extra axis */
@@ -39,7 +39,7 @@ struct kernel; /* core/kernel.h */
 #define PROGRAM_FLAG_COMPACT         4u  /* its records have fewer bytes: only in a chunk */
 #define PROGRAM_DIGITALS             16u /* outputs that events can switch: digital ones, */
 #define PROGRAM_ANALOGUES            3u  /* and analogue ones, so that all fit in one PDO */
-#define PROGRAM_EVENTS_A_TICK        16u /* that a tick can pass at most */
+#define PROGRAM_EVENTS_A_TICK        16u /* the most that a tick can pass */
 
 /* Header of the image, protocol.md 1.1; field names carry the units. */
 struct program_header {
@@ -132,14 +132,14 @@ enum program_stop_kind {
     PROGRAM_STOP_FAULT = 1, /* fault stop: inside the machine's */
 };
 
-/* What a brake along the path may use that begins in a piece, protocol.md 1.4: codes, decoded by core/path_brake. All
- * of them 0: no brake may begin in this piece. */
+/* Stop parameters of a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of them 0: no brake may begin in
+ * this piece. */
 struct program_stop {
     uint8_t jerk_down;
     uint8_t deceleration;
     uint8_t jerk_up;
     uint16_t reserved;
-    uint32_t bound_us; /* from the command, given in this piece, to rest: at most */
+    uint32_t bound_us; /* stop time bound: from a command in this piece to standstill */
 };
 
 /* What an event does, protocol.md 1.8. */
@@ -149,14 +149,14 @@ enum program_event_kind {
     PROGRAM_EVENT_PROPORTIONAL = 3,
 };
 
-/* An event on the path: what becomes of outputs at an arc length. */
+/* An event on the path: outputs that switch at an arc length. */
 struct program_event {
     int64_t place_q40_mm;
     uint8_t kind;    /* enum program_event_kind, of an image that passed program_check */
     uint8_t channel; /* of an analogue output; 0 for digital ones */
     uint16_t mask;   /* digital: the outputs that change; else 0 */
-    int32_t
-        value; /* digital: their levels; analogue: the value; proportional: q16, for each mm/s */
+    /* digital: their levels; analogue: the value; proportional: q16, for each mm/s */
+    int32_t value;
 };
 
 struct program {
@@ -168,7 +168,7 @@ struct program {
 };
 
 /* Opens an image of `size` bytes: magic, version, axis count, header size, counts against the size, CRC. The
- * buffer may be longer than the image says (a fixed store); never shorter. Cost: the CRC, linear in
+ * buffer may be longer than the size in the header (a fixed store); never shorter. Cost: the CRC, linear in
  * the size. Returns 0 or a negative PROGRAM_ERR_... of core/program_rules.h; *p is then not usable.
  */
 int program_open(struct program *p, const uint8_t *image, uint32_t size);
@@ -191,16 +191,16 @@ void program_stop_get(const struct program *p, uint32_t i, enum program_stop_kin
 void program_event_get(const struct program *p, uint32_t i, struct program_event *out);
 int64_t program_event_place(const struct program *p, uint32_t i);
 
-/* Number of the first event at or past an arc length; their count where there is none. Some 32 steps at most. */
+/* Number of the first event at or past an arc length; the count of events if there is none. At most some 32 steps. */
 uint32_t program_first_event_from(const struct program *p, int64_t arc_length_q40_mm);
 
-/* Only the start (arc length) of a segment, only the duration or the start of a piece: cheaper. */
+/* Cheaper than reading the whole record: the start (arc length) of a segment, the duration and the start of a piece. */
 int64_t program_segment_start(const struct program *p, uint32_t i);
 uint64_t program_piece_duration(const struct program *p, uint32_t i);
 int64_t program_piece_start(const struct program *p, uint32_t i);
 
-/* Whether segment or piece i of one program has the numbers of number k of the other, but for the arc length of its start.
- * Of programs with the same number of path axes; one may be compact and the other not. */
+/* Whether segment or piece i of program a equals number k of program b in all but the arc length of its start. Both
+ * have the same number of path axes; one may be compact and the other not. */
 int program_segment_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 int program_piece_alike(const struct program *a, uint32_t i, const struct program *b, uint32_t k);
 
@@ -211,7 +211,7 @@ void program_piece_override(const struct program *p, uint32_t i, struct program_
  * an octave. */
 uint64_t program_number(uint8_t code);
 
-/* Rate of a level below the full one, 2^-9. */
+/* Override of a level below the full one, in 2^-9. */
 static inline uint32_t program_level_q9(uint32_t level)
 {
     static const uint16_t overrides_q9[PROGRAM_LEVEL_FULL] = {320, 448, 488, 504, 509, 511};
@@ -222,8 +222,8 @@ static inline uint32_t program_level_q9(uint32_t level)
  * program that passed program_check. */
 uint32_t program_ticks(const struct program *p);
 
-/* Time scale of a piece: the smallest e with 2^e s not below the duration; -32 ... 31 (above: 31).
- * A duration of 0 gives -32. */
+/* Time scale of a piece: the smallest e with 2^e s not below the duration; -32 ... 31 (above: 31). A duration of 0
+ * gives -32. */
 int program_piece_exponent(uint64_t duration_q32_s);
 
 #endif

@@ -18,8 +18,9 @@ static void set_period(struct program_clock *clock, uint32_t period_us)
     clock->period_us = period_us;
     clock->period_log2 = (period_us >= 2000u ? 1u : 0u) + (period_us >= 4000u ? 1u : 0u) +
                          (period_us >= 8000u ? 1u : 0u);
-    clock->period_q42_s = qmath_div_u64(period, PROGRAM_CLOCK_REST_UNIT);
-    clock->period_rest = (uint32_t)(period - clock->period_q42_s * PROGRAM_CLOCK_REST_UNIT);
+    clock->period_q42_s = qmath_div_u64(period, PROGRAM_CLOCK_REMAINDER_UNIT);
+    clock->period_remainder =
+        (uint32_t)(period - clock->period_q42_s * PROGRAM_CLOCK_REMAINDER_UNIT);
     clock->period_q32_s = (uint32_t)qmath_q32_of_q42(clock->period_q42_s) + 1u;
     /* period_us 2^63 / 46875 in two steps */
     uint64_t high = qmath_div_u64((uint64_t)period_us << 48, 46875u);
@@ -30,7 +31,7 @@ static void set_period(struct program_clock *clock, uint32_t period_us)
 static void set_time(struct program_clock *clock, uint64_t time_q42_s)
 {
     clock->time_q42_s = time_q42_s;
-    clock->rest = 0;
+    clock->remainder = 0;
     clock->fine = 0;
     clock->even_q62_s = 0;
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The rules of a program, for all parts of the check: the codes with which a program is refused (enum program_error),
- * the limits of the controller (struct program_limits), and the place of a fault (struct program_fault).
- * core/program_check.h checks a whole program.
+ * program_rules: what all parts of the program check share: the codes with which a program is refused (enum
+ * program_error), the limits of the controller (struct program_limits), and the place of a fault (struct
+ * program_fault). core/program_check.h checks a whole program. Plain data, any context; program_limits_attend: in the
+ * check, main loop.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_RULES_H
 #define HODOGRAPH_CORE_PROGRAM_RULES_H
@@ -21,8 +22,8 @@ enum program_error {
     PROGRAM_ERR_CRC = -4,     /* CRC-32 of the contents is wrong */
     PROGRAM_ERR_COUNT = -5,   /* no segment or no piece */
     PROGRAM_ERR_STORE = -6,   /* the program store did not keep it (app/program_slot) */
-    PROGRAM_ERR_ROOM =
-        -7, /* image and coefficient cache do not fit the store (app/program_table) */
+    /* image and coefficient cache do not fit the store (app/program_table) */
+    PROGRAM_ERR_ROOM = -7,
     PROGRAM_ERR_KERNEL = -8, /* this controller's image does not have the kernel configured */
     /* header */
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
@@ -44,8 +45,8 @@ enum program_error {
     PROGRAM_ERR_JOIN_ARC = -28,       /* arc lengths differ by more than 2^-34 mm */
     PROGRAM_ERR_JOIN_DIRECTION = -29, /* directions differ by more than 2^-20 rad */
     PROGRAM_ERR_SEGMENT_END = -30, /* the last segment does not end at the length of the header */
-    PROGRAM_ERR_NOT_CLOSED =
-        -31, /* flag "closed", but end and start are more than 2^-24 mm apart */
+    /* flag "closed", but end and start are more than 2^-24 mm apart */
+    PROGRAM_ERR_NOT_CLOSED = -31,
     PROGRAM_ERR_SEGMENT_SHORT = -32, /* a tick at 200 % could cross more than two segment ends */
     PROGRAM_ERR_TRAVEL = -33,        /* leaves the travel limits */
     /* pieces: index = the piece (of a joint: the later one) */
@@ -69,11 +70,11 @@ enum program_error {
     PROGRAM_ERR_AXIS_VELOCITY = -70,     /* above the velocity limit of an axis */
     PROGRAM_ERR_AXIS_ACCELERATION = -71, /* above its acceleration limit */
     PROGRAM_ERR_AXIS_JERK = -72,         /* above its jerk limit */
-    PROGRAM_ERR_AXIS_STEP =
-        -73, /* velocity or acceleration jumps at a joint by more than its limits allow */
+    /* velocity or acceleration jumps at a joint by more than its limits allow */
+    PROGRAM_ERR_AXIS_STEP = -73,
     /* stops: index = the piece */
-    PROGRAM_ERR_STOP_ENTRY =
-        -60, /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
+    /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
+    PROGRAM_ERR_STOP_ENTRY = -60,
     PROGRAM_ERR_STOP_NUMBERS = -61, /* a brake would be above the limits of the controller */
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
@@ -83,37 +84,37 @@ enum program_error {
     PROGRAM_ERR_EVENT_VALUE = -101, /* mask or value outside of what the kind has */
     PROGRAM_ERR_EVENT_PLACE = -102, /* before the event before it, or outside the path */
     PROGRAM_ERR_EVENT_DENSE = -103, /* a tick at 200 % could pass more than 16 events */
-    /* chunks of a stream (core/chunk.h): index = the segment, piece or event of the chunk where it says so, else 0 */
-    PROGRAM_ERR_CHUNK_FORMAT =
-        -80, /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
+    /* chunks of a stream (core/chunk.h): index = the segment, piece or event of the chunk if stated so, else 0 */
+    /* no magic "HDGC", version unknown, size wrong, unknown flag, or a reserved field is not 0 */
+    PROGRAM_ERR_CHUNK_FORMAT = -80,
     PROGRAM_ERR_CHUNK_CRC = -81, /* CRC-32 of the chunk is wrong */
     PROGRAM_ERR_CHUNK_JOB = -82, /* another job than the predecessor's, or job 0 */
-    PROGRAM_ERR_CHUNK_SEQUENCE =
-        -83, /* sequence is not one more than the predecessor's; of a first chunk not 0 */
-    PROGRAM_ERR_CHUNK_FIRST =
-        -84, /* flag FIRST, but a predecessor, shared parts or a start in motion; or none of them */
+    /* sequence is not one more than the predecessor's; of a first chunk not 0 */
+    PROGRAM_ERR_CHUNK_SEQUENCE = -83,
+    /* flag FIRST, but a predecessor, shared parts or a start in motion; or none of them */
+    PROGRAM_ERR_CHUNK_FIRST = -84,
     PROGRAM_ERR_CHUNK_PROGRAM = -85, /* period, axis count or first axis is not the predecessor's */
     PROGRAM_ERR_CHUNK_SHARED = -86,  /* shifts or shared counts do not fit the predecessor */
-    PROGRAM_ERR_CHUNK_SEGMENT =
-        -87, /* a shared segment is not the predecessor's; index = the segment */
+    /* a shared segment is not the predecessor's; index = the segment */
+    PROGRAM_ERR_CHUNK_SEGMENT = -87,
     PROGRAM_ERR_CHUNK_PIECE = -88, /* a shared piece is not the predecessor's; index = the piece */
-    PROGRAM_ERR_CHUNK_OVER =
-        -89, /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
-    PROGRAM_ERR_CHUNK_REST =
-        -79, /* behind a rest it does not begin where its predecessor ends, or flag REST is missing */
-    PROGRAM_ERR_CHUNK_EVENT =
-        -78, /* events of the shared segments are not the predecessor's; index = the event */
+    /* the job has ended or has been stopped, or the configuration has changed (app/stream) */
+    PROGRAM_ERR_CHUNK_OVER = -89,
+    /* after a rest it does not begin where its predecessor ends, or flag REST is missing */
+    PROGRAM_ERR_CHUNK_REST = -79,
+    /* events of the shared segments are not the predecessor's; index = the event */
+    PROGRAM_ERR_CHUNK_EVENT = -78,
 };
 
 /* What this controller allows. */
 struct program_limits {
-    uint32_t
-        axis_count; /* path axes of the machine; a program with another number is refused; 0: any */
+    /* path axes of the machine; a program with another number is refused; 0: any */
+    uint32_t axis_count;
     uint32_t period_us; /* configured period; 0: any allowed one */
     uint32_t feed_um_s; /* 0: no limit; the same for the next two */
     uint32_t acceleration_um_s2;
     uint32_t jerk_mm_s3;
-    /* Of the path axes, those of the program; mm are degrees for an extra axis that turns. */
+    /* Of the path axes of the program; mm are degrees for a rotary axis. */
     int64_t min_q40_mm[PROGRAM_AXES]; /* travel */
     int64_t max_q40_mm[PROGRAM_AXES];
     uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every override; 0: no limit */
@@ -121,8 +122,8 @@ struct program_limits {
     uint32_t axis_jerk_mm_s3[PROGRAM_AXES];
     uint32_t stop_time_ms; /* greatest bound of a fault stop; 0: any */
     uint32_t chunk;        /* 1: a chunk's program may begin in motion (core/chunk.h) */
-    /* Called with `self` at every segment and piece, and at every part of a piece near the limits of axes, so that a main
-     * loop can send heartbeats and make coefficient records meanwhile. May be NULL. */
+    /* Called with `self` at every segment and piece, and at every part of a piece near the limits of axes, so that a
+     * main loop can send heartbeats and make coefficient records during the check. May be NULL. */
     void (*attend)(void *self);
     void *self;
 };

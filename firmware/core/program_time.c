@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/program_time.h (see there): the program time at which a program comes to an arc length. */
+/* Implements core/program_time.h (see there): the program time at which a program reaches an arc length. */
 #include "core/program_time.h"
 
 #include "core/feed_piece.h"

@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements core/qmath.h (see there): divisions and square roots in integers. */
 #include "core/qmath.h"
 
-/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The first
- * estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
+/* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The
+ * first estimate, from the upper half of b, is at most 2 too large (Knuth, TAOCP 2, 4.3.1, theorem B). */
 static uint32_t digit(uint32_t *high, uint32_t next, uint32_t b)
 {
     uint32_t upper = b >> 16;
     uint32_t lower = b & 0xFFFFu;
     uint32_t q = *high / upper;
-    uint32_t rest = *high - q * upper;
+    uint32_t remainder = *high - q * upper;
     for (int i = 0; i < 2; i++) {
-        if (rest < 0x10000u && (q > 0xFFFFu || q * lower > (rest << 16 | next))) {
+        if (remainder < 0x10000u && (q > 0xFFFFu || q * lower > (remainder << 16 | next))) {
             q--;
-            rest += upper;
+            remainder += upper;
         }
     }
     *high = (*high << 16 | next) - q * b;
@@ -31,9 +32,9 @@ static uint64_t divide_by_word(uint64_t a, uint32_t b)
     int shift = qmath_clz32(b);
     uint32_t high = (uint32_t)(a >> 32);
     uint32_t q = high / b;
-    uint64_t rest = ((uint64_t)(high - q * b) << 32 | (uint32_t)a) << shift;
+    uint64_t remainder = ((uint64_t)(high - q * b) << 32 | (uint32_t)a) << shift;
     return (uint64_t)q << 32 |
-           divide_normalised((uint32_t)(rest >> 32), (uint32_t)rest, b << shift);
+           divide_normalised((uint32_t)(remainder >> 32), (uint32_t)remainder, b << shift);
 }
 
 uint64_t qmath_div_u64(uint64_t a, uint64_t b)
@@ -101,8 +102,8 @@ int64_t qmath_fifth(int64_t a)
     return mul_reciprocal(a, 0x33333333u);
 }
 
-/* Of a >= 2^30, by pairs of bits; the remainder goes to rest. */
-static uint32_t root_of_word(uint32_t a, uint32_t *rest)
+/* Square root of a >= 2^30, by pairs of bits; *remainder gets what remains. */
+static uint32_t root_of_word(uint32_t a, uint32_t *remainder)
 {
     uint32_t root = 0;
     for (uint32_t bit = (uint32_t)1 << 30; bit != 0; bit >>= 2) {
@@ -113,7 +114,7 @@ static uint32_t root_of_word(uint32_t a, uint32_t *rest)
             root += bit;
         }
     }
-    *rest = a;
+    *remainder = a;
     return root;
 }
 
@@ -126,9 +127,9 @@ uint64_t qmath_root(uint64_t a)
     }
     int shift = qmath_clz64(a) & ~1;
     uint64_t n = a << shift;
-    uint32_t rest = 0;
-    uint32_t upper = root_of_word((uint32_t)(n >> 32), &rest);
-    uint32_t lower = (rest << 15 | (uint32_t)n >> 17) / upper;
+    uint32_t remainder = 0;
+    uint32_t upper = root_of_word((uint32_t)(n >> 32), &remainder);
+    uint32_t lower = (remainder << 15 | (uint32_t)n >> 17) / upper;
     uint32_t root = (upper << 16) + (lower < 0xFFFFu ? lower : 0xFFFFu);
     root -= (uint64_t)root * root > n ? 1u : 0u;
     return root >> (shift / 2);

@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Integer arithmetic shared by the core: counts of zeros, wide products, slow division.
+ * qmath: integer arithmetic shared by the core: counts of zeros, wide products, slow division.
  *
- * Right shifts of negative numbers: C99 leaves them to the implementation. gcc, clang and every
- * compiler we build with shift arithmetically (floor); the typedef below stops the build where that
- * is not so. Beside it the core relies on one more implementation-defined rule: conversion to a
- * narrower signed type is modulo 2^N. Nothing else.
+ * Right shifts of negative numbers: C99 leaves them to the implementation. gcc, clang and every compiler we build with
+ * shift arithmetically (floor); the typedef below stops the build where that is not so. The core relies on one more
+ * implementation-defined rule: conversion to a narrower signed type is modulo 2^N. Nothing else.
  *
- * All inline functions: constant time, any context.
+ * All functions are pure: any context. The inline ones take constant time.
  *
  * Names of fixed-point numbers, in all of the core:
  *
@@ -85,8 +84,8 @@ static inline int64_t qmath_narrow_signed(int32_t a, int32_t b)
     return (int64_t)((uint64_t)high << 32 | (uint32_t)a * (uint32_t)b);
 }
 
-/* The same number, of which the compiler does not know that: else gcc extends a factor that is used often to 64 bits
- * beforehand and multiplies with four instructions instead of one. */
+/* The same number, hidden from the optimiser: otherwise gcc extends a factor that is used often to 64 bits beforehand
+ * and multiplies with four instructions instead of one. */
 static inline int32_t qmath_plain(int32_t a)
 {
 #if defined(__GNUC__) && defined(__arm__)
@@ -203,7 +202,7 @@ uint64_t qmath_div_up_u64(uint64_t a, uint64_t b);
  * where b is at least 2^-10 of a and has 52 bits. */
 uint64_t qmath_ratio(int64_t a, int64_t b, int bits);
 
-/* floor of the square root: 16 rounds of additions and a 32-bit division. */
+/* floor of the square root: 16 rounds of additions, and one 32-bit division. */
 uint64_t qmath_root(uint64_t a);
 
 /* At least the square root of a, 2^30 <= a, and at most 2^-10 of it and 2 more: a straight line, off by 5 %, and one

@@ -8,7 +8,7 @@
 #define NO_BOUND  UINT32_MAX
 #define END_TICKS 2u /* until a command counts, and until the end of the program is a setpoint */
 
-/* What is beyond these counts as no bound: 2^14 mm/s, 2^24 mm/s^2; so no product below passes 2^63. */
+/* Larger values count as no bound: 2^14 mm/s, 2^24 mm/s^2. So no product below exceeds 2^63. */
 #define MOST_SPEED_UM  ((uint64_t)1 << 24)
 #define MOST_CHANGE_UM ((uint64_t)1 << 34)
 #define MOST_TIME_US   ((uint64_t)1 << 32)
@@ -40,7 +40,7 @@ static uint64_t jerk_time_us(uint64_t change_um, uint64_t jerk_q18)
     return qmath_div_up_u64(change_um * 1000u, greater(jerk_q18 >> 18, 1u));
 }
 
-/* --- What a piece asks of a brake --- */
+/* --- Motion of a piece in which a brake begins --- */
 
 /* a 1000 / 2^bits, up; a < 2^52 */
 static uint64_t thousands(int64_t a, int bits)
@@ -54,7 +54,7 @@ static uint64_t scaled(uint64_t value, uint32_t factor_q24)
     return ((value * (factor_q24 >> 8)) >> 16) + (value >> 16) + 1u;
 }
 
-/* v >= f^3 a^2 / (2 j) and what three ticks change, all at the lowest speed and the strongest deceleration. */
+/* v >= f^3 a^2 / (2 j) and the change in three ticks, all at the lowest speed and the strongest deceleration. */
 static int settled(const struct program *p, uint64_t speed_um, uint64_t falling_um,
                    uint32_t factor_q24, uint64_t jerk_q18)
 {
@@ -91,15 +91,15 @@ static void extent_waits(struct stop_extent *out, const struct program *p,
     out->last = run;
 }
 
-/* Greatest rate of program time in a level. */
+/* Greatest override in a level. */
 static uint32_t level_rate_q24(const struct program_override *bounds, uint32_t level)
 {
     return level == PROGRAM_LEVEL_FULL ? (uint32_t)bounds->factor_q14 << 10
                                        : program_level_q9(level) << 15;
 }
 
-/* Greatest slope of the rate, 2^-16 /s: it rises from 0 and falls to 0 again within a change of the rate by
- * the greatest rate at most, by the second at most. */
+/* Greatest override rate, 2^-16 /s: it rises from 0 and falls to 0 again, with at most the override acceleration, while
+ * the override changes by at most its greatest value. */
 static uint64_t greatest_slope_q16(const struct program_override *bounds, uint32_t level)
 {
     const uint64_t second_q8 =
@@ -152,8 +152,8 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
 
 /* --- The brake --- */
 
-/* The S-curve to rest in continuous time; any deceleration up to the number gives a bound, and the root one that is near the
- * least. */
+/* The S-curve to standstill in continuous time. Any deceleration up to the number gives a bound; that of the root is
+ * near the least bound. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop)
 {
     const struct stop_bound none = {NO_BOUND, NO_BOUND};
@@ -225,7 +225,7 @@ static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t cou
     return micro(program_piece_duration(p, piece) * count, 35, NO_BOUND);
 }
 
-/* For a brake that begins at a rate of one level. */
+/* For a brake that begins at an override of one level. */
 static struct stop_bound level_bound(const struct program *p, const struct stop_start *start,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
@@ -233,7 +233,7 @@ static struct stop_bound level_bound(const struct program *p, const struct stop_
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
     uint64_t little = number(stop->deceleration) * 125u >> 23;
     if (kind == PROGRAM_STOP_HOLD &&
-        from.slope_um > little) { /* a rising rate is cut first, until it adds little */
+        from.slope_um > little) { /* a rising override is cut first, until it adds little */
         more_us += from.cut_us;
         from.cut_us = from.slope_um > MOST_CHANGE_UM || from.cut_us >= (uint64_t)1 << 28
                           ? 0u
@@ -270,7 +270,7 @@ static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
                    lesser(speed_um, MOST_SPEED_UM + 1u) * lesser(wait_us, MOST_TIME_US), 1000000u));
 }
 
-/* The plan goes on through the last eighths of the piece and into the next. */
+/* The nominal motion continues through the last eighths of the piece into the next piece. */
 static struct stop_bound waited(const struct program *p, uint32_t piece, uint32_t eighths,
                                 struct stop_bound next)
 {

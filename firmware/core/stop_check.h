@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it cover the longest
- * stop? The bounds are computed anew from the feed pieces, the override bounds and the stop parameters
- * (docs/theory/numerics.md section 7, "Stops"). A part of program_check; the host tools compute the table with it.
+ * stop_check: checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it
+ * cover the longest stop? The bounds are computed anew from the feed pieces, the override bounds and the stop
+ * parameters (docs/theory/numerics.md section 7, "Stops"). A part of program_check; the host tools compute the table
+ * with it.
  *
  * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.
  * Integer arithmetic; every value is rounded so that a bound is never too short. About 10 000 instructions for each
@@ -22,8 +23,8 @@
 /* The stop parameters that apply are those of a piece that begins within this time: three ticks at 200 %, in periods of
  * program time. */
 #define STOP_WINDOW_TICKS 6u
-#define STOP_WINDOW                                                                                \
-    8 /* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
+/* pieces that begin in it, at most (docs/reference/protocol.md 1.3: no two last less than two periods) */
+#define STOP_WINDOW 8
 
 /* From the command to standstill; saturates at UINT32_MAX. */
 struct stop_bound {
@@ -42,21 +43,22 @@ struct stop_walk {
     uint32_t count;
 };
 
-/* Motion of a piece at the rate 1. */
+/* Motion of a piece at override 1. */
 struct stop_extent {
     uint64_t speed_um;  /* greatest, um/s, */
     uint64_t rising_um; /* and acceleration, um/s^2 */
-    uint32_t
-        waits; /* eighths of the piece, one after the other, in which no brake may fit, at most, */
-    uint32_t last; /* and so many before its end */
+    /* the most eighths of the piece in a row in which no brake may fit, */
+    uint32_t waits;
+    uint32_t last; /* and those at its end */
 };
 
 void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
                        struct stop_extent *out);
 
-/* Where a brake begins: the speed at the greatest rate, the acceleration at a constant rate, and what a changing rate
- * adds. A rate that still rises is below the greatest one by what it gains until its slope is 0, which takes at least
- * cut_us. So the slope adds to the speed only for the time that the brake's jerk takes longer than that. um, s; us. */
+/* Where a brake begins: the speed at the greatest override, the acceleration at a constant override, and what a
+ * changing override adds. An override that still rises is below the greatest one by what it gains until its slope is 0,
+ * which takes at least cut_us. So the slope adds to the speed only for the time by which the brake's jerk takes longer
+ * than cut_us. um, s; us. */
 struct stop_start {
     uint64_t speed_um;
     uint64_t rising_um;
@@ -68,7 +70,7 @@ struct stop_start {
 void stop_level_start(const struct stop_extent *extent, const struct program_override *bounds,
                       uint32_t level, struct stop_start *out);
 
-/* The greatest slope of the rate of program time in a level, 2^-16 /s. */
+/* The greatest override rate in a level, 2^-16 /s. */
 uint64_t stop_level_slope_q16(const struct program_override *bounds, uint32_t level);
 
 /* The brake of the table alone: its continuous curve. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * port.h: everything that the controller needs of a machine, on one page.
+ * port.h: everything that the controller needs of a machine. Called by firmware/app.
  *
  * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
  * includes nothing above this file but the headers of can/. docs/guides/port-to-your-board.md makes one.
@@ -14,8 +14,8 @@
  * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
  * `receive`.) On Linux one thread stands for both interrupts.
  *
- * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. Unless its
- * comment says otherwise, a function may be called from any context. Call none before port_begin().
+ * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. If its comment states nothing else, a
+ * function may be called from any context. Call none before port_begin().
  */
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
@@ -35,20 +35,18 @@ enum port_error {
 
 /* --- Life --- */
 
-/* Sets up clock, bus and store; both interrupts stay off. A hosted port reads its command line, a
- * board ignores it (0, NULL). Returns 0; otherwise main() returns the result as its exit status:
- * the reason has been reported. */
+/* Sets up clock, bus and store; both interrupts stay off. A hosted port reads its command line, a board ignores it (0,
+ * NULL). Returns 0; otherwise main() returns the result as its exit status: the reason has been reported. */
 int port_begin(int argc, char **argv);
 
 /* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
- * failed on the way (the bus went away); that has been reported. Main loop. */
+ * has failed (the bus is gone); that has been reported. Main loop. */
 int port_end(void);
 
-/* True when the machine wants the controller to end (SIGTERM, SIGINT); never on a board without
- * such a request. */
+/* True when the end of the controller is requested (SIGTERM, SIGINT); never on a board without such a request. */
 bool port_stop_requested(void);
 
-/* True when it has been requested a second time: not along the path any more, but as quickly as the drives can. */
+/* True when it has been requested a second time: the drives then stop by their own ramps, not along the path. */
 bool port_stop_insisted(void);
 
 /* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps.
@@ -78,8 +76,8 @@ struct port_handlers {
     void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
     /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A late tick is called late.
      * Where the port has the choice it skips none, and no two are closer than three quarters of a period; a timer whose
-     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. Either way a
-     * program goes on with its next tick: only time is lost. */
+     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. In both cases a
+     * program continues with its next tick: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
@@ -101,15 +99,15 @@ void port_tick_period(uint32_t period_us);
 void port_tick_await(uint32_t guard_us, bool hurry);
 void port_tick_ready(void);
 
-/* Whether ticks have to come in time because drives are real: then none is put off for a main loop that starves. At
- * first they have not. Boards, on which ticks are interrupts, ignore it. Main loop. */
+/* Whether ticks have to come in time because drives are real: then none is delayed for a main loop that gets no
+ * processor time. Initially false. Boards, on which ticks are interrupts, ignore it. Main loop. */
 void port_tick_urgent(bool urgent);
 
 /* How well ticks come in time. Boards: PORT_TIMING_KEPT. Any context. */
 enum port_timing {
     PORT_TIMING_KEPT = 0,     /* by an interrupt, a real-time thread, or virtual time */
     PORT_TIMING_REFUSED = 1,  /* the machine does not permit it: real drives must not be enabled */
-    PORT_TIMING_ACCEPTED = 2, /* the same, and the user has said that it is fine */
+    PORT_TIMING_ACCEPTED = 2, /* the same, and the user has accepted it by an option */
 };
 enum port_timing port_timing(void);
 
@@ -119,27 +117,28 @@ enum port_timing port_timing(void);
 void port_lock(void);
 void port_unlock(void);
 
-/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical section. */
+/* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical
+ * section. */
 void port_wait(uint32_t timeout_us);
 void port_wake(void);
 
-/* Work that is longer than usual has got further: the main loop goes on, though it does not wait. A port with a
- * watchdog feeds it, provided that ticks go on as well; others have nothing to do. Main loop. */
+/* Reports progress in long work, during which the main loop does not call port_wait(). A port with a watchdog feeds it,
+ * provided that ticks come as well; others have nothing to do. Main loop. */
 void port_progress(void);
 
-/* --- Store: two banks for programs, two for parameters, so that what breaks off leaves the other one whole. Main
- * loop --- */
+/* --- Store: two banks for programs, two for parameters, so that an interrupted write leaves the other bank complete.
+ * Main loop --- */
 
 #define PORT_STORE_BANKS      2u /* 0 and 1: programs, as large as there is room for */
 #define PORT_STORE_PARAMETERS 2u /* 2 and 3: parameters, at least PORT_STORE_PARAMETER_BYTES each */
 #define PORT_STORE_BANKS_ALL  4u
 #define PORT_STORE_PARAMETER_BYTES 2048u
 
-uint32_t port_store_size(unsigned bank); /* bytes of a bank; those of a pair are alike */
+uint32_t port_store_size(unsigned bank); /* bytes of a bank; equal in a pair */
 
-/* Erases a bank, its last 16 bytes first; then writes go in ascending order. The one gap that may be left is before the
- * last 16 bytes, which are written at once. What is written can be read at multiples of 8 bytes, and after the last
- * write. 0 or PORT_ERR_STORE. */
+/* Erases a bank, its last 16 bytes first; then writes go in ascending order. One gap is allowed: before the last 16
+ * bytes, which are written at once. Written data can be read at multiples of 8 bytes, and after the last write. 0 or
+ * PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 
@@ -152,13 +151,14 @@ const uint8_t *port_store_data(unsigned bank);
  * Always the same. Main loop. */
 uint8_t *port_stream_memory(uint32_t *size);
 
-/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is streamed. */
+/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is
+ * streamed. */
 uint8_t *port_cache_memory(uint32_t *size);
 
-/* --- Words for a human --- */
+/* --- Console --- */
 
 enum port_level {
-    PORT_NOTE,    /* only where somebody requested it (--verbose) */
+    PORT_NOTE,    /* only if it was requested (--verbose) */
     PORT_WARNING, /* always */
 };
 

@@ -28,7 +28,7 @@ static double quintic(const double *c, double x)
            10.0 * c[3] * (xx * x * yy) + 5.0 * c[4] * (xx * xx * y) + c[5] * (xx * xx * x);
 }
 
-/* The number of the last of joints 0 to N - 1 at or before an arc length. Looks first where the last place was. */
+/* The number of the last of joints 0 to N - 1 at or before an arc length. Searches first at the last place. */
 static uint32_t segment_of(const struct ph_chain *chain, double arc_mm, uint32_t last)
 {
     const double *start = chain->start;
@@ -50,7 +50,7 @@ static uint32_t segment_of(const struct ph_chain *chain, double arc_mm, uint32_t
     return low;
 }
 
-/* Newton's method inside a bracket that shrinks every step, so that it ends also where the speed all but vanishes. */
+/* Newton's method inside a bracket that shrinks in every step, so that it also ends where the speed is nearly 0. */
 static double inverted(const double *arc, const double *speed, double arc_mm, double tolerance)
 {
     const double length = arc[ARC_SIZE - 1];
@@ -88,7 +88,7 @@ void ph_locate(const struct ph_chain *chain, uint32_t count, const double *arc_m
     }
 }
 
-/* Where the derivatives of one place go. */
+/* Where the derivatives of one place are stored. */
 struct ph_frame {
     double *r1, *r2, *r3;
     size_t step; /* from one axis to the next */

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chains of Pythagorean-hodograph quintic segments: places by arc length, and derivatives by arc length there, as the
- * planner of feeds needs them at very many places. docs/theory/numerics.md 4.3 and 5.6, docs/theory/spatial-splines.md 2.
+ * ph_chain: chains of Pythagorean-hodograph quintic segments: places by arc length, and derivatives by arc length
+ * there. The feed planner needs them at very many places. docs/theory/numerics.md 4.3 and 5.6,
+ * docs/theory/spatial-splines.md
+ * 2. Called through host_tools/hodograph/native.
  *
- * Double arithmetic without contraction: the same bits on every computer. No heap. Main loop of a host.
+ * Double arithmetic without contraction: the same bits on every computer. No heap. The functions write the caller's
+ * arrays only; any thread.
  */
 #ifndef HODOGRAPH_NUMERICS_PH_CHAIN_H
 #define HODOGRAPH_NUMERICS_PH_CHAIN_H
@@ -15,7 +18,7 @@
 struct ph_chain {
     uint32_t segments, planar; /* N, at least 1; planar: 1 in the plane, 0 in space */
     uint32_t extra;            /* E; 0 in the plane */
-    const double *start;       /* [N + 1], arc length at the joints, mm; not falling */
+    const double *start;       /* [N + 1], arc length at the joints, mm; never decreasing */
     const double *arc;         /* [N][6], arc length from the start of each segment, mm */
     const double *speed;       /* [N][5], its derivative by xi */
     /* in the plane [N][3][2], real and imaginary part of w; in space [N][4][3], of A */

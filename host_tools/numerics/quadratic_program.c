@@ -2,7 +2,7 @@
 /*
  * Implements numerics/quadratic_program.h (see there).
  *
- * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step asks
+ * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step needs
  *
  *     hessian dx + sum of coefficient d multiplier = -residual of the gradient      coefficient dx + d slack = -excess
  *     multiplier d slack + slack d multiplier = target - multiplier slack
@@ -427,7 +427,7 @@ static void assemble(struct solving *s)
 }
 
 /* Factors the matrix in place: row i of a unit triangle, and the inverse of its pivot. Before the first row are as many
- * of zeros as it looks back. */
+ * rows of zeros as it reads back. */
 static void matrix_factor(struct solving *s)
 {
     double *row = s->matrix;
@@ -441,7 +441,7 @@ static void matrix_factor(struct solving *s)
         row[1] = u2 * pivot[-2];
         row[2] = u1 * pivot[-1];
         const double own = row[3] - u3 * row[0] - u2 * row[1] - u1 * row[2];
-        /* Rounding left no digit of this pivot: the unknown stays as it is. */
+        /* This pivot has no valid digit after rounding: the unknown does not change. */
         pivot[0] = own > LEAST_PIVOT * row[3] && !known(s->given, i) ? 1.0 / own : 0.0;
     }
 }
@@ -510,7 +510,8 @@ static double link_step(struct solving *s, uint32_t interval, double most)
     return most;
 }
 
-/* Solves for a step. Returns the share of it to take: at most 1, and STEP_SHARE of the distance to the nearest boundary. */
+/* Solves for a step. Returns the share of it to take: at most 1, and STEP_SHARE of the distance to the nearest
+ * boundary. */
 static double direction(struct solving *s)
 {
     double most = 1.0 / STEP_SHARE;
@@ -539,7 +540,8 @@ static void correct(struct solving *s, double target)
     }
 }
 
-/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes START_PRODUCT. */
+/* Starts a hard side: the slack that the unknowns leave, or the least one, and the multiplier that makes
+ * START_PRODUCT. */
 static void hard_start(struct side *one, double left)
 {
     const double least = fmax(LEAST_SLACK, START_SLACK * sqrt(dot(one->a, one->a)));

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Convex quadratic programs along a chain of intervals, as the planner of feeds has them: docs/theory/numerics.md 5.6.
+ * quadratic_program: solves convex quadratic programs along a chain of intervals, for the feed planner:
+ * docs/theory/numerics.md 5.6. Called through host_tools/hodograph/native.
  *
  * Each of n + 1 knots has two unknowns. Every row bounds a linear function of the four unknowns at both ends of one
  * interval, and the objective couples no others:
@@ -8,11 +9,11 @@
  *     least  gradient x + x hessian x / 2   where  low <= x <= high,  least <= coefficient x <= most
  *
  * An interior-point method (Mehrotra's predictor and corrector: Wright, Primal-Dual Interior-Point Methods, SIAM 1997,
- * chapter 10). Its equations are condensed to the unknowns, a matrix with three diagonals beside the main one, so that
+ * chapter 10). Its equations are condensed to the unknowns: a matrix with the main diagonal and three on each side. So
  * an iteration takes time proportional to the rows.
  *
- * Double arithmetic without contraction: the same bits on every computer. No heap: the caller lends all arrays. Main
- * loop of a host.
+ * Double arithmetic without contraction: the same bits on every computer. No heap: the caller lends all arrays, and no
+ * others are written. Any thread.
  */
 #ifndef HODOGRAPH_NUMERICS_QUADRATIC_PROGRAM_H
 #define HODOGRAPH_NUMERICS_QUADRATIC_PROGRAM_H
@@ -22,9 +23,9 @@
 
 enum quadratic_status {
     QUADRATIC_SOLVED = 0,
-    QUADRATIC_NEAR = 1,        /* as near as rounding let it come: all residuals below 1e-3 */
+    QUADRATIC_NEAR = 1,        /* rounding allowed no better: all residuals below 1e-3 */
     QUADRATIC_INFEASIBLE = -1, /* no x is inside all bounds and rows */
-    QUADRATIC_STUCK = -2,      /* no solution found, nor that there is none */
+    QUADRATIC_STUCK = -2,      /* neither a solution nor a proof of infeasibility found */
 };
 
 /* A program; inf and -inf: no bound. Unknowns 2 k and 2 k + 1 belong to knot k.
@@ -48,16 +49,16 @@ struct quadratic_program {
 /* How solving ended. */
 struct quadratic_report {
     uint32_t iterations;
-    double violated; /* by how much a row or bound is exceeded at most */
-    double gradient; /* the greatest entry of what remains of the gradient */
-    double gap; /* how far above the least the objective is at most, as a share of itself or of 1 */
+    double violated; /* the most by which a row or bound is exceeded */
+    double gradient; /* the greatest entry of the residual of the gradient */
+    double gap;      /* upper bound of objective less its minimum, as a share of itself or of 1 */
 };
 
 /* Numbers that `work` has to hold. */
 size_t quadratic_work(uint32_t intervals, uint32_t rows);
 
-/* Solves from a first guess: at the call `unknown` (2 n + 2) has about what the unknowns will be, or 0. Returns an enum
- * quadratic_status; below 0 the unknowns are of no use. Unknowns, rows and gradient should be scaled to about 1. About
+/* Solves from a first guess: at the call `unknown` (2 n + 2) has an estimate of the unknowns, or 0. Returns an enum
+ * quadratic_status; below 0 the unknowns are not valid. Unknowns, rows and gradient should be scaled to about 1. About
  * 0.03 ms for each iteration and thousand rows; at most 100 iterations, 15 to 30 as a rule. */
 int quadratic_solve(const struct quadratic_program *program, double *unknown, double *work,
                     struct quadratic_report *report);

@@ -109,7 +109,7 @@ static const struct key keys[KEYS] = {
 
 /* Keys of a kind, as bits. */
 struct needs {
-    uint32_t allowed; /* beside the required ones */
+    uint32_t allowed; /* in addition to the required ones */
     uint32_t required;
 };
 
@@ -141,8 +141,8 @@ static bool is_hex(const char *digits)
     return digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X');
 }
 
-/* Decimal, or hexadecimal after 0x; a leading zero means nothing; fractions in FIELD_NUMBER only. False: no such number.
- * Whole numbers up to 2^53 are exact. */
+/* Decimal, or hexadecimal after 0x; a leading zero means nothing; fractions in FIELD_NUMBER only. False: no such
+ * number. Whole numbers up to 2^53 are exact. */
 static bool read_value(const char *text, enum field_type type, double *out)
 {
     char *end = NULL;
@@ -250,7 +250,7 @@ static bool store_key(struct fault_rule *rule, unsigned key, const char *value)
 
 /* ---- text ---- */
 
-/* Where the text of an error goes, and the line that it is about. */
+/* The buffer for the text of an error, and the line with the error. */
 struct place {
     char *reason;
     size_t size;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and their
- * parser. Pure, but for fault_rules_read and the text of an error.
+/* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and
+ * their parser. Used by sim/injector, sim/node and their command lines. Any thread; fault_rules_read reads a file, the
+ * other functions change their arguments only.
  */
 #ifndef FAULTS_FAULT_RULES_H
 #define FAULTS_FAULT_RULES_H
@@ -15,7 +16,7 @@
 #define FAULT_FILE_MAX  16384u /* bytes of a file */
 
 enum fault_kind {
-    FAULT_KIND_DROP, /* from here on: the injector's */
+    FAULT_KIND_DROP, /* from here on: executed by the injector */
     FAULT_KIND_DUPLICATE,
     FAULT_KIND_DELAY,
     FAULT_KIND_REORDER,
@@ -23,7 +24,7 @@ enum fault_kind {
     FAULT_KIND_SHORT,
     FAULT_KIND_FLOOD,
     FAULT_KIND_BUS_OFF,
-    FAULT_KIND_STOP, /* from here on: the drives' */
+    FAULT_KIND_STOP, /* from here on: executed by the drives */
     FAULT_KIND_RESTART,
     FAULT_KIND_HEARTBEAT_STOP,
     FAULT_KIND_ENCODER_FREEZE,
@@ -58,7 +59,7 @@ struct fault_rule {
     uint32_t delay_us;
     uint8_t byte;
     uint8_t mask;      /* xor */
-    uint8_t len;       /* bytes left */
+    uint8_t len;       /* bytes that the shortened frame keeps */
     uint32_t per_tick; /* frames of a flood */
     enum fault_side side;
     int32_t counts;
@@ -71,16 +72,16 @@ struct fault_rules {
     uint32_t count;
 };
 
-/* The word of the grammar. */
+/* The name of a kind in a rule. */
 const char *fault_kind_name(enum fault_kind kind);
 
-/* Whether a drive acts by this kind, and not the injector. */
+/* Whether drives execute this kind, and not the injector. */
 bool fault_kind_is_drives(enum fault_kind kind);
 
 #define FAULT_RULES_WRONG (-1)
 
-/* `length` bytes of text. Returns 0, or FAULT_RULES_WRONG with one line in `reason`: which line, what is wrong and what
- * would be right. */
+/* Parses `length` bytes of text. Returns 0, or FAULT_RULES_WRONG with one line in `reason`: the line, the error, and
+ * what would be correct. */
 int fault_rules_parse(struct fault_rules *rules, const char *text, size_t length, char *reason,
                       size_t size);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* bus: the CAN side of the gateway, its signals and its errors. Used by both sides to the board, fifo and slcan. */
+/* bus: the CAN side of the gateway, its signals and its errors. Used by main of the gateway and by both sides to the
+ * board, fifo and slcan. One thread. */
 #ifndef GATEWAY_BUS_H
 #define GATEWAY_BUS_H
 
@@ -11,11 +12,12 @@
 
 enum gateway_status { GATEWAY_OK = 0, GATEWAY_GONE = 1, GATEWAY_USAGE = 2, GATEWAY_BUS = 4 };
 
-/* From now on SIGTERM and SIGINT are only counted. 0, or -1 with errno set. */
+/* From now on SIGTERM and SIGINT of this process are only counted. 0, or -1 with errno set. */
 int bus_catch_signals(void);
 unsigned bus_signals(void); /* how many have come */
 
-/* Undoes that clock_join() blocks them: they come while the gateway waits for the board, too. */
+/* Unblocks the signals that clock_join() has blocked, so that they arrive also while the gateway waits for the board.
+ * */
 void bus_unblock_signals(void);
 
 /* Sends all of them; waits while the queue of the interface is full. Returns 0, or a negative errno. */

@@ -42,7 +42,7 @@ static int open_fifo(const char *path, int flags)
     return fd;
 }
 
-/* False when the board is gone, or its request is none. */
+/* False if the board has ended, or the request is invalid. */
 static bool read_request(void)
 {
     size_t got = 0;
@@ -119,8 +119,9 @@ static int take_frames(void)
     return 0;
 }
 
-/* At lock step the processor belongs to the drives, which are to answer: the socket is not read before they can have done
- * so. Nor is the clock when they have, since that may cost a system call: guard times begin anew with the next request. */
+/* At lock step the processor is for the drives, which have to answer: the socket is not read before they can have
+ * answered. The clock is not read either, because it may cost a system call: guard times begin anew with the next
+ * request. */
 static int wait_until_due(uint64_t now_ns)
 {
     bool over = false;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* gateway_options: the command line of hodograph-bridge. */
+/* gateway_options: reads the command line of hodograph-bridge. Used by main of the gateway. Main thread, once; prints
+ * nothing. */
 #ifndef GATEWAY_GATEWAY_OPTIONS_H
 #define GATEWAY_GATEWAY_OPTIONS_H
 
@@ -7,7 +8,7 @@
 
 struct gateway_options { /* all into argv */
     const char *bus;
-    const char *out; /* both NULL where `slcan` is not */
+    const char *out; /* `out` and `in` are NULL if `slcan` is given */
     const char *in;
     const char *slcan;
 };
@@ -15,7 +16,7 @@ struct gateway_options { /* all into argv */
 enum gateway_options_result {
     GATEWAY_OPTIONS_OK,
     GATEWAY_OPTIONS_HELP, /* print gateway_options_help */
-    GATEWAY_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
+    GATEWAY_OPTIONS_WRONG /* `reason` has one line: the error and its remedy */
 };
 
 extern const char gateway_options_help[];

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-bridge: between a board that is emulated, or that has no CAN of Linux, and a CAN interface. */
+/* hodograph-bridge: the gateway between an emulated board, or one without SocketCAN, and a CAN interface. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>
@@ -12,7 +12,7 @@
 #include "gateway/slcan_side.h"
 #include "port/linux/clock.h"
 
-/* A batch thread is woken once for all answers of the drives, not by the first of them; nor by each character of a UART. A
+/* A batch thread is woken once for all answers of the drives, or all characters of a UART, not by the first of them. A
  * real-time priority that the process was started with stays. */
 static void use_batch_scheduling(void)
 {

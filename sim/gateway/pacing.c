@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements gateway/pacing.h (see there): when a request of the emulated board is answered, so that its ticks
- * come as those of the Linux port do (port/linux/schedule.h). */
+/* Implements gateway/pacing.h (see there): when a request of the emulated board is answered, so that its ticks come at
+ * the times of the Linux port (port/linux/schedule.h). */
 #include "gateway/pacing.h"
 
 #define SLEEP_MAX_NS 100000000u /* latest check for signals */
 
-/* At lock step the board goes on by itself when all have answered. */
+/* At lock step the board continues by itself when all have answered. */
 static void begin_tick(struct pacing *pacing, const struct exchange_header *request,
                        uint64_t now_ns)
 {

@@ -36,7 +36,7 @@ static int connect_unix(const char *path)
     return fd;
 }
 
-/* Every line shall leave at once. */
+/* Every line has to be sent at once. */
 static int connect_first(const struct addrinfo *found)
 {
     for (; found != NULL; found = found->ai_next) {
@@ -95,13 +95,13 @@ static int connect_stream(const char *address)
                                                         : connect_unix(address);
 }
 
-/* Of datagrams: the board's emulator does not listen yet; after a signal to end it no longer does. */
+/* Errors of datagrams that are ignored: the emulator does not receive yet, or has ended after a signal. */
 static bool passes_over(int error)
 {
     return error == EINTR || error == EAGAIN || (error == ECONNREFUSED && bus_signals() == 0u);
 }
 
-/* What is there, which may be many messages of a character. -1: the stream has ended. */
+/* Reads all available text, which may be many messages of one character. -1: the stream has ended. */
 static ssize_t gather(int stream, char text[TEXT_SIZE])
 {
     ssize_t size = 0;
@@ -166,7 +166,7 @@ static int to_stream(struct can_socket *socket, int stream)
     return write_all(stream, text, size) ? 0 : 1;
 }
 
-/* What has come, either way; likewise. */
+/* Passes on all that has come from both sides; likewise. */
 static int pass_on(struct can_socket *socket, int stream, struct slcan_decoder *decoder)
 {
     struct pollfd wait[2] = {{.fd = stream, .events = POLLIN},

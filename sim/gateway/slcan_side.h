@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* slcan_side: forwards frames between a CAN bus and a stream of SLCAN lines (can/slcan.h), which an emulated board reads and
- * writes. Called by the main program of the gateway (hodograph-bridge --slcan). */
+/* slcan_side: forwards frames between a CAN bus and a stream of SLCAN lines (can/slcan.h), which an emulated board
+ * reads and writes. Called by the main program of the gateway (hodograph-bridge --slcan). One thread. */
 #ifndef GATEWAY_SLCAN_SIDE_H
 #define GATEWAY_SLCAN_SIDE_H
 
 #include "port/linux/can_socket.h"
 
 /* Runs until the stream ends, the board has closed after a signal, or a second signal comes. `address`: path of a UNIX
- * socket, HOST:PORT, or fd:N for a connected socket of the caller. Datagrams may be cut anywhere. Returns an exit status;
- * if it is not 0, a line on stderr has the reason. */
+ * socket, HOST:PORT, or fd:N for a connected socket of the caller. Datagrams may be cut anywhere. Returns an exit
+ * status; if it is not 0, a line on stderr has the reason. */
 int slcan_side_run(struct can_socket *socket, const char *address);
 
 #endif

@@ -18,7 +18,7 @@
 
 #include "hub/frame_bits.h"
 
-enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, LOOK_ALL_MS = 20 };
+enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
 
 #define NS_PER_S      1000000000u
 #define PACE_AHEAD_NS 2e6 /* of virtual time before real time, where its speed is limited */
@@ -41,7 +41,7 @@ static uint64_t clock_of(clockid_t clock)
 
 /* --- Connections --- */
 
-/* Whether a path is the socket of a hub that was killed: nobody accepts connections there any more. */
+/* Whether a path is the socket of a hub that was killed: no process accepts connections there. */
 static bool is_left_over(const char *path, const struct stat *found)
 {
     struct sockaddr_un address = {.sun_family = AF_UNIX};
@@ -59,9 +59,9 @@ static bool is_left_over(const char *path, const struct stat *found)
     return refused;
 }
 
-/* Hubs that start in one folder take turns, so that no two serve one path. Gives what to close when the turn is over, or a
- * negative errno. The turn of a killed process is over, too. */
-static int take_turn(const char *path)
+/* Locks the folder of a path, so that no two hubs that start at the same time serve one path. Returns a descriptor,
+ * whose close is the unlock (also if the process is killed), or a negative errno. */
+static int lock_folder(const char *path)
 {
     char folder[sizeof((struct sockaddr_un *)NULL)->sun_path];
     (void)snprintf(folder, sizeof folder, "%s", path);
@@ -71,16 +71,16 @@ static int take_turn(const char *path)
     } else {
         slash[slash == folder ? 1 : 0] = '\0';
     }
-    const int turn = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (turn < 0 || flock(turn, LOCK_EX) == 0) {
-        return turn < 0 ? -errno : turn;
+    const int folder_lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (folder_lock < 0 || flock(folder_lock, LOCK_EX) == 0) {
+        return folder_lock < 0 ? -errno : folder_lock;
     }
     const int error = -errno;
-    (void)close(turn);
+    (void)close(folder_lock);
     return error;
 }
 
-/* The socket is served before it gets its path: until then it has another one, `own`. */
+/* Binds the socket to another path, `own`, and moves it to its path when it accepts connections. */
 static int serve(int fd, const struct sockaddr_un *own, const char *path)
 {
     struct stat found;
@@ -108,13 +108,13 @@ static int listen_at(const char *path)
     if (length < 0 || (size_t)length >= sizeof own.sun_path) {
         return -ENAMETOOLONG;
     }
-    const int turn = take_turn(path);
-    if (turn < 0) {
-        return turn;
+    const int folder_lock = lock_folder(path);
+    if (folder_lock < 0) {
+        return folder_lock;
     }
     const int fd = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     const int error = fd < 0 ? -errno : serve(fd, &own, path);
-    (void)close(turn);
+    (void)close(folder_lock);
     if (error != 0 && fd >= 0) {
         (void)close(fd);
     }
@@ -141,7 +141,7 @@ int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub
     return 0;
 }
 
-/* What a member sent before it left is still to go out. */
+/* In use until all frames that a member sent before it left have been sent. */
 static bool in_use(const struct hub *hub, size_t at)
 {
     bool sends = hub->connections[at].queue.count > 0u;
@@ -180,8 +180,8 @@ static void take_connection(struct hub *hub, unsigned bus)
     hub->used = at < hub->used ? hub->used : at + 1u;
 }
 
-/* Whether the packet has left: a connection that has ended is dropped later. In virtual time nothing is lost, so a process that
- * does not take its frames is waited for. */
+/* Whether the packet has been sent; a connection that has ended is dropped later. In virtual time nothing may be lost,
+ * so it waits for a process that does not take its frames. */
 static bool send_packet(const struct hub *hub, int fd, const void *packet, size_t size)
 {
     struct pollfd writable = {.fd = fd, .events = POLLOUT};
@@ -219,13 +219,13 @@ static struct hub_connection *participant_connection(struct hub *hub, uint32_t n
     return NULL;
 }
 
-/* Notifies the participants that watch; a leave ends their wait, too. */
+/* Notifies the participants that requested notices; a leave also ends their wait. */
 static void notify(struct hub *hub, uint16_t kind, const struct participant *about)
 {
     for (size_t i = 0; i < hub->time.count; ++i) {
         const struct participant *each = &hub->time.participants[i];
         const struct hub_connection *to = participant_connection(hub, each->number);
-        if (each->watches && each != about && to != NULL) {
+        if (each->wants_notices && each != about && to != NULL) {
             send_control(hub, to->fd, kind, about->number, about->name);
             if (kind == LOCAL_BUS_LEFT) {
                 virtual_time_wake(&hub->time, each->number);
@@ -236,7 +236,7 @@ static void notify(struct hub *hub, uint16_t kind, const struct participant *abo
 
 static void take_packets(struct hub *hub, struct hub_connection *from, size_t most);
 
-/* What a participant has sent is on the bus before time goes on. */
+/* Takes the frames that a participant has sent, before time advances. */
 static void take_sent(struct hub *hub, uint32_t number)
 {
     for (size_t i = 0; i < hub->used; ++i) {
@@ -273,8 +273,8 @@ static bool matches(const struct can_filter *filters, size_t count, const struct
     return false;
 }
 
-/* The first frames that are held for a member as one packet. False: it has no room now. One without a participant is waited for.
- * What a connection that has ended does not take is gone. */
+/* Sends the first frames that are held for a member, as one packet. False: it has no room now. It waits for a member
+ * without a participant. Frames for a connection that has ended are dropped. */
 static bool send_held(struct hub *hub, struct hub_connection *to)
 {
     struct hub_held *held = &to->held;
@@ -293,7 +293,7 @@ static bool send_held(struct hub *hub, struct hub_connection *to)
     return true;
 }
 
-/* Members of this participant find all that was sent up to now; 0: members of none. True: some had no room for it. */
+/* Sends all held frames to the members of this participant; 0: to those without one. True: some had no room. */
 static bool flush_all(struct hub *hub, uint32_t number)
 {
     bool remains = false;
@@ -308,7 +308,7 @@ static bool flush_all(struct hub *hub, uint32_t number)
     return remains;
 }
 
-/* Until the next grant. A process for which nothing was due has to take its frames before they fill the room. */
+/* Holds a frame until the next grant. A process that is not due is woken before its frames fill the room. */
 static void hold_frame(struct hub *hub, struct hub_connection *to,
                        const struct local_bus_frame *frame)
 {
@@ -337,7 +337,7 @@ static void send_frame(struct hub *hub, struct hub_connection *to,
     }
 }
 
-/* To all other members of the bus of connection `sender`; those that are to be woken are. */
+/* Delivers a frame to all other members of the bus of connection `sender`, and wakes those that do not defer it. */
 static void deliver(struct hub *hub, size_t sender, const struct can_frame *frame, uint64_t now_ns)
 {
     const unsigned bus = hub->connections[sender].bus;
@@ -361,7 +361,7 @@ static void deliver(struct hub *hub, size_t sender, const struct can_frame *fram
     }
 }
 
-/* Back to its sender, if that tracks it, which finds it when it wakes for something else. */
+/* Gives a frame back to a sender that tracks it; this does not wake the sender. */
 static void deliver_back(struct hub *hub, size_t sender, const struct can_frame *frame)
 {
     struct hub_connection *to = &hub->connections[sender];
@@ -410,7 +410,8 @@ static void take_frame(struct hub *hub, struct hub_connection *from, const struc
     }
 }
 
-/* What goes first on a bus that is free: the lowest identifier among the members' first frames. HUB_CONNECTIONS: nothing waits. */
+/* The connection that sends next on a free bus: the lowest identifier among the members' first frames. HUB_CONNECTIONS:
+ * no frame waits. */
 static size_t arbitrate(const struct hub *hub, unsigned bus)
 {
     size_t best = HUB_CONNECTIONS;
@@ -460,8 +461,8 @@ static uint64_t next_event_ns(struct hub *hub)
     return next_ns;
 }
 
-/* A reaction to a frame takes some time: so a frame that waits already goes first, whatever its identifier. Else two
- * processes that answer each other at once would keep the bus from all that is less urgent. */
+/* A reaction to a frame takes some time on a real bus, so a frame that already waits goes first, whatever its
+ * identifier. Otherwise two processes that answer each other at once would block all frames of lower priority. */
 static void end_transmissions(struct hub *hub)
 {
     for (unsigned i = 0; i < hub->bus_count; ++i) {
@@ -484,8 +485,9 @@ static double ahead_ns(const struct hub *hub, uint64_t next_ns, uint64_t real_ns
     return virtual_ns / hub->options.speed - (double)(real_ns - hub->pace_real_ns);
 }
 
-/* Milliseconds of real time until this instant may come; 0: it may come now. Time goes on in steps of PACE_AHEAD_NS, since events are
- * closer together than a process can sleep. A simulation that is later than PACE_LATE_NS does not catch up. */
+/* Milliseconds of real time until this instant may come; 0: it may come now. Time advances in steps of PACE_AHEAD_NS,
+ * because a process cannot sleep for the short time between two events. A simulation that is late by more than
+ * PACE_LATE_NS does not catch up. */
 static int pace_ms(struct hub *hub, uint64_t next_ns)
 {
     if (hub->options.speed <= 0.0) {
@@ -507,7 +509,8 @@ static int pace_ms(struct hub *hub, uint64_t next_ns)
     return left_ns < 1e9 ? (int)(left_ns / 1e6) : 1000;
 }
 
-/* Its members, and recorders if it may ask one, find all frames up to now. */
+/* Grants; the members of the participant get all frames up to now. So do recorders (members without a participant), if
+ * the participant requested notices, because it may evaluate what they have recorded. */
 static void grant(struct hub *hub, struct participant *next)
 {
     struct hub_connection *to = participant_connection(hub, next->number);
@@ -518,14 +521,15 @@ static void grant(struct hub *hub, struct participant *next)
                                         .time_ns = hub->time.now_ns};
     granted.flags = next->frames ? LOCAL_BUS_FRAMES : 0;
     next->frames = flush_all(hub, next->number);
-    if (next->watches) {
+    if (next->wants_notices) {
         (void)flush_all(hub, 0);
     }
-    hub->granted = next->watches ? NULL : to;
+    hub->granted = next->wants_notices ? NULL : to;
     (void)send_packet(hub, to->fd, &granted, sizeof granted);
 }
 
-/* Hands out the next grant, when time is not held. Returns how long to wait for processes, in ms: -1 without a limit. */
+/* Gives the next grant, if no participant is active. Returns how long to wait for processes, in ms: -1 without a limit.
+ * */
 static int go_on(struct hub *hub)
 {
     while (!virtual_time_is_held(&hub->time)) {
@@ -553,7 +557,7 @@ static int go_on(struct hub *hub)
 static void greet(struct hub *hub, struct hub_connection *from,
                   const struct local_bus_control *hello)
 {
-    const struct timeval look_all = {.tv_usec = LOOK_ALL_MS * 1000};
+    const struct timeval poll_all_interval = {.tv_usec = POLL_ALL_MS * 1000};
     if (hello->kind == LOCAL_BUS_HELLO_MEMBER) {
         from->role = HUB_MEMBER;
         from->number = hub->options.is_virtual ? hello->number : 0u;
@@ -564,7 +568,8 @@ static void greet(struct hub *hub, struct hub_connection *from,
         from->number =
             virtual_time_join(&hub->time, hello->name, (hello->flags & LOCAL_BUS_NOTICES) != 0u);
         from->role = from->number != 0u ? HUB_PARTICIPANT : HUB_UNKNOWN;
-        (void)setsockopt(from->fd, SOL_SOCKET, SO_RCVTIMEO, &look_all, sizeof look_all);
+        (void)setsockopt(from->fd, SOL_SOCKET, SO_RCVTIMEO, &poll_all_interval,
+                         sizeof poll_all_interval);
         if (from->number == 0u) {
             drop_connection(hub, from);
             return;
@@ -674,8 +679,8 @@ static void take_packets(struct hub *hub, struct hub_connection *from, size_t mo
 
 /* --- The hub --- */
 
-/* What participants have sent is taken when they wait. Until then their members are read only now and then (`all`), so
- * that one that sends very much finds room. */
+/* Frames of participants are taken when they wait. Before that their members are read only sometimes (`all`), so that a
+ * member that sends very much has room. */
 static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *who, bool all)
 {
     size_t count = 0;
@@ -694,8 +699,8 @@ static size_t fill(const struct hub *hub, int end, struct pollfd *wait, size_t *
     return count;
 }
 
-/* The next message of the participant that alone computes, without polling the others: nothing that they do changes what
- * happens until it waits. False: it takes long, or it is time to poll all. */
+/* Takes the next message of the only active participant without polling the others, because they cannot change anything
+ * until it waits. False: the message takes long, or it is time to poll all. */
 static bool take_granted(struct hub *hub)
 {
     union packet packet;
@@ -729,7 +734,7 @@ bool hub_step(struct hub *hub, int end)
     }
     const bool all = !held || hub->poll_all;
     const size_t count = fill(hub, end, wait, who, all);
-    const int ready = poll(wait, count, all ? limit_ms : LOOK_ALL_MS);
+    const int ready = poll(wait, count, all ? limit_ms : POLL_ALL_MS);
     if (ready < 0) {
         return errno == EINTR;
     }

@@ -1,22 +1,25 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * hub: CAN buses for the processes of one machine, whose kernel need not have CAN, in real or in virtual time.
+ * hub: CAN buses for the processes of one computer, without kernel CAN, in real or in virtual time. Used by the main
+ * program hodograph-hub. One thread. It makes the sockets of the buses in the file system and nothing else outside of
+ * struct hub.
  *
- * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all other
- * members of its bus, in one order.
+ * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all
+ * other members of its bus, in one order.
  *
- * In real time it goes at once. A member that does not take its frames loses those for which its buffer of some megabytes
- * has no room; the others do not wait for it.
+ * In real time a frame goes at once. A member that does not take its frames loses those for which its buffer of some
+ * megabytes has no room; the others do not wait for it.
  *
- * In virtual time a frame takes its bits (frame_bits.h) on a bus that carries one at a time. Of the frames that wait, the lowest identifier
- * goes first (CAN arbitration), also among those of one member, as in the mailboxes of a CAN controller; equal identifiers keep their
- * order. What is sent when a frame has ended comes after what has waited for that. Nothing is lost but what a member sends beyond
- * HUB_QUEUE frames ahead of the bus. Time goes on when every participant waits (virtual_time.h).
+ * In virtual time a frame takes the time of its bits (frame_bits.h), and a bus carries one frame at a time. Of the
+ * waiting frames the lowest identifier goes first (CAN arbitration), also among those of one member, as in the
+ * mailboxes of a CAN controller; equal identifiers keep their order. A frame that is sent at the end of another one
+ * goes after those that waited for this end. Frames are lost only if a member has more than HUB_QUEUE of them waiting.
+ * Time advances when every participant waits (virtual_time.h).
  *
- * A process that waits takes nothing. So the hub holds the frames for its members until its grant, and wakes it when they fill half of
- * HUB_HELD. It never waits for room in the socket of a member that has a participant: what has no room is held until the next grant.
- * A suspended process loses what comes when HUB_HELD is full. A member without a participant, as a recorder, reads at any time: the
- * hub waits for it.
+ * A process that waits does not read. So the hub holds the frames for its members until its grant, and wakes it when
+ * they fill half of HUB_HELD. It never waits for room in the socket of a member that has a participant; frames without
+ * room are held until the next grant. A suspended process loses the frames that come when HUB_HELD is full. A member
+ * without a participant, such as a recorder, reads at any time: the hub waits for it.
  */
 #ifndef HUB_HUB_H
 #define HUB_HUB_H
@@ -36,8 +39,8 @@
 
 struct hub_options {
     bool is_virtual;
-    uint32_t bitrate; /* of each bus, in virtual time */
-    double speed;     /* virtual time: at most so much per real time; 0: no limit */
+    uint32_t bitrate; /* of each bus, bit/s, in virtual time */
+    double speed;     /* the most virtual time per real time; 0: no limit */
 };
 
 /* Frames of a member that wait for the bus. */
@@ -47,7 +50,7 @@ struct hub_queue {
     size_t count;
 };
 
-/* Virtual time: frames for a member that it finds with the next grant of its participant. */
+/* Virtual time: frames for a member, which it gets with the next grant of its participant. */
 struct hub_held {
     struct local_bus_frame frames[HUB_HELD];
     size_t first;
@@ -89,22 +92,22 @@ struct hub {
     struct virtual_time time;
     uint64_t pace_real_ns;          /* where speed is limited: an instant of real time, */
     uint64_t pace_virtual_ns;       /* and that of virtual time which may not come before it */
-    bool poll_all;                  /* members of participants that compute, too */
-    struct hub_connection *granted; /* that alone computes, and waits for no process; or NULL */
+    bool poll_all;                  /* members of participants that compute are polled as well */
+    struct hub_connection *granted; /* the only participant that computes; or NULL */
     unsigned unpolled;              /* grants since the last poll of all connections */
     uint64_t lost;                  /* frames that found no room */
 };
 
-/* Serves a bus at each of these paths, which it makes. A socket that nobody serves, left by a hub that was killed, is replaced. 0,
- * or a negative errno with the index of the path that failed in `*failed`: -EADDRINUSE where a hub serves the path, or where
- * it is something else than a socket. */
+/* Makes a socket at each of these paths and serves a bus there. It replaces a socket that no process serves (left by a
+ * hub that was killed). 0, or a negative errno with the index of the path that failed in `*failed`: -EADDRINUSE if a
+ * hub serves the path, or if it is not a socket. */
 int hub_open(struct hub *hub, const char *const *paths, size_t count, struct hub_options options,
              size_t *failed);
 
-/* Waits for something to happen and does it. False: `end` has become readable, or nothing can happen any more. */
+/* Waits for the next event and handles it. False: `end` has become readable, or no event can follow. */
 bool hub_step(struct hub *hub, int end);
 
-/* Ends the buses for all their members. */
+/* Closes the buses and the connections of all their members. */
 void hub_close(struct hub *hub);
 
 #endif

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-hub: CAN buses for the processes of one machine, whose kernel need not have CAN. */
+/* hodograph-hub: CAN buses for the processes of one computer, without kernel CAN. */
 #define _GNU_SOURCE
 #include <getopt.h>
 #include <inttypes.h>
@@ -40,8 +40,8 @@ static int wrong(const char *what, const char *value)
     return EXIT_USAGE;
 }
 
-/* Above the simulated drives (20), where that is permitted: a real bus does not wait for anybody. */
-static void ask_for_priority(void)
+/* Above the simulated drives (20), if permitted: a real bus does not wait for a process. */
+static void request_priority(void)
 {
     const struct sched_param priority = {.sched_priority = 25};
     (void)sched_setscheduler(0, SCHED_FIFO, &priority);
@@ -66,7 +66,7 @@ static int serve(char **paths, size_t count, struct hub_options options)
         return EXIT_BUS;
     }
     if (!options.is_virtual) {
-        ask_for_priority();
+        request_priority();
     }
     while (hub_step(&hub, end)) {
     }

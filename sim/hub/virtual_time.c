@@ -11,7 +11,7 @@ void virtual_time_init(struct virtual_time *time)
     time->now_ns = VIRTUAL_TIME_BEGIN_NS;
 }
 
-uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool watches)
+uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool wants_notices)
 {
     if (time->count == VIRTUAL_TIME_PARTICIPANTS) {
         return 0;
@@ -26,7 +26,7 @@ uint32_t virtual_time_join(struct virtual_time *time, const char *name, bool wat
     memcpy(fresh->name, name, strnlen(name, LOCAL_BUS_NAME - 1u));
     fresh->number = ++time->last_number;
     fresh->active = true;
-    fresh->watches = watches;
+    fresh->wants_notices = wants_notices;
     time->count++;
     return fresh->number;
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/delay_queue.h (see there): frames that go out later. */
+/* Implements injector/delay_queue.h (see there): frames that are sent later. */
 #include "injector/delay_queue.h"
 
 #include <string.h>

@@ -7,7 +7,7 @@
 
 enum { HOLD_NS = 20000000 };
 
-/* What the rules make of one frame. */
+/* The effect of the rules on one frame. */
 struct verdict {
     struct can_msg frame;
     uint32_t copies;
@@ -46,7 +46,7 @@ static bool is_off(struct forwarder *forwarder, enum fault_side side)
     return false;
 }
 
-/* From one side to the other: nothing while one of them is off. */
+/* Sends from one side to the other; nothing while one of them is off. */
 static void send(struct forwarder *forwarder, enum fault_side to, const struct can_msg *frame)
 {
     if (!is_off(forwarder, FAULT_SIDE_CONTROLLER) && !is_off(forwarder, FAULT_SIDE_DRIVES)) {
@@ -127,8 +127,7 @@ static void deliver(struct forwarder *forwarder, enum fault_side from,
     }
 }
 
-/* Other traffic: eight bytes that identify the frame. It is on the wire, so only a side that is off does not receive
- * it. */
+/* Other traffic: eight bytes that identify the frame. Both sides receive it, except a side that is off. */
 static void flood(struct forwarder *forwarder, struct fault_trigger *trigger)
 {
     const bool receives[2] = {!is_off(forwarder, FAULT_SIDE_CONTROLLER),

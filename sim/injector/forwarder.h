@@ -2,12 +2,12 @@
 /* forwarder: passes every frame between the controller's bus and the drives', and injects the faults of the fault rules
  * (docs/reference/protocol.md section 4).
  *
- * Rules act on a frame in the order of the file. A frame that changes places with the next one of
- * its direction waits for it for 20 ms at most. While a side is off the bus nothing passes, frames that were held or
- * delayed are lost, and a flood reaches the other side only. Deterministic: the same frames give the same
- * faults, but for delays and durations in ms, which go by the wall clock.
+ * Rules act on a frame in the order of the file. A frame that changes places with the next one of its direction waits
+ * for it for 20 ms at most. While a side is off the bus no frame passes, frames that were held or delayed are lost, and
+ * a flood reaches the other side only. The same frames give the same faults, except delays and durations in ms, which
+ * follow the wall clock.
  *
- * No I/O, no heap. All functions in one context.
+ * Used by the injector's main program. No I/O, no heap. All functions in one thread.
  */
 #ifndef INJECTOR_FORWARDER_H
 #define INJECTOR_FORWARDER_H
@@ -17,10 +17,10 @@
 #include "injector/delay_queue.h"
 
 struct forwarder_port {
-    /* A frame to one side. */
+    /* Sends a frame to one side. */
     void (*send)(void *context, enum fault_side to, const struct can_msg *frame);
-    /* Something was done to `frame` as it came (NULL: a rule without a frame of its own begins or
-     * ends, by `on`). */
+    /* Reports that a rule has acted on `frame`, given as it came. NULL: a rule without a frame begins or ends, by
+     * `on`. */
     void (*note)(void *context, const struct fault_trigger *trigger, enum fault_side from,
                  const struct can_msg *frame, bool on);
     void *context;
@@ -44,7 +44,7 @@ struct forwarder {
     struct forwarder_port port;
 };
 
-/* `rules` are borrowed; those of the drives are passed over. */
+/* `rules` are borrowed; those for the drives are ignored. */
 void forwarder_init(struct forwarder *forwarder, const struct fault_rules *rules,
                     struct forwarder_port port);
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* injector_options: the command line of hodograph-injector. */
+/* injector_options: reads the command line of hodograph-injector. Used by its main program. Main thread, once; prints
+ * nothing. */
 #ifndef INJECTOR_INJECTOR_OPTIONS_H
 #define INJECTOR_INJECTOR_OPTIONS_H
 
@@ -15,7 +16,7 @@ struct injector_options {
 enum injector_options_result {
     INJECTOR_OPTIONS_OK,
     INJECTOR_OPTIONS_HELP, /* print injector_options_help */
-    INJECTOR_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
+    INJECTOR_OPTIONS_WRONG /* `reason` has one line: the error and its remedy */
 };
 
 extern const char injector_options_help[];

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-injector: joins two SocketCAN buses and injects faults. One thread: it
- * sleeps until frames or a signal come, or a delayed frame is due. */
+/* hodograph-injector: joins two SocketCAN buses and injects faults. One thread: it sleeps until frames or a signal
+ * come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>
@@ -88,7 +88,7 @@ static int receive(struct injector *injector, enum fault_side from)
     return 0;
 }
 
-/* Until something is due. Without a limit where nothing is: to set and unset a timer for every frame costs. */
+/* Waits until a frame is due. Without a timeout if none is, because setting a timer for every frame costs time. */
 static int await(const struct injector *injector, struct pollfd wait[3])
 {
     const uint64_t due_ns = forwarder_due_ns(&injector->forwarder);

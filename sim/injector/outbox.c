@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/outbox.h (see there): frames to one bus that leave together. */
+/* Implements injector/outbox.h (see there): frames to one bus that are sent together. */
 #define _GNU_SOURCE
 #include "injector/outbox.h"
 

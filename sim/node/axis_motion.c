@@ -65,8 +65,8 @@ bool axis_motion_set_scale(struct axis_motion *axis, double counts_per_mm)
     return true;
 }
 
-/* The model's coordinates are the drive's own, so that a homed axis has the same bits as one that
- * was there from the beginning; the machine moves in them. */
+/* The coordinates of the model are those of the drive, so that a homed axis has the same bits as one that began there.
+ * The place of the machine changes instead. */
 void axis_motion_shift(struct axis_motion *axis, int32_t from, int32_t to)
 {
     const double shift_mm = ((double)to - (double)from) * axis->drive.mm_per_count;
@@ -152,7 +152,7 @@ double axis_motion_place_mm(const struct axis_motion *axis)
     return axis->drive.state.motor.position_mm + axis->machine_mm;
 }
 
-bool axis_motion_at_rest(const struct axis_motion *axis)
+bool axis_motion_at_standstill(const struct axis_motion *axis)
 {
     return axis->drive.state.motor.speed_rad_s == 0.0;
 }

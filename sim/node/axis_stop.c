@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/axis_stop.h (see there): how a simulated drive brings its axis to rest. */
+/* Implements node/axis_stop.h (see there): how a simulated drive stops its axis. */
 #include "node/axis_stop.h"
 
 #define WAIT_MAX_US 1000000u

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* axis_stop: how a simulated drive brings its axis to rest: by a ramp (0x6084, 0x6085), or at the motor's limits, as the
- * option codes 0x605A and 0x605E request. One call a period; all in one context.
+/* axis_stop: stops the axis of a simulated drive: by a ramp (0x6084, 0x6085), or at the motor's limits, as the option
+ * codes 0x605A and 0x605E request. Used by node/servo. One call in each period; all in one context.
  */
 #ifndef NODE_AXIS_STOP_H
 #define NODE_AXIS_STOP_H
@@ -15,15 +15,15 @@
 struct axis_stop {
     uint32_t settled_us; /* within the position window */
     uint32_t waited_us;  /* since the ramp has ended */
-    bool braked;         /* at the motor's limits the axis has come to rest, and is held there */
+    bool braked;         /* the axis has stopped at the motor's limits, and is held there */
 };
 
 /* The next period begins a new stop. */
 void axis_stop_reset(struct axis_stop *stop);
 
-/* One period of a stop by a ramp, counts/s^2. The ramp is the setpoint's: the stop has ended (true) when the motor, too,
- * has stood in the position window 0x6067 for its time 0x6068, or after 1 s: a motor that a load or a lost encoder keeps
- * in motion is left to its brake. */
+/* One period of a stop by a ramp of the setpoint, counts/s^2. Returns true when the stop has ended: the motor has been
+ * in the position window 0x6067 for its time 0x6068, or 1 s after the ramp. After that second the brake has to stop a
+ * motor that a load or a lost encoder keeps in motion. */
 bool axis_stop_ramp(struct axis_stop *stop, struct axis_motion *axis, const struct od_drive *values,
                     uint32_t deceleration_counts_s2);
 

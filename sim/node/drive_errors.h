@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_errors: reports errors of a simulated drive: error code 0x603F, error register 0x1001, history 0x1003, EMCY. It does
- * not change the motion: the reaction to an error is in node/servo. All in one context.
+/* drive_errors: reports errors of a simulated drive: error code 0x603F, error register 0x1001, history 0x1003, EMCY. It
+ * does not change the motion: the reaction to an error is in node/servo. Used by node/servo, node/drive_pdos and
+ * node/drive_node. All in one context.
  */
 #ifndef NODE_DRIVE_ERRORS_H
 #define NODE_DRIVE_ERRORS_H
@@ -27,8 +28,8 @@ void drive_errors_report(struct drive_errors *errors, uint16_t code, uint8_t det
 void drive_errors_rpdo_short(struct drive_errors *errors, int i, const struct pdo_map *map,
                              const struct can_msg *in);
 
-/* A frame for RPDO number `i` was long enough, while `short_rpdos` is not 0: ends the error when no RPDO has it any more
- * and no other communication error is present. */
+/* A frame for RPDO number `i` was long enough; to be called while `short_rpdos` is not 0. Ends the error if no other
+ * RPDO has it and no other communication error is present. */
 void drive_errors_rpdo_good(struct drive_errors *errors, int i);
 
 /* Ends all errors. */

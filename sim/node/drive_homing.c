@@ -108,7 +108,7 @@ bool drive_homing_move(const struct drive_homing *homing, struct axis_motion *ax
     return axis_motion_ramp(axis, phase_speed(homing, axis, values), values->homing_acceleration);
 }
 
-/* Against a limit switch that is not the method's own: the home switch is not where it should be. */
+/* At a limit switch that the method does not use: the home switch was not found. */
 static bool at_wrong_end(const struct drive_homing *homing, uint32_t inputs)
 {
     const bool back = homing->phase == DRIVE_HOMING_BACK;

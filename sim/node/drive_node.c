@@ -17,7 +17,7 @@ static void send(const struct drive_node *node, const struct can_msg *frame)
 
 /* ---- power-on and NMT ---- */
 
-/* Communication objects and what hangs on them, as after power-on. */
+/* Communication objects and the services that depend on them, as after power-on. */
 static void begin_communication(struct drive_node *node)
 {
     drive_od_fill(node);
@@ -49,7 +49,7 @@ static void reset_communication(void *context)
 static void change_state(void *context, enum nmt_state state)
 {
     struct drive_node *node = context;
-    drive_pdos_rest(&node->pdos);
+    drive_pdos_restart(&node->pdos);
     if (state != NMT_OPERATIONAL) {
         servo_disconnect(&node->servo, EMCY_COMMUNICATION);
         sync_clock_reset_counter(&node->clock, node->values.synchronous_counter_overflow_value);
@@ -178,7 +178,7 @@ void drive_node_receive(struct drive_node *node, const struct can_msg *in)
     }
 }
 
-/* The time since the last call may have passed before a heartbeat that came meanwhile: then it does not count. */
+/* If a heartbeat has come since the last call, the time since that call does not count. */
 static void process_master(struct drive_node *node, uint32_t elapsed_us)
 {
     const uint32_t without_us = node->master_seen ? 0u : elapsed_us;

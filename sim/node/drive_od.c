@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_od.h (see there): the object dictionary of a simulated drive beside its table (drive.eds). */
+/* Implements node/drive_od.h (see there): the behaviour of the object dictionary of a simulated drive (drive.eds). */
 #include "node/drive_od.h"
 
 #include <stddef.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_od: the object dictionary of a simulated drive beside its table (drive.eds): values that follow from the model,
- * checks of writes, and what a write does. One row for each object that has a handler. All in one context.
+/* drive_od: the behaviour of the object dictionary of a simulated drive; its table is generated from drive.eds. Values
+ * that follow from the model, checks of writes, effects of writes. One row for each object that has a handler. Used by
+ * node/drive_node. All in one context.
  */
 #ifndef NODE_DRIVE_OD_H
 #define NODE_DRIVE_OD_H

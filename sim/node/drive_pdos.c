@@ -34,7 +34,7 @@ static bool maps_more_than_cyclic(const struct od_drive *v, const struct pdo_map
     return found;
 }
 
-/* What the mapping means for the rest of the drive. */
+/* Evaluates which values the mapping contains. */
 static void evaluate_mapping(struct drive_pdos *pdos)
 {
     const struct od_drive *values = pdos->servo->values;
@@ -67,11 +67,11 @@ void drive_pdos_init(struct drive_pdos *pdos, struct od *od, struct servo *servo
     evaluate_mapping(pdos);
 }
 
-void drive_pdos_rest(struct drive_pdos *pdos)
+void drive_pdos_restart(struct drive_pdos *pdos)
 {
     for (int i = 0; i < DRIVE_PDOS; i++) {
-        pdo_map_rest(&pdos->rpdos[i]);
-        pdo_map_rest(&pdos->tpdos[i]);
+        pdo_map_restart(&pdos->rpdos[i]);
+        pdo_map_restart(&pdos->tpdos[i]);
     }
 }
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values act
- * on the servo: a controlword at once or at SYNC, a target from the next period on. All in one context.
+/* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values
+ * act on the servo: a controlword at once or at SYNC, a target from the next period on. Used by node/drive_node and
+ * node/drive_od. All in one context.
  */
 #ifndef NODE_DRIVE_PDOS_H
 #define NODE_DRIVE_PDOS_H
@@ -20,14 +21,14 @@ struct drive_node_port {
     void *context;
 };
 
-/* Read `rpdos`; clear `moved`; the rest is private. */
+/* Read `rpdos`; clear `moved`; all other fields are private. */
 struct drive_pdos {
     struct pdo_map rpdos[DRIVE_PDOS];
     struct pdo_map tpdos[DRIVE_PDOS];
     struct servo *servo; /* borrowed */
     struct drive_node_port port;
     bool moved;           /* identifiers of RPDOs changed: for the owner's filters, who clears it */
-    bool want_all;        /* a TPDO maps more than what is up to date at each SYNC anyway */
+    bool want_all;        /* a TPDO maps values that are not updated at each SYNC */
     uint8_t target_rpdos; /* a bit for each RPDO that maps the target 0x607A */
     uint8_t rpdo_count;   /* PDOs in use: those above are off */
     uint8_t tpdo_count;
@@ -38,9 +39,10 @@ void drive_pdos_init(struct drive_pdos *pdos, struct od *od, struct servo *servo
                      struct drive_node_port port);
 
 /* The NMT state changes: deadlines and counters restart. */
-void drive_pdos_rest(struct drive_pdos *pdos);
+void drive_pdos_restart(struct drive_pdos *pdos);
 
-/* The od's hooks, for 0x1400 ... 0x1BFF: whether a write is permitted (SDO_OK or an abort code); it has happened. */
+/* For the hooks of the dictionary, 0x1400 ... 0x1BFF: checks a write (SDO_OK or an abort code); applies a write that
+ * has been stored. */
 uint32_t drive_pdos_write(const struct drive_pdos *pdos, const struct od_entry *entry,
                           const uint8_t *value, uint32_t size);
 void drive_pdos_written(struct drive_pdos *pdos, const struct od_entry *entry);
@@ -48,7 +50,7 @@ void drive_pdos_written(struct drive_pdos *pdos, const struct od_entry *entry);
 /* A frame. Returns whether it was an RPDO. */
 bool drive_pdos_receive(struct drive_pdos *pdos, const struct can_msg *in);
 
-/* At SYNC, in this order: sends the synchronous TPDOs; puts what the synchronous RPDOs brought into force. */
+/* At SYNC, in this order: sends the synchronous TPDOs; applies the received values of the synchronous RPDOs. */
 void drive_pdos_report(struct drive_pdos *pdos);
 void drive_pdos_latch(struct drive_pdos *pdos);
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_state: the state of a simulated drive, for its object dictionary (node/drive_od.h) and for node/drive_node.h, which
- * begins and runs it. */
+/* drive_state: the state of a simulated drive, for its object dictionary (node/drive_od.h) and for node/drive_node.h,
+ * which begins and runs it. Data only; the context of drive_node. */
 #ifndef NODE_DRIVE_STATE_H
 #define NODE_DRIVE_STATE_H
 
@@ -17,8 +17,8 @@
 #include "node/sync_clock.h"
 #include "od_drive.h"
 
-/* Contents private, except `values` (the object dictionary) and `servo`, which tests may read, `pdos` for the filters of
- * drives.c, and what injected faults change. Has pointers to itself: not to be copied. */
+/* Contents private, except `values` (the object dictionary) and `servo`, which tests may read, `pdos` for the filters
+ * of drives.c, and what injected faults change. Has pointers to itself: not to be copied. */
 struct drive_node {
     struct od_drive values;
     struct od od;

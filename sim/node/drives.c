@@ -12,8 +12,8 @@
 
 enum { SEND_TRIES = 200, BATCHES = 4, PILE_BYTES = 256 * 1024 };
 
-/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is off:
- * the frame is lost. */
+/* A full queue of the interface empties within a few frame times: wait for it. One that stays full is a bus that is
+ * off: the frame is lost. */
 static void drives_send(void *context, const struct can_msg *frame)
 {
     struct drives *drives = context;
@@ -61,14 +61,14 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
     return 0;
 }
 
-/* What the module receives beside what the drives do; returns how many there are. */
+/* Filters for frames that only the module receives; returns their number. */
 static size_t module_filters(struct io_module *module, struct can_match filters[])
 {
     size_t n = 0;
     if (module->id == 0) {
         return 0;
     }
-    filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + module->id), CAN_ID_MAX};
+    filters[n++] = (struct can_match){(uint16_t)(COB_SDO_REQUEST + module->id), CAN_ID_MAX};
     for (int k = 0; k < IO_MODULE_RPDOS; k++) {
         if (module->rpdos[k].valid) {
             filters[n++] = (struct can_match){module->rpdos[k].cob_id, CAN_ID_MAX};
@@ -104,7 +104,7 @@ int drives_filter(struct drives *drives)
     }
     for (size_t i = 0; i < drives->count; i++) {
         struct drive_node *node = &drives->nodes[i];
-        filters[n++] = (struct can_match){(uint16_t)(COB_SDO_ASK + node->id), CAN_ID_MAX};
+        filters[n++] = (struct can_match){(uint16_t)(COB_SDO_REQUEST + node->id), CAN_ID_MAX};
         for (int k = 0; k < DRIVE_PDOS; k++) {
             if (node->pdos.rpdos[k].valid) {
                 filters[n++] = (struct can_match){node->pdos.rpdos[k].cob_id, CAN_ID_MAX};

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program hodograph-drive.
+/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program
+ * hodograph-drive.
  *
  * It reads frames from the socket, gives them to the nodes, and sends what they return. All functions in one thread. An
- * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no space are lost.
+ * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no room are lost.
  */
 #ifndef NODE_DRIVES_H
 #define NODE_DRIVES_H
@@ -27,7 +28,7 @@ struct drives {
     int failed;                /* negative errno of the bus, 0: none */
 };
 
-#define DRIVES_ERR_EQUIPMENT (-100) /* beside enum drive_error */
+#define DRIVES_ERR_EQUIPMENT (-100) /* in addition to enum drive_error */
 
 /* Makes the drives; nothing is sent yet. Returns 0, or DRIVES_ERR_EQUIPMENT or a negative enum
  * drive_error with `*node` the drive whose figures are wrong. */
@@ -37,13 +38,12 @@ int drives_init(struct drives *drives, const struct node_options *options, uint8
  * negative errno. */
 int drives_filter(struct drives *drives);
 
-/* Hands waiting frames to the drives, a bounded number: the wall clock (drives_process) must go on
- * in a flood, too. Returns true when one of them was acyclic (NMT, SDO, heartbeat): call
- * drives_process at once. */
+/* Passes waiting frames to the drives, a bounded number, so that drives_process is called also in a flood. Returns true
+ * if one of them was acyclic (NMT, SDO, heartbeat): call drives_process at once. */
 bool drives_receive(struct drives *drives);
 
-/* After a long sleep: when so much has piled up meanwhile that working it off would take as long again, all of it is
- * dropped, as for a drive that was not there. A stall of the whole machine leaves a few frames only, which stay. */
+/* After a long sleep: if so many frames wait that processing them would take as long again, all are dropped, as by a
+ * drive that was switched off. After a stall of the whole computer only a few frames wait, which are kept. */
 void drives_wake(struct drives *drives);
 
 /* Lets wall time pass. */

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated drive
- * (node/drive_node, node/servo).
+/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated
+ * drive (node/drive_node, node/servo).
  *
  * Switches have places in the coordinates that the axis has at power-on. Homing changes the coordinates, not the
  * switches. Pure functions.
@@ -32,11 +32,11 @@ struct equipment {
     double friction_volts;    /* Coulomb friction, as the voltage that overcomes it; 0 or more */
     double brake_volts;       /* of the holding brake, as friction; more than 0 */
     uint32_t serial;          /* 0x1018 sub 4 */
-    uint32_t vendor;          /* 0x1018 sub 1; not 0: a controller takes it for a real drive */
+    uint32_t vendor;          /* 0x1018 sub 1; not 0: a controller treats it as a real drive */
 };
 
-/* No switches, no friction; rated torque half of what the voltage limit gives, 5 A, 10 s of
- * overload; a brake as strong as the motor. */
+/* No switches, no friction; rated torque half of what the voltage limit gives, 5 A, 10 s of overload; a brake as strong
+ * as the motor. */
 void equipment_init(struct equipment *equipment, const struct drive_config *config);
 
 /* Whether all figures are in their ranges; and the rule, as one phrase. */

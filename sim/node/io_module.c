@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements node/io_module.h (see there): a simulated I/O module. */
 #include "node/io_module.h"
 
 #include <string.h>
@@ -64,7 +65,7 @@ static void change_state(void *context, enum nmt_state state)
 {
     struct io_module *module = context;
     for (int i = 0; i < IO_MODULE_RPDOS; i++) {
-        pdo_map_rest(&module->rpdos[i]);
+        pdo_map_restart(&module->rpdos[i]);
     }
     if (state == NMT_STOPPED) {
         take_error_values(module);
@@ -155,7 +156,7 @@ void io_module_receive(struct io_module *module, const struct can_msg *in)
         module->master_seen || in->id == COB_HEARTBEAT + (uint32_t)module->master.node;
 }
 
-/* The time since the last call may have passed before a heartbeat that came meanwhile: then it does not count. */
+/* If a heartbeat has come since the last call, the time since that call does not count. */
 static void process_master(struct io_module *module, uint32_t elapsed_us)
 {
     const uint32_t without_us = module->master_seen ? 0u : elapsed_us;

@@ -65,8 +65,9 @@ static bool run(struct drives *drives, int signals)
     return false;
 }
 
-/* Real drives answer within a fraction of the period; where a priority is not permitted, the host's scheduler decides. */
-static void ask_for_priority(void)
+/* Real drives answer within a fraction of the period; where a priority is not permitted, the host's scheduler
+ * decides. */
+static void request_priority(void)
 {
     const struct sched_param priority = {.sched_priority = PRIORITY};
     (void)sched_setscheduler(0, SCHED_FIFO, &priority);
@@ -99,7 +100,7 @@ static int start(struct drives *drives, const struct node_options *options)
         return fail(EXIT_BUS, reason);
     }
     const int filtered = drives_filter(drives);
-    ask_for_priority();
+    request_priority();
     if (filtered != 0) {
         return fail(EXIT_BUS, strerror(-filtered));
     }

@@ -5,7 +5,7 @@
 #include <assert.h>
 #include <string.h>
 
-/* The supply has failed when less than this part of the drive's own voltage is left. */
+/* The supply has failed below this part of the drive's own voltage. */
 static const double undervoltage = 0.1;
 
 void node_faults_init(struct node_faults *faults, const struct fault_rules *rules,
@@ -76,7 +76,7 @@ static void force_limit_switch(struct servo *servo, enum fault_side side, bool o
     servo_refresh_inputs(servo);
 }
 
-/* Faults that happen at an instant and have no end. */
+/* Faults without a duration. */
 static void happen(struct drive_node *node, const struct fault_rule *rule)
 {
     if (rule->kind == FAULT_KIND_RESTART) {

@@ -2,8 +2,8 @@
 /* node_faults: faults injected into simulated drives: carries out the fault rules that are about drives
  * (docs/reference/protocol.md section 4) on the drives of this process.
  *
- * Each rule is independent of the others. A fault stays until its rule ends; a restart of the drive ends none: a broken
- * encoder stays broken. Same context as drive_node_receive, between two frames.
+ * Each rule is independent of the others. A fault lasts until its rule ends, also over a restart of the drive: a broken
+ * encoder stays broken. Used by node/drives. Same context as drive_node_receive, between two frames.
  */
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H
@@ -26,17 +26,18 @@ struct node_faults {
     node_faults_note *note;
 };
 
-/* `rules` and `nodes` are borrowed; rules about other nodes do nothing, but are noted, too. */
+/* `rules` and `nodes` are borrowed; rules for other nodes have no effect, but are noted as well. */
 void node_faults_init(struct node_faults *faults, const struct fault_rules *rules,
                       struct drive_node *nodes, size_t node_count, node_faults_note *note);
 
 /* A frame of the bus, before the drives get it. `now_ns` is above 0. */
 void node_faults_receive(struct node_faults *faults, const struct can_msg *in, uint64_t now_ns);
 
-/* Wall time passes: what lasts for ms ends. */
+/* Lets wall time pass: ends faults whose duration is given in ms. */
 void node_faults_process(struct node_faults *faults, uint64_t now_ns);
 
-/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_rules_parse has checked its figures:
+/* Begins (on) or ends the fault of one rule, which is about drives, on one drive; fault_rules_parse has checked its
+ * figures:
  *     stop             on: no power: sends and receives nothing, the axis is on its brake. Off: the drive boots
  *     restart          on: power lost and back at once
  *     heartbeat-stop   sends no heartbeats

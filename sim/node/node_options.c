@@ -44,7 +44,7 @@ const char node_options_help[] =
     "\n"
     "SIGTERM or SIGINT ends it. Exit status: 0 ended as asked, 2 wrong usage, 4 bus not usable.\n";
 
-/* What is at fault, and in which word. */
+/* Reports an error and its word. */
 static enum node_options_result wrong(const struct long_options *line, const char *text,
                                       const char *word)
 {
@@ -173,7 +173,7 @@ static enum node_options_result set_item(struct node_options_axis *axis, char *i
     return NODE_OPTIONS_OK;
 }
 
-/* Equipment that is not given is what belongs to the motor. */
+/* Equipment that is not given has the defaults for the motor. */
 static void equip(struct node_options_axis *axis, const bool *seen)
 {
     struct node_options_axis whole = *axis;

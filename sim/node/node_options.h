@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* node_options: the command line of hodograph-drive. */
+/* node_options: reads the command line of hodograph-drive. Used by its main program. Main thread, once; prints
+ * nothing. */
 #ifndef NODE_NODE_OPTIONS_H
 #define NODE_NODE_OPTIONS_H
 
@@ -29,7 +30,7 @@ struct node_options {
 enum node_options_result {
     NODE_OPTIONS_OK,
     NODE_OPTIONS_HELP, /* help requested: print node_options_help */
-    NODE_OPTIONS_WRONG /* `reason` has one line: what is wrong and what to do */
+    NODE_OPTIONS_WRONG /* `reason` has one line: the error and its remedy */
 };
 
 extern const char node_options_help[];

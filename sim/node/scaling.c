@@ -51,7 +51,7 @@ static uint32_t change(struct axis_motion *axis, const struct ratios *ratios, ui
     if (*changed == value) {
         return SDO_OK;
     }
-    if (!permitted || !axis_motion_at_rest(axis)) {
+    if (!permitted || !axis_motion_at_standstill(axis)) {
         return SDO_ABORT_STATE;
     }
     *changed = value;

@@ -54,8 +54,7 @@ void servo_fail(struct servo *servo, uint16_t code)
     }
 }
 
-/* There is nothing to stop with: the brake has to do it. In a fault already it is one more error, which is reported
- * to the master, too. */
+/* The motor cannot stop the axis; the brake has to. In state Fault it is one more error, which is reported as well. */
 void servo_fail_powerless(struct servo *servo, uint16_t code)
 {
     const int16_t reaction = servo->device.options.fault_reaction;
@@ -111,7 +110,7 @@ static void clear_errors(struct servo *servo)
 
 /* ---- controlword and mode ---- */
 
-/* The beginning of Operation enabled. A drive that is switched on by hand, without a setpoint, stays where it is. */
+/* Operation enabled begins. A drive that is enabled manually, without a setpoint, stays at its position. */
 static void begin_operation(struct servo *servo)
 {
     servo->values->simulation.reproducible = 1;
@@ -317,7 +316,7 @@ void servo_step(struct servo *servo)
 
 /* ---- results ---- */
 
-/* CiA 402-2, homing: bit 12 attained, 13 error, 10 at rest. */
+/* CiA 402-2, homing: bit 12 attained, 13 error, 10 at standstill. */
 static uint16_t homing_flags(const struct servo *servo)
 {
     const uint16_t reached =
@@ -351,7 +350,7 @@ static bool internal_limit_active(const struct servo *servo)
     return servo->software_limit || servo->limit_switch_hit || volts >= limit || volts <= -limit;
 }
 
-/* Bits beside the state and the mode. */
+/* Bits that depend on neither state nor mode. */
 static uint16_t general_flags(const struct servo *servo)
 {
     const bool warning = supervision_warning(&servo->supervision, servo->values->digital_inputs);

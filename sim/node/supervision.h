@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* supervision: what a simulated drive supervises in each period: the following error, and the overload of its motor; and
- * what injected faults have done to switches, encoder and supply. It reports conditions; the servo decides what follows.
- * All in one context.
+/* supervision: supervises the following error and the motor overload of a simulated drive in each period, and stores
+ * the effects of injected faults on switches, encoder and supply. It reports conditions; the servo decides the
+ * reaction. Used by node/servo. All in one context.
  */
 #ifndef NODE_SUPERVISION_H
 #define NODE_SUPERVISION_H
@@ -19,8 +19,8 @@ struct supervision {
     struct overload overload;
     double load_per_volt;  /* motor load in units of the rated torque */
     uint32_t following_us; /* following error out of its window */
-    uint32_t
-        forced_inputs; /* injected fault: switches that are on wherever the axis is, bits of 0x60FD */
+    /* injected fault: switches that are on wherever the axis is, bits of 0x60FD */
+    uint32_t forced_inputs;
     bool overloaded;
     bool encoder_failed; /* injected fault, as the next one */
     bool supply_failed;
@@ -36,7 +36,7 @@ void supervision_equip(struct supervision *supervision, const struct equipment *
 uint16_t supervision_step(struct supervision *supervision, const struct axis_motion *axis,
                           const struct od_drive *values, bool following);
 
-/* Whether statusword bit 7 is due: a limit switch is on, or the overload is near. */
+/* Whether statusword bit 7 (warning) is set: a limit switch is on, or the overload is near. */
 bool supervision_warning(const struct supervision *supervision, uint32_t inputs);
 
 /* Whether the cause of a fault persists, so that a fault reset has no effect. */

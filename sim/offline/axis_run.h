@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* One axis under given setpoints and offsets, for fits of its plant: what the motor does in the
- * model, before encoder and bus round it. The drive computes as it always does, with its encoder.
+/* axis_run: runs one simulated axis with given setpoints and offsets, to fit its plant to a recording. It returns the
+ * motion of the motor in the model, before encoder and bus round it; the drive itself uses its encoder as usual. Called
+ * by Python through host_tools/hodograph/native. Pure, any thread.
  */
 #ifndef HODOGRAPH_OFFLINE_AXIS_RUN_H
 #define HODOGRAPH_OFFLINE_AXIS_RUN_H
@@ -12,7 +13,7 @@
 struct axis_run {
     double rated_torque_nm; /* of torque offsets, more than 0 */
     double friction_volts;  /* Coulomb, 0 or more */
-    int32_t start_counts;   /* at rest here */
+    int32_t start_counts;   /* standstill here */
     uint32_t count;
     /* By bus period, `count` each. */
     const int32_t *target_counts;

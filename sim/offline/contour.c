@@ -15,13 +15,13 @@ static const double CONTOUR_WINDOW = 4.0;
 
 struct foot {
     struct place place;
-    double moved_mm; /* along the curve from where the search began */
+    double moved_mm; /* along the curve, from the start of the search */
     double distance_mm;
     bool found;
 };
 
 /* Distance of the point from the tangent. In the plane without the square and the root of one number. */
-static double contour_beside(const struct contour *c, const struct view *v, double square)
+static double contour_off_tangent(const struct contour *c, const struct view *v, double square)
 {
     const double z = v->offset[0] * v->first[1] - v->offset[1] * v->first[0];
     if (c->axes == PROGRAM_PLANE) {
@@ -46,7 +46,7 @@ static struct foot contour_newton(const struct contour *c, struct place start,
         const double full = square - contour_dot(v.offset, v.second);
         const double step = along / (full > 0.25 * square ? full : square);
         if (step * step * square < CONTOUR_STEP_MM * CONTOUR_STEP_MM) {
-            foot.distance_mm = contour_beside(c, &v, square);
+            foot.distance_mm = contour_off_tangent(c, &v, square);
             foot.found = true;
             return foot;
         }
@@ -68,8 +68,8 @@ static double contour_gap_at(const struct contour *c, double arc_length_mm, cons
     return contour_gap(c, contour_place(c, c->cursor, contour_wrap(c, arc_length_mm)), point);
 }
 
-/* Slow and sure: samples the window, then closes in on the best sample by golden sections. *foot_mm is the arc length
- * found. */
+/* Slow but without failure: samples the window, then searches around the best sample by golden sections. *foot_mm is
+ * the arc length found. */
 static double contour_search(const struct contour *c, double arc_length_mm, double window_mm,
                              const double point[3], double *foot_mm)
 {

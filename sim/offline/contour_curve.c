@@ -4,7 +4,8 @@
 
 #include <math.h>
 
-/* The hodograph of the preimage A is A i A*, a quadratic form; this is scale times the bilinear one that belongs to it. */
+/* The hodograph of the preimage A is A i A*, a quadratic form; this is scale times the bilinear one that belongs to
+ * it. */
 static void hodograph_product(const double a[4], const double b[4], double scale, double out[3])
 {
     out[0] = scale * (a[PROGRAM_U] * b[PROGRAM_U] + a[PROGRAM_V] * b[PROGRAM_V] -

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The exact curve of a program for offline/contour.h: expands it once, and finds places on it near a point. All functions
- * but contour_begin are pure. */
+/* contour_curve: the exact curve of a program, for offline/contour: expands it once, and finds places on it near a
+ * point. All functions except contour_begin are pure. One thread for each struct contour. */
 #ifndef HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 #define HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 
@@ -23,8 +23,7 @@ struct contour_segment {
 struct contour {
     const struct contour_segment *segments;
     uint32_t count;
-    uint32_t cursor; /* where the last commanded arc length was: speeds up the search, changes no
-                        result */
+    uint32_t cursor; /* segment of the last commanded arc length: only to search faster */
     double length_mm;
     uint32_t axes; /* of the curve: 2, or 3 in space */
     bool closed;
@@ -36,8 +35,7 @@ struct place {
     double xi;
 };
 
-/* The curve at a place, seen from a point: offset = point - curve, and the first two derivatives of
- * the curve. */
+/* The curve at a place, relative to a point: offset = point - curve, and the first two derivatives of the curve. */
 struct view {
     double offset[3];
     double first[3];
@@ -63,19 +61,19 @@ void contour_begin(struct contour *contour, const struct program *program,
 /* Brings an arc length into the program: modulo the length on a closed path, else clamped. */
 double contour_wrap(const struct contour *c, double arc_length_mm);
 
-/* About the place of an arc length within the program: good enough to start from; no result depends
- * on it being exact. `hint` is the segment to look in first. */
+/* The approximate place of an arc length within the program, as a first guess. `hint` is the segment that is searched
+ * first. */
 struct place contour_place(const struct contour *c, uint32_t hint, double arc_length_mm);
 
-/* The curve at a place, seen from a point. */
+/* Fills the curve at a place, relative to a point. */
 void contour_view(const struct contour *c, struct place place, const double point[3],
                   struct view *v);
 
 /* Distance of a point from a place. */
 double contour_gap(const struct contour *c, struct place place, const double point[3]);
 
-/* Takes a parameter that has left [0, 1] over into the adjacent segment, beyond the start of a closed path too. False
- * at the end of an open path: xi is clamped. */
+/* Moves a place with a parameter outside [0, 1] to the adjacent segment, also over the start of a closed path. False at
+ * the end of an open path: xi is limited. */
 bool contour_cross(const struct contour *c, struct place *p);
 
 #endif

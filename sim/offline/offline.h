@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* The whole chain in one process, without a bus: interpolator, rounding to counts, two simulated
- * drives, contour error. Gives the same setpoints and encoder positions as a run on the bus, bit
- * for bit.
+/* offline: the offline simulation, without a bus: interpolator, rounding to counts, simulated axes and contour error in
+ * one process. It gives the same setpoints and encoder positions as a run on the bus, bit for bit. Called by Python
+ * through host_tools/hodograph/native.
  *
  * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC
- * k+2. The drives begin parked at the program's start point. Rows after the program's last tick
- * repeat its end point (settling), those after a stop its place of rest.
+ * k+2. The drives begin at standstill at the program's start point. Rows after the program's last tick repeat its end
+ * point (settling), those after a stop its place of standstill.
  *
- * Use: offline_begin, then offline_run as often as wanted. No heap: the caller lends the segment array, and
- * the program, its image, its coefficient records and the segments must outlive the simulation. Main loop only.
+ * Use: offline_begin, then offline_run as often as needed. No heap: the caller lends the segment array. The program,
+ * its image, its coefficient records and the segments must outlive the simulation. One thread for each struct offline.
  */
 #ifndef HODOGRAPH_OFFLINE_OFFLINE_H
 #define HODOGRAPH_OFFLINE_OFFLINE_H
@@ -59,10 +59,10 @@ struct offline_order {
 /* The last hold, stop or fault stop. */
 struct offline_stop {
     uint32_t tick;       /* of the order, */
-    uint32_t rest_tick;  /* and the first setpoint at rest; UINT32_MAX: there was none yet */
+    uint32_t rest_tick;  /* and of the first setpoint at standstill; UINT32_MAX: not yet */
     uint32_t bound_us;   /* of the stop table, at the piece in which it was commanded */
     int64_t from_q40_mm; /* arc length of the last setpoint before the order, */
-    int64_t rest_q40_mm; /* and at rest */
+    int64_t rest_q40_mm; /* and at standstill */
 };
 
 enum offline_error {
@@ -102,8 +102,8 @@ struct offline {
     uint32_t tick;
 };
 
-/* Sets up for a program that passed program_check and has coefficient records; segments has room for its
- * segment_count, `drives` one for each axis of the program. Returns 0 or an error. */
+/* Sets up for a program that passed program_check and has coefficient records. `segments` has room for its
+ * segment_count, `drives` has one element for each axis of the program. Returns 0 or an error. */
 int offline_begin(struct offline *sim, const struct program *program,
                   const struct drive_config *drives, struct contour_segment *segments);
 
@@ -111,8 +111,8 @@ int offline_begin(struct offline *sim, const struct program *program,
  * counts per mm in the gains are those of the simulation. */
 void offline_feedforward(struct offline *sim, const struct feedforward_gains *gains);
 
-/* Rated torque of an axis (from 0; more than 0; drive_config_rated_torque_nm if this is not called), and
- * Coulomb friction as volts (0 or more; none); right after offline_begin. */
+/* Rated torque of axis `axis` (from 0), more than 0, by default drive_config_rated_torque_nm; and its Coulomb friction
+ * as volts, 0 or more, by default 0. Right after offline_begin. */
 void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double friction_volts);
 
 /* Faults of this run, right after offline_begin; they must outlive the simulation. Positions and contour error stay
@@ -120,17 +120,19 @@ void offline_equip(struct offline *sim, int axis, double rated_torque_nm, double
  * Returns 0 or OFFLINE_ERR_FAULT. */
 int offline_faults(struct offline *sim, const struct offline_fault *faults, uint32_t count);
 
-/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the simulation. Returns 0 or OFFLINE_ERR_FAULT. */
+/* Commands of this run, by ascending tick, right after offline_begin; they must outlive the simulation. Returns 0 or
+ * OFFLINE_ERR_FAULT. */
 int offline_orders(struct offline *sim, const struct offline_order *orders, uint32_t count);
 
-/* What became of the last order to stop. */
+/* The result of the last order to hold or stop. */
 void offline_stop_get(const struct offline *sim, struct offline_stop *stop);
 
 /* The next n ticks. Returns 0 or OFFLINE_ERR_INTERP. */
 int offline_run(struct offline *sim, struct offline_row *rows, uint32_t n);
 
-/* Commanded points alone, for n program times in 2^-42 s, in any order (ascending is quick).
- * counts: those of all axes of a point, one point after the other, or NULL. The interpolator has to have begun. Returns 0 or OFFLINE_ERR_INTERP. */
+/* Only the commanded points, for n program times in 2^-42 s, in any order (fastest if ascending). counts: those of all
+ * axes of a point, one point after the other, or NULL. Call interpolator_begin before. Returns 0 or
+ * OFFLINE_ERR_INTERP. */
 int offline_points(struct interpolator *interp, uint32_t n, const uint64_t *time_q42_s,
                    uint32_t counts_per_mm, struct interpolator_point *points, int32_t *counts);
 

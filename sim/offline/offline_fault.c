@@ -63,7 +63,7 @@ void offline_fault_tick(const struct offline_fault *fault, int64_t tick,
     } else if (tick == offline_fault_after(fault)) {
         offline_fault_end(fault, influence, drive);
     } else {
-        /* goes on, or does not concern us */
+        /* continues, or is none of this simulation */
     }
 }
 

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Faults of a run without a bus: what a rule of docs/reference/protocol.md section 4 does to an axis, for the
- * kinds that act on drive or setpoint alone. Nobody supervises here: an axis goes on under its fault
- * where a controller would stop the machine.
+/* offline_fault: faults of the offline simulation: the effect of a rule of docs/reference/protocol.md section 4 on an
+ * axis, for the kinds that act on drive or setpoint only. There is no supervision here: an axis continues with its
+ * fault where a controller would stop the machine. Used by offline/offline.
  *
- * Ticks count as they do in the rules: tick 0 is the SYNC at which the first setpoint is latched
- * that differs from the start point. Pure functions but for what they are given.
+ * Ticks count as in the rules: tick 0 is the SYNC at which the first setpoint is latched that differs from the start
+ * point. The functions change their arguments only, any thread.
  */
 #ifndef HODOGRAPH_OFFLINE_OFFLINE_FAULT_H
 #define HODOGRAPH_OFFLINE_OFFLINE_FAULT_H
@@ -35,8 +35,7 @@ struct offline_fault {
     double value;
 };
 
-/* Tick number `tick` begins: the fault begins, ends, or nothing changes. To be called for every tick
- * from 0 on. */
+/* Tick number `tick` begins: begins or ends the fault, or changes nothing. To be called for every tick from 0 on. */
 void offline_fault_tick(const struct offline_fault *fault, int64_t tick,
                         struct influence *influence, const struct drive *drive);
 

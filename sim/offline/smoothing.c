@@ -16,7 +16,7 @@ static const double SMOOTHING_GAIN = 0.1;    /* of the gain that the gradient pr
 /* Shifts, and what follows from them. */
 struct smoothing_state {
     double *shift;      /* [count][directions] */
-    double *room;       /* [count]: what is left of the squares of the bounds */
+    double *room;       /* [count]: square of the bound less that of the shift */
     double *difference; /* [count - 3][3] */
     double value;       /* sum of squares and barrier; inf outside the bounds */
 };
@@ -75,7 +75,7 @@ static double smoothing_cosine(const struct smoothing *s, uint32_t k, uint32_t a
     return sum;
 }
 
-/* Adds what the points k and k + lag have to do with one another. */
+/* Adds the coupling of the points k and k + lag. */
 static void smoothing_couple(struct smoothing_search *m, uint32_t k, uint32_t lag, double both)
 {
     const struct smoothing *s = m->given;
@@ -128,7 +128,7 @@ static void smoothing_move(struct smoothing_search *m, const double *shift)
     }
 }
 
-/* Room, differences and value of the shifts of a state. */
+/* Computes `room`, differences and value of the shifts of a state. */
 static void smoothing_evaluate(struct smoothing_search *m, struct smoothing_state *at, double level)
 {
     const struct smoothing *s = m->given;
@@ -156,7 +156,7 @@ static void smoothing_evaluate(struct smoothing_search *m, struct smoothing_stat
 static void smoothing_gradient(struct smoothing_search *m, double level)
 {
     const struct smoothing *s = m->given;
-    double *slope = m->point; /* the points are no longer needed */
+    double *slope = m->point; /* the memory of the points, which are not used from here on */
     memset(slope, 0, sizeof(double) * 3 * s->count);
     for (uint32_t i = 0; i < 3 * m->rows; i++) {
         for (uint32_t k = 0; k <= SMOOTHING_ORDER; k++) {
@@ -270,7 +270,7 @@ static double smoothing_longest(const struct smoothing_search *m)
     return least;
 }
 
-/* Goes along the step until the value is low enough. False: it becomes no lower. */
+/* Searches along the step for a value that is low enough. False: there is none. */
 static bool smoothing_search_line(struct smoothing_search *m, double level, double decrease)
 {
     double along = fmin(1.0, SMOOTHING_INSIDE * smoothing_longest(m));

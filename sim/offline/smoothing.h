@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Moves points of a path sideways, each within its bound, so that the sum of squared third differences becomes least:
- * docs/theory/toolpath-fitting.md section 3. The bounds are kept by a barrier, so every step stays inside them.
+ * smoothing: moves points of a path sideways, each within its bound, so that the sum of squared third differences
+ * becomes least: docs/theory/toolpath-fitting.md section 3. The bounds are kept by a barrier, so every step stays
+ * inside them. Called by Python through host_tools/hodograph/native.
  *
- * Newton's method on a banded system, in double arithmetic. No heap: the caller lends all arrays. Main loop of a host.
+ * Newton's method on a banded system, in double arithmetic. No heap: the caller lends all arrays, and no others are
+ * written. Any thread.
  */
 #ifndef HODOGRAPH_OFFLINE_SMOOTHING_H
 #define HODOGRAPH_OFFLINE_SMOOTHING_H
@@ -17,7 +19,7 @@ struct smoothing {
     uint32_t directions;  /* directions in which each point may move: 1 or 2 */
     const double *point;  /* [3], mm */
     const double *normal; /* [3][directions], these directions, orthonormal */
-    const double *bound;  /* how far, mm; 0: not at all */
+    const double *bound;  /* greatest shift, mm; 0: the point is fixed */
     /* [4] in count - 3 rows: weighted third difference of point k and the next three */
     const double *coefficient;
 };

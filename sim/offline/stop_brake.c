@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_brake.h (see there): whether a brake along the path keeps given limits. */
 #include "offline/stop_brake.h"
 
 #include <math.h>
 
 #define GREATEST_CODE 255
-#define LEAST_MM_S    1e-4 /* slower is rest */
+#define LEAST_MM_S    1e-4 /* slower is standstill */
 #define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
-#define SURE_EACH                                                                                  \
-    12 /* ticks of a brake between two looks whether the rest of it, or so many ticks, surely keep the limits */
+/* ticks of a brake between two tests whether bounds show the limits kept, for its remaining ticks or so many ticks */
+#define SURE_EACH   12
 #define SPARE_TIME  1.25 /* of stop_brake_time, */
 #define SPARE_TICKS 10.0 /* and ticks more */
-#define FASTER                                                                                     \
-    0.03 /* of a feed, or the velocity of an axis: at other rates states are looked at that look-ahead excludes */
+/* of a feed, or the velocity of an axis: at other overrides the states include some that look-ahead excludes */
+#define FASTER 0.03
 
 double stop_number_of(int k, int code)
 {
@@ -55,8 +56,8 @@ double stop_brake_time(const struct stop_state *from, const struct path_brake_nu
     return fabs(from->a + depth) / down + even_s + depth / up + TICKS_MORE * period_s;
 }
 
-int stop_has_room(const struct stop_setting *setting, const struct stop_state *at,
-                  const struct path_brake_numbers *numbers)
+int stop_fits_before_end(const struct stop_setting *setting, const struct stop_state *at,
+                         const struct path_brake_numbers *numbers)
 {
     const struct path_state state = {
         .speed_q56 = (int64_t)(at->v * setting->period_s * 0x1p56),
@@ -94,7 +95,7 @@ static struct stop_state moved(const struct stop_state *from, double j, double t
     return to;
 }
 
-/* 1 while one tick keeps the limits, looked at in `parts` places. */
+/* 1 if one tick keeps the limits, sampled at `parts` places. */
 static int tick_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                       const struct stop_state *from, const struct stop_state *to, uint32_t *row,
                       int parts)
@@ -102,8 +103,8 @@ static int tick_keeps(const struct stop_setting *setting, const struct stop_inve
     double j = (to->a - from->a) / setting->period_s;
     for (int k = 0; k < parts; k++) {
         struct stop_state at = moved(from, j, setting->period_s * k / parts);
-        stop_pass_rows(&setting->road, at.s, row);
-        if (stop_strain(&setting->road, inverse, &setting->road.rows[*row], &at, j) > 1.0) {
+        stop_pass_rows(&setting->lookup, at.s, row);
+        if (stop_usage(&setting->lookup, inverse, &setting->lookup.rows[*row], &at, j) > 1.0) {
             return 0;
         }
     }
@@ -127,8 +128,8 @@ double stop_brake_extent(const struct stop_setting *setting,
     return most->s + extent->speed * most_s;
 }
 
-/* 1: the rest of the brake keeps the limits without a look at its ticks; 0: that is open. Most brakes at low rates are far from the
- * limits, and to follow each of them would take nearly all of the time of a search. */
+/* 1: bounds show that the remaining brake keeps the limits; 0: they do not decide. Most brakes at low overrides are far
+ * from the limits, and following each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
 {
@@ -137,10 +138,10 @@ static int surely_keeps(const struct stop_setting *setting, const struct stop_in
     struct stop_extent extent;
     most.a = stop_greater(most.a, 0.0);
     const double to_mm = stop_brake_extent(setting, &brake->numbers, &most, fall, &extent);
-    return stop_keeps_up_to(&setting->road, inverse, &extent, row, to_mm);
+    return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, to_mm);
 }
 
-/* 1: some ticks of a brake, at[0 ... count], surely keep the limits, by bounds of all of them; 0: that is open. */
+/* 1: bounds show that some ticks of a brake, at[0 ... count], keep the limits; 0: they do not decide. */
 static int ticks_surely_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                              const struct stop_state *at, int count, uint32_t row)
 {
@@ -152,7 +153,7 @@ static int ticks_surely_keep(const struct stop_setting *setting, const struct st
         extent.acceleration = stop_greater(extent.acceleration, fabs(at[k + 1].a));
         extent.jerk = stop_greater(extent.jerk, fabs(at[k + 1].a - at[k].a) / period_s);
     }
-    return stop_keeps_up_to(&setting->road, inverse, &extent, row, at[count].s);
+    return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, at[count].s);
 }
 
 int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
@@ -164,12 +165,12 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
     const int each = (int)stop_greater(step_s / setting->period_s, 1.0);
     int done = 0;
     at[0] = state_of(&tick, from_mm, setting->period_s);
-    while (!path_brake_rests(&tick)) {
+    while (!path_brake_ended(&tick)) {
         if (surely_keeps(setting, inverse, &tick, from_mm, row)) {
             return 1;
         }
         int count = 0;
-        while (count < SURE_EACH && !path_brake_rests(&tick)) {
+        while (count < SURE_EACH && !path_brake_ended(&tick)) {
             if (done + count == 0) {
                 path_brake_first(&tick);
             } else {
@@ -187,7 +188,7 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
         }
         done += count;
         at[0] = at[count];
-        stop_pass_rows(&setting->road, at[0].s, &row);
+        stop_pass_rows(&setting->lookup, at[0].s, &row);
     }
     return 1;
 }
@@ -195,24 +196,24 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
 void stop_setting_open(struct stop_setting *setting, const struct program *p,
                        const struct stop_limits *limits, const struct stop_path *path)
 {
-    stop_road_open(&setting->road, p, path);
+    stop_lookup_open(&setting->lookup, p, path);
     setting->period_us = p->header.period_us;
     setting->period_s = 1e-6 * p->header.period_us;
     setting->length_mm = ldexp((double)p->header.length_q40_mm, -40);
     setting->rise_is_cut = limits->rise_is_cut;
     setting->quick = limits->quick;
     setting->deceleration = limits->acceleration;
-    stop_invert(&setting->inverse, limits, setting->road.axis_count);
+    stop_invert(&setting->inverse, limits, setting->lookup.axis_count);
     setting->at_any_rate = setting->inverse;
     setting->at_any_rate.feed /= 1.0 + FASTER;
-    for (uint32_t k = 0; k < setting->road.axis_count; k++) {
+    for (uint32_t k = 0; k < setting->lookup.axis_count; k++) {
         setting->at_any_rate.velocity[k] /= 1.0 + FASTER;
-        setting->at_any_rate.reach[k] *= limits->reach_at_pace != 0u ? 0.0 : 1.0;
+        setting->at_any_rate.reach[k] *= limits->reach_at_rate_1 != 0u ? 0.0 : 1.0;
     }
     for (int k = 0; k < 3; k++) {
         const double *axis = k == 1 ? limits->axis_acceleration : limits->axis_jerk;
         double all = hypot(axis[0], axis[1]);
-        all = setting->road.axis_count > PROGRAM_PLANE ? hypot(all, axis[2]) : all;
+        all = setting->lookup.axis_count > PROGRAM_PLANE ? hypot(all, axis[2]) : all;
         double limit = fmin(k == 1 ? limits->acceleration : limits->jerk, all);
         setting->most[k] = 0;
         for (int c = 1; c <= GREATEST_CODE; c++) {

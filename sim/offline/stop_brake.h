@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A brake as the controller makes it (core/path_brake.h), followed along the path of a program beside its limits.
+ * stop_brake: whether a brake of the controller (core/path_brake.h) along the path of a program keeps given limits.
+ * Used by the search of stop parameters (offline/stop_search and its parts).
  *
- * A brake has three numbers: jerk of onset, deceleration, jerk of release, as codes of docs/reference/protocol.md 1.4. It is
- * followed tick by tick, but as soon as bounds of the rest of it, or of some ticks, show that the limits are kept, its
- * ticks are not looked at. mm, s. Main loop of a host.
+ * A brake has three numbers: jerk of onset, deceleration, jerk of release, as codes of docs/reference/protocol.md 1.4.
+ * It is followed tick by tick. If bounds of all its remaining ticks, or of some of them, show that the limits are kept,
+ * these ticks are not evaluated one by one. mm, s. Any thread of a host; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_BRAKE_H
 #define HODOGRAPH_OFFLINE_STOP_BRAKE_H
@@ -13,12 +14,12 @@
 
 #include "core/path_brake.h"
 #include "core/program.h"
-#include "offline/stop_strain.h"
+#include "offline/stop_usage.h"
 
-/* What stays while the stops of a program are searched. */
+/* The inputs of the search for one program, constant during the search. */
 struct stop_setting {
-    struct stop_road road;
-    struct stop_inverse inverse;     /* at the rate 1, */
+    struct stop_lookup lookup;
+    struct stop_inverse inverse;     /* limits at override 1, */
     struct stop_inverse at_any_rate; /* and at others */
     uint32_t rise_is_cut;
     uint32_t quick;
@@ -36,33 +37,35 @@ void stop_setting_open(struct stop_setting *setting, const struct program *p,
 /* The number of a code: jerk, deceleration, jerk for k = 0 ... 2; mm, s. */
 double stop_number_of(int k, int code);
 
-/* The numbers of three codes; 0: the controller takes no such numbers. */
+/* The numbers of three codes; 0: the controller refuses such numbers. */
 int stop_numbers_of(const struct stop_setting *setting, const int codes[3],
                     struct path_brake_numbers *numbers);
 
-/* Begins the brake that the controller would make, at arc length 0; 0 where none fits. */
+/* Begins the brake that the controller would make, at arc length 0; returns 0 if none fits. */
 int stop_brake_begin(struct path_brake *brake, const struct stop_state *from,
                      const struct path_brake_numbers *numbers, double period_s);
 
-/* How long it takes: the continuous curve, and what whole ticks take more on the mean. */
+/* Duration of a brake: that of the continuous curve, and the mean excess because it brakes in whole ticks. */
 double stop_brake_time(const struct stop_state *from, const struct path_brake_numbers *numbers,
                        double period_s);
 
-/* Whether the controller would find room for the brake before the end of the program. */
-int stop_has_room(const struct stop_setting *setting, const struct stop_state *at,
-                  const struct path_brake_numbers *numbers);
+/* Whether the controller would accept the brake, because it ends before the program does. */
+int stop_fits_before_end(const struct stop_setting *setting, const struct stop_state *at,
+                         const struct path_brake_numbers *numbers);
 
-/* Whether the state has so little speed left, for its deceleration, that no brake need fit: the plan may go on. */
+/* Whether the speed is so low for the deceleration of the state that no brake has to fit: the nominal motion may
+ * continue. */
 int stop_may_wait(const struct stop_setting *setting, const struct stop_state *at,
                   const struct path_brake_numbers *numbers);
 
-/* Bounds of brakes from states with at most this speed and rise of it, and no more deceleration than `fall`: all of `extent` but
- * its path. Returns the arc length that they do not pass. */
+/* Bounds of all brakes from states with at most the speed and acceleration of `most`, and at most the deceleration
+ * `fall`: fills `extent` except its path. Returns an upper bound of their braking distance, mm. */
 double stop_brake_extent(const struct stop_setting *setting,
                          const struct path_brake_numbers *numbers, const struct stop_state *most,
                          double fall, struct stop_extent *extent);
 
-/* 1 while a brake that has begun at arc length from_mm, behind `row`, keeps the limits all the way; looked at each step_s. */
+/* 1: a brake that has begun at arc length from_mm, at or after `row`, keeps the limits until standstill; sampled each
+ * step_s. */
 int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                      const struct path_brake *brake, double from_mm, uint32_t row, double step_s);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The limits that a brake along a path keeps: those of the path file and the machine for a feed hold, those of the machine
- * for a fault stop. Data only; offline/stop_path.h and offline/stop_strain.h use them.
+ * stop_limits: the limits that a path stop keeps: those of the path file and the machine for a feed hold, those of the
+ * machine for a fault stop. Data only; set by Python (host_tools/hodograph/native), used by the modules offline/stop_*.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_LIMITS_H
 #define HODOGRAPH_OFFLINE_STOP_LIMITS_H
@@ -10,17 +10,17 @@
 
 #include "core/program.h"
 
-#define STOP_MARGIN                                                                                \
-    0.003 /* share of each limit that is left for what lies between the instants that are looked at */
+/* share of each limit that is reserved for the motion between two sampled instants */
+#define STOP_MARGIN 0.003
 
-/* A greatest feed on a stretch of the path. */
-struct stop_cap {
+/* A feed zone: the greatest feed on a stretch of the path. */
+struct stop_feed_zone {
     double from_mm;
     double to_mm;
     double feed_mm_s;
 };
 
-/* What a brake has to keep; HUGE_VAL: no limit. The numbers never ask for more than `acceleration` and `jerk`. */
+/* What a brake has to keep; HUGE_VAL: no limit. Its stop parameters never exceed `acceleration` and `jerk`. */
 struct stop_limits {
     double feed;         /* along the path: mm/s, */
     double acceleration; /* mm/s^2, */
@@ -32,13 +32,13 @@ struct stop_limits {
     double reach
         [PROGRAM_AXES]; /* greatest |velocity + time constant * acceleration| of the axis, mm/s */
     double time_constant[PROGRAM_AXES]; /* s */
-    const struct stop_cap *caps;
-    uint32_t cap_count;
-    uint32_t
-        reach_at_pace; /* 1: `reach` counts at the rate 1 only: other rates may pass it without a brake */
-    uint32_t
-        rise_is_cut; /* 1: a brake begins when a rising rate adds a quarter of its deceleration at most */
-    uint32_t quick; /* 1: few codes are tried, about 0.1 ms a piece, for long programs */
+    const struct stop_feed_zone *zones;
+    uint32_t zone_count;
+    /* 1: `reach` counts at override 1 only, because the motion at other overrides may exceed it without a brake */
+    uint32_t reach_at_rate_1;
+    /* 1: a brake begins only if a rising override adds at most a quarter of its deceleration */
+    uint32_t rise_is_cut;
+    uint32_t quick; /* 1: few codes are tried, about 0.1 ms for each piece, for long programs */
 };
 
 #endif

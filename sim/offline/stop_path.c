@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_path.h (see there): the path of a program as a table. */
 #include "offline/stop_path.h"
 
 #include <math.h>
@@ -57,7 +58,7 @@ static void planar_row(const struct preimage *w, double xi, struct stop_row *row
     row->slope = (2.0 * turn2 - 8.0 * turn * along / sigma) / (sigma * sigma * sigma);
 }
 
-/* What x', y', z' and sigma are of, as symmetric forms of two preimages. */
+/* The symmetric forms of two preimages that give x', y', z' and sigma. */
 static void forms(const double a[PROGRAM_COMPONENTS], const double b[PROGRAM_COMPONENTS],
                   double out[4])
 {
@@ -98,7 +99,8 @@ static void by_arc_length(const double d[3], const double sigma[3], uint32_t axi
     bend->by_mm[2][axis] = rest / (sigma[0] * sigma[0] * sigma[0]);
 }
 
-/* The third derivative of the path across its tangent: along it, it is the square of the curvature with a minus sign. */
+/* The third derivative of the path across its tangent: along it, it is the square of the curvature with a minus
+ * sign. */
 static double across(const struct stop_bend *bend, double curvature)
 {
     double square = 0.0;
@@ -140,7 +142,7 @@ static void spatial_row(const struct program_segment *segment, const struct prei
 }
 
 /* Arc length from the start of the segment: the integral of |A|^2. */
-static double way_to(const struct preimage *w, double xi)
+static double arc_length_to(const struct preimage *w, double xi)
 {
     double b[5] = {0};
     for (int k = 0; k < w->count; k++) {
@@ -165,7 +167,7 @@ static double feed_here(const struct stop_limits *limits, const struct stop_row 
     return most < limits->feed ? most : limits->feed;
 }
 
-/* The first of `count` rows at or behind an arc length. */
+/* The first of `count` rows at or after an arc length. */
 static uint32_t first_row_from(const struct stop_row *rows, uint32_t count, double s_mm)
 {
     uint32_t low = 0;
@@ -183,8 +185,8 @@ static uint32_t first_row_from(const struct stop_row *rows, uint32_t count, doub
 
 static void cap_rows(const struct stop_limits *limits, struct stop_row *rows, uint32_t count)
 {
-    for (uint32_t i = 0; i < limits->cap_count; i++) {
-        const struct stop_cap *cap = &limits->caps[i];
+    for (uint32_t i = 0; i < limits->zone_count; i++) {
+        const struct stop_feed_zone *cap = &limits->zones[i];
         uint32_t k = first_row_from(rows, count, cap->from_mm);
         for (; k < count && rows[k].s_mm <= cap->to_mm; k++) {
             if (cap->feed_mm_s < rows[k].feed_mm_s) {
@@ -291,7 +293,7 @@ void stop_rows(const struct program *p, const struct stop_limits *limits,
             } else {
                 spatial_row(&segment, &w, xi, row, &path->bends[at]);
             }
-            row->s_mm = ldexp((double)segment.start_q40_mm, -40) + way_to(&w, xi);
+            row->s_mm = ldexp((double)segment.start_q40_mm, -40) + arc_length_to(&w, xi);
             row->feed_mm_s = feed_here(limits, row);
         }
     }
@@ -299,13 +301,13 @@ void stop_rows(const struct program *p, const struct stop_limits *limits,
     group_rows(p, path);
 }
 
-uint32_t stop_row_at(const struct stop_road *road, double s)
+uint32_t stop_row_at(const struct stop_lookup *lookup, double s)
 {
     uint32_t low = 0;
-    uint32_t high = road->row_count - 1u;
+    uint32_t high = lookup->row_count - 1u;
     while (high - low > 1u) {
         uint32_t middle = low + (high - low) / 2u;
-        if (road->rows[middle].s_mm <= s) {
+        if (lookup->rows[middle].s_mm <= s) {
             low = middle;
         } else {
             high = middle;
@@ -314,26 +316,26 @@ uint32_t stop_row_at(const struct stop_road *road, double s)
     return low;
 }
 
-void stop_pass_rows(const struct stop_road *road, double s, uint32_t *row)
+void stop_pass_rows(const struct stop_lookup *lookup, double s, uint32_t *row)
 {
-    while (*row + 2u < road->row_count && road->rows[*row + 1u].s_mm <= s) {
+    while (*row + 2u < lookup->row_count && lookup->rows[*row + 1u].s_mm <= s) {
         (*row)++;
     }
 }
 
-/* The first row behind both a row and an arc length; the last one if there is none. */
-static uint32_t row_behind(const struct stop_road *road, uint32_t row, double to_mm)
+/* The first row after both a row and an arc length; the last one if there is none. */
+static uint32_t row_after(const struct stop_lookup *lookup, uint32_t row, double to_mm)
 {
-    const uint32_t last = road->row_count - 1u;
+    const uint32_t last = lookup->row_count - 1u;
     uint32_t low = row;
     uint32_t high = row < last ? row + 1u : last;
-    for (uint32_t step = 1u; high < last && road->rows[high].s_mm <= to_mm; step *= 2u) {
+    for (uint32_t step = 1u; high < last && lookup->rows[high].s_mm <= to_mm; step *= 2u) {
         low = high;
         high = last - high > step ? high + step : last;
     }
     while (high - low > 1u) {
         const uint32_t middle = low + (high - low) / 2u;
-        if (road->rows[middle].s_mm <= to_mm) {
+        if (lookup->rows[middle].s_mm <= to_mm) {
             low = middle;
         } else {
             high = middle;
@@ -342,44 +344,46 @@ static uint32_t row_behind(const struct stop_road *road, uint32_t row, double to
     return high;
 }
 
-void stop_stretch_from(const struct stop_road *road, uint32_t row, double to_mm,
+void stop_stretch_from(const struct stop_lookup *lookup, uint32_t row, double to_mm,
                        struct stop_stretch *stretch)
 {
-    const uint32_t last = row_behind(road, row, to_mm);
+    const uint32_t last = row_after(lookup, row, to_mm);
     stretch_begin(stretch);
     while (row <= last) {
         int level = 0;
         uint32_t size = 1u;
-        while (level < road->levels && row % (size << GROUP_BITS) == 0u &&
+        while (level < lookup->levels && row % (size << GROUP_BITS) == 0u &&
                last - row >= (size << GROUP_BITS) - 1u) {
             size <<= GROUP_BITS;
             level++;
         }
         if (level == 0) {
-            stretch_add_row(stretch, road->rows, road->bends, row, road->axis_count);
+            stretch_add_row(stretch, lookup->rows, lookup->bends, row, lookup->axis_count);
         } else {
-            stretch_add(stretch, &road->group[level - 1][row / size], road->axis_count);
+            stretch_add(stretch, &lookup->group[level - 1][row / size], lookup->axis_count);
         }
         row += size;
     }
 }
 
-void stop_stretch_of_row(const struct stop_road *road, uint32_t row, struct stop_stretch *stretch)
+void stop_stretch_of_row(const struct stop_lookup *lookup, uint32_t row,
+                         struct stop_stretch *stretch)
 {
     stretch_begin(stretch);
-    stretch_add_row(stretch, road->rows, road->bends, row, road->axis_count);
+    stretch_add_row(stretch, lookup->rows, lookup->bends, row, lookup->axis_count);
 }
 
-void stop_road_open(struct stop_road *road, const struct program *p, const struct stop_path *path)
+void stop_lookup_open(struct stop_lookup *lookup, const struct program *p,
+                      const struct stop_path *path)
 {
-    road->axis_count = p->header.axis_count;
-    road->rows = path->rows;
-    road->bends = path->bends;
-    road->row_count = p->header.segment_count * STOP_ROWS;
+    lookup->axis_count = p->header.axis_count;
+    lookup->rows = path->rows;
+    lookup->bends = path->bends;
+    lookup->row_count = p->header.segment_count * STOP_ROWS;
     const struct stop_stretch *group = path->groups;
-    road->levels = 0;
-    for (uint32_t count = road->row_count >> GROUP_BITS; count > 0; count >>= GROUP_BITS) {
-        road->group[road->levels++] = group;
+    lookup->levels = 0;
+    for (uint32_t count = lookup->row_count >> GROUP_BITS; count > 0; count >>= GROUP_BITS) {
+        lookup->group[lookup->levels++] = group;
         group += count;
     }
 }

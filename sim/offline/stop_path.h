@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The path of a program as rows of its curve at places close to each other, for those who follow many brakes along it.
+ * stop_path: the path of a program as a table: rows of its curve at places close to each other. The search of stop
+ * parameters follows many brakes along it.
  *
- * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first three
- * derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ... rows have the
- * greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
+ * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first
+ * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ...
+ * rows have the greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
  *
- * stop_rows() fills the path once; stop_road_open() makes what the look-ups take. mm, s. No heap: the caller lends all
- * arrays. Main loop of a host.
+ * stop_rows() fills the table once; stop_lookup_open() makes the struct that the look-ups use. mm, s. No heap: the
+ * caller lends all arrays. Any thread of a host; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_PATH_H
 #define HODOGRAPH_OFFLINE_STOP_PATH_H
@@ -26,7 +27,7 @@ struct stop_row {
     double tangent[2]; /* of a planar program */
     double curvature;  /* 1/mm; of a spatial program without sign */
     double slope; /* of the curvature, 1/mm^2; in space the third derivative across the tangent */
-    double feed_mm_s; /* greatest feed here: caps and centripetal acceleration */
+    double feed_mm_s; /* greatest feed here: feed zones and centripetal acceleration */
 };
 
 /* How the axes of a spatial program move there: first to third derivative by arc length. */
@@ -46,13 +47,13 @@ struct stop_stretch {
 /* The path of a program: segment_count * STOP_ROWS rows and bends. */
 struct stop_path {
     struct stop_row *rows;
-    struct stop_bend *bends; /* of a spatial program; not looked at of a planar one */
-    struct stop_stretch
-        *groups; /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    struct stop_bend *bends; /* of a spatial program; not used for a planar one */
+    /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    struct stop_stretch *groups;
 };
 
 /* The same with what look-ups need; borrows the path. */
-struct stop_road {
+struct stop_lookup {
     uint32_t axis_count;
     uint32_t row_count;
     const struct stop_row *rows;
@@ -61,27 +62,29 @@ struct stop_road {
     int levels;
 };
 
-/* How many groups of rows the path of a program has: `groups` of its stop_path. */
+/* Number of groups of rows of a program: the length of stop_path.groups. */
 uint32_t stop_groups(uint32_t segment_count);
 
 /* Fills the path; the program has passed program_open. */
 void stop_rows(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path);
 
-/* Makes a road of a path that stop_rows() has filled. */
-void stop_road_open(struct stop_road *road, const struct program *p, const struct stop_path *path);
+/* Fills *lookup for a path that stop_rows() has filled. */
+void stop_lookup_open(struct stop_lookup *lookup, const struct program *p,
+                      const struct stop_path *path);
 
 /* The last row at or before an arc length. */
-uint32_t stop_row_at(const struct stop_road *road, double s);
+uint32_t stop_row_at(const struct stop_lookup *lookup, double s);
 
 /* Raises `row` to the last row at or before an arc length. */
-void stop_pass_rows(const struct stop_road *road, double s, uint32_t *row);
+void stop_pass_rows(const struct stop_lookup *lookup, double s, uint32_t *row);
 
 /* Fills the bounds of a single row, */
-void stop_stretch_of_row(const struct stop_road *road, uint32_t row, struct stop_stretch *stretch);
+void stop_stretch_of_row(const struct stop_lookup *lookup, uint32_t row,
+                         struct stop_stretch *stretch);
 
 /* and those of the path from a row up to an arc length. */
-void stop_stretch_from(const struct stop_road *road, uint32_t row, double to_mm,
+void stop_stretch_from(const struct stop_lookup *lookup, uint32_t row, double to_mm,
                        struct stop_stretch *stretch);
 
 /* --- Small numbers, inline: the innermost loops --- */

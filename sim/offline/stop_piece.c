@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_piece.h (see there): instants and states of a feed piece in which a stop may begin. */
 #include "offline/stop_piece.h"
 
 #include <math.h>
 
-#define EVEN_INSTANTS 129  /* of a piece, one as long after the other */
+#define EVEN_INSTANTS 129  /* of a piece, at equal distances */
 #define ROWS_EACH     4    /* of the path, for an instant between them */
-#define LEAST_MM_S    1e-4 /* slower is rest */
-#define LEAST_TICKS                                                                                \
-    6.0 /* of a brake that the jerks alone make: with more jerk the way of one tick would count */
+#define LEAST_MM_S    1e-4 /* slower is standstill */
+/* of the shortest brake: with more jerk the distance of one tick would matter */
+#define LEAST_TICKS 6.0
 
 /* Feed overrides at which brakes are followed, and the same shares of the piece's greatest. */
 static const double SHARES[STOP_SHARES] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
@@ -52,7 +53,7 @@ static int add_instant(const struct stop_setting *setting, const double c[8], do
     at->v = stop_greater(stop_piece_value(c, u, 1) / piece->seconds, 0.0);
     at->a = stop_piece_value(c, u, 2) / (piece->seconds * piece->seconds);
     piece->at_s[piece->count] = u * piece->seconds;
-    piece->row[piece->count] = stop_row_at(&setting->road, at->s);
+    piece->row[piece->count] = stop_row_at(&setting->lookup, at->s);
     piece->fastest.v = stop_greater(piece->fastest.v, at->v);
     piece->fastest.a = stop_greater(piece->fastest.a, at->a);
     piece->extreme.v = stop_greater(piece->extreme.v, at->v);
@@ -61,8 +62,8 @@ static int add_instant(const struct stop_setting *setting, const double c[8], do
     return 1;
 }
 
-/* Adds those of a stretch, from the last one to u = high, at which every `each`-th row of the path is passed, no closer
- * to each other than step_s: a bend may be narrower than the even instants are apart. */
+/* Adds the instants of a stretch, from the last one to u = high, at every `each`-th row of the path, no closer than
+ * step_s: a bend may be shorter than the distance of the even instants. */
 static int add_rows(const struct stop_setting *setting, const double c[8], double high,
                     uint32_t each, double step_s, struct stop_piece *piece)
 {
@@ -70,10 +71,10 @@ static int add_rows(const struct stop_setting *setting, const double c[8], doubl
     const double from = piece->at[piece->count - 1u].s;
     const double way = stop_piece_value(c, high, 0) - from;
     uint32_t row = piece->row[piece->count - 1u] + 1u;
-    for (; row < setting->road.row_count && setting->road.rows[row].s_mm < from + way;
+    for (; row < setting->lookup.row_count && setting->lookup.rows[row].s_mm < from + way;
          row += each) {
         const double u =
-            low + (high - low) * stop_greater(setting->road.rows[row].s_mm - from, 0.0) / way;
+            low + (high - low) * stop_greater(setting->lookup.rows[row].s_mm - from, 0.0) / way;
         const double last_s = piece->at_s[piece->count - 1u];
         if (u * piece->seconds >= last_s + step_s &&
             high * piece->seconds >= last_s + 2.0 * step_s && !add_instant(setting, c, u, piece)) {
@@ -101,16 +102,16 @@ static int add_instants(const struct stop_setting *setting, const double c[8], u
     return fits;
 }
 
-/* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by the
- * reciprocals of their limits. They may turn by many degrees within a millimetre. */
+/* The greatest acceleration or jerk along the path that the extra axes can follow at one of the instants of a piece, by
+ * the reciprocals of their limits. A rotary axis may turn by many degrees within a millimetre. */
 static double extra_axes_most(const struct stop_setting *setting, const struct stop_piece *piece,
                               const double inverse[PROGRAM_AXES])
 {
     double most = 0.0;
     for (uint32_t i = 0; i < piece->count; i++) {
-        const double *by_mm = setting->road.bends[piece->row[i]].by_mm[0];
+        const double *by_mm = setting->lookup.bends[piece->row[i]].by_mm[0];
         double used = 0.0; /* share of a limit, for 1 along the path */
-        for (uint32_t k = PROGRAM_SPACE; k < setting->road.axis_count; k++) {
+        for (uint32_t k = PROGRAM_SPACE; k < setting->lookup.axis_count; k++) {
             used = stop_greater(used, fabs(by_mm[k]) * inverse[k]);
         }
         most = stop_greater(most, used > 0.0 ? 1.0 / used : HUGE_VAL);
@@ -122,13 +123,13 @@ static double extra_axes_most(const struct stop_setting *setting, const struct s
 static double followed_most(const struct stop_setting *setting, const struct stop_piece *piece,
                             const double inverse[PROGRAM_AXES], double most)
 {
-    return setting->road.axis_count > PROGRAM_SPACE
+    return setting->lookup.axis_count > PROGRAM_SPACE
                ? fmin(most, extra_axes_most(setting, piece, inverse))
                : most;
 }
 
-/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or over the path that is left
- * after it where that needs more; but no more than the extra axes can follow. */
+/* The greatest codes of a piece. They allow a stop within LEAST_TICKS from its greatest speed, or on the remaining path
+ * if that needs higher codes; but no more than the extra axes can follow. */
 static void piece_most(const struct stop_setting *setting, struct stop_piece *piece)
 {
     const double span_s = LEAST_TICKS * setting->period_s;
@@ -148,7 +149,7 @@ static void piece_most(const struct stop_setting *setting, struct stop_piece *pi
     }
 }
 
-void stop_piece_look(const struct stop_setting *setting, const struct program *p, uint32_t i,
+void stop_piece_fill(const struct stop_setting *setting, const struct program *p, uint32_t i,
                      double left_s, double step_s, struct stop_piece *piece)
 {
     struct program_piece from;
@@ -182,8 +183,8 @@ void stop_piece_look(const struct stop_setting *setting, const struct program *p
     piece->fastest.a = most;
 }
 
-/* Greatest slope at a rate of program time, of a rise (sign 1) or a fall (-1): it came from a rest, and can come to one
- * within the level. */
+/* Greatest override rate at an override, of a rise (sign 1) or a fall (-1): it began at a constant override, and can
+ * end at one within the level. */
 static double slope_at(const struct stop_piece *piece, double rate, int sign)
 {
     double most = 0.0;

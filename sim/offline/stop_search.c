@@ -10,16 +10,16 @@
 #include "offline/stop_verdict.h"
 
 #define GREATEST_CODE 255
-#define WAIT_BETTER   0.8   /* of the mean time: rather none than such a brake; */
-#define WAIT_AS_GOOD  1.001 /* or such a one that could also take much longer */
-#define NEAR          1.05  /* so near to the least time without limits no other start is tried */
+#define WAIT_BETTER   0.8   /* of the mean time: no brake is used if waiting takes less; */
+#define WAIT_AS_GOOD  1.001 /* or about as long, if the brake could also take much longer */
+#define NEAR 1.05 /* times the least time without limits: below it no other start is tried */
 
 struct choice {
     int codes[3];
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-/* Takes the codes when they are better; `strict`: at all rates, and at more instants. */
+/* Takes the codes if they are better; `strict`: at all overrides, and at more instants. */
 static int better(const struct stop_setting *setting, struct stop_piece *piece, const int codes[3],
                   double after_s, int strict, struct choice *best)
 {
@@ -67,7 +67,7 @@ static void climb(const struct stop_setting *setting, struct stop_piece *piece, 
     }
 }
 
-/* Lowers all codes until the limits are kept at all rates; 0: they never are. */
+/* Lowers all codes until the limits are kept at all overrides; 0: they never are. */
 static int lowered(const struct stop_setting *setting, struct stop_piece *piece, const int start[3],
                    double after_s, struct choice *best)
 {
@@ -151,7 +151,8 @@ static void search_piece(const struct stop_setting *setting, struct stop_piece *
     }
 }
 
-/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do not. */
+/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do
+ * not. */
 static int lower_by(const struct stop_setting *setting, struct stop_piece *piece, const int from[3],
                     const int quarters[3], double after_s, struct choice *best)
 {
@@ -162,8 +163,8 @@ static int lower_by(const struct stop_setting *setting, struct stop_piece *piece
     return better(setting, piece, codes, after_s, 1, best);
 }
 
-/* A search of few trials: the codes of the next piece, else lower ones of all, or of the onset first, down to the lowest; then
- * raised together as far as that goes. */
+/* A search of few trials: the codes of the next piece, else lower ones, of all three or of the onset first, down to the
+ * lowest; then all raised together as far as the limits allow. */
 static void search_quickly(const struct stop_setting *setting, struct stop_piece *piece,
                            const int warm[3], double after_s, struct choice *best)
 {
@@ -193,7 +194,7 @@ static void search_quickly(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* A piece without a brake: the plan goes on into the next. */
+/* A piece without a brake: the nominal motion continues into the next. */
 static void wait_for_next(const struct stop_piece *piece, double after_s, struct choice *out)
 {
     double seconds = piece->seconds;
@@ -224,7 +225,7 @@ static void known_choice(const struct stop_setting *setting, const struct stop_p
     out->first_s = times.first_s;
 }
 
-/* Takes the given codes. Returns 1 where they are `kept` and keep the limits out of `before` too. */
+/* Takes the given codes. Returns 1 if they are `kept` and keep the limits also in place of the brake `before`. */
 static int kept_choice(const struct stop_setting *setting, struct stop_piece *piece,
                        const struct stop_found *found, double after_s, struct choice *best)
 {
@@ -260,15 +261,15 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* Where brakes from a piece pass a limit, those from the piece before do so as a rule: from its last instant, at the same
- * override. They are looked at first; what is found does not depend on that. */
-static void suspect_as_behind(struct stop_piece *piece, const struct stop_overridden behind[2])
+/* If brakes from a piece exceed a limit, those from the previous piece usually do so as well, from its last instant at
+ * the same override. These are evaluated first; the result does not depend on the order. */
+static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden suspects[2])
 {
     piece->suspect = piece->count - 1u;
     piece->close->suspect = piece->close->count - 1u;
-    piece->suspect_override = behind[0];
+    piece->suspect_override = suspects[0];
     piece->suspect_override.instant = piece->count - 1u;
-    piece->suspect_before = behind[1];
+    piece->suspect_before = suspects[1];
     piece->suspect_before.instant = piece->count - 1u;
 }
 
@@ -282,22 +283,22 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
     double left_s = 0.0;
     stop_setting_open(&setting, p, limits, path);
     int warm[3] = {setting.most[0], setting.most[1], setting.most[2]};
-    struct stop_overridden behind[2] = {{0, 0, -1}, {0, 0, 0}};
+    struct stop_overridden suspects[2] = {{0, 0, -1}, {0, 0, 0}};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
         struct choice best;
-        stop_piece_look(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
+        stop_piece_fill(&setting, p, i - 1u, left_s, STOP_INSTANT_S, &piece);
         if (found[i - 1u].known != 0u) {
             known_choice(&setting, &piece, &found[i - 1u], after_s, &best);
         } else {
-            stop_piece_look(&setting, p, i - 1u, left_s, STOP_CLOSE_S, &close);
+            stop_piece_fill(&setting, p, i - 1u, left_s, STOP_CLOSE_S, &close);
             for (int k = 0; k < 3; k++) {
                 piece.before[k] = found[i - 1u].before[k];
             }
             piece.close = &close;
-            suspect_as_behind(&piece, behind);
+            suspect_as_next(&piece, suspects);
             search_or_keep(&setting, &piece, &found[i - 1u], warm, after_s, &best);
-            behind[0] = piece.suspect_override;
-            behind[1] = piece.suspect_before;
+            suspects[0] = piece.suspect_override;
+            suspects[1] = piece.suspect_before;
         }
         for (int k = 0; k < 3; k++) {
             found[i - 1u].codes[k] = (uint8_t)best.codes[k];
@@ -328,19 +329,19 @@ void stop_used(const struct program *p, const struct stop_limits *limits,
         double seconds = stop_piece_powers(&from, c);
         int parts = (int)fmin(stop_greater(ceil(seconds / STOP_INSTANT_S), 4.0), 256.0);
         for (int k = 0; k <= parts; k++) {
-            double u =
-                STOP_BESIDE + (1.0 - 2.0 * STOP_BESIDE) * k / parts; /* jerks jump at joints */
+            double u = STOP_END_MARGIN +
+                       (1.0 - 2.0 * STOP_END_MARGIN) * k / parts; /* jerks jump at joints */
             struct stop_state at = {stop_piece_value(c, u, 0), stop_piece_value(c, u, 1) / seconds,
                                     stop_piece_value(c, u, 2) / (seconds * seconds)};
             double j = stop_piece_value(c, u, 3) / (seconds * seconds * seconds);
-            const struct stop_row *row = &setting.road.rows[stop_row_at(&setting.road, at.s)];
+            const struct stop_row *row = &setting.lookup.rows[stop_row_at(&setting.lookup, at.s)];
             struct stop_axes axes;
-            stop_axes_of(&setting.road, row, stop_share_of(row, at.s), &at, j, &axes);
+            stop_axes_of(&setting.lookup, row, stop_share_of(row, at.s), &at, j, &axes);
             most_of(&used->feed, at.v);
             most_of(&used->acceleration, at.a);
             most_of(&used->jerk, j);
             most_of(&used->centripetal, row->curvature * at.v * at.v);
-            for (uint32_t axis = 0; axis < setting.road.axis_count; axis++) {
+            for (uint32_t axis = 0; axis < setting.lookup.axis_count; axis++) {
                 most_of(&used->axis_velocity[axis], axes.velocity[axis]);
                 most_of(&used->axis_acceleration[axis], axes.acceleration[axis]);
                 most_of(&used->axis_jerk[axis], axes.jerk[axis]);

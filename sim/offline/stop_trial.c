@@ -23,7 +23,7 @@ struct course {
     struct interpolator interp;
     double points[HISTORY + 1u][PROGRAM_AXES + 1u]; /* the newest first */
     uint32_t count;
-    uint32_t brake_ticks; /* of the brake so far; 0: none */
+    uint32_t brake_ticks; /* of the brake up to now; 0: none */
     double begun_with;    /* acceleration along the path when it began */
     int machine;          /* 1: a fault stop: the machine's limits count */
 };
@@ -46,7 +46,7 @@ static void grow(double *most, double value)
     *most = value > *most ? value : *most;
 }
 
-/* --- A tick, beside the limits --- */
+/* --- A tick, compared with the limits --- */
 
 static void differences(const struct course *course, uint32_t axis, double period_s, double out[3])
 {
@@ -59,8 +59,8 @@ static void differences(const struct course *course, uint32_t axis, double perio
     out[2] = (p[0] - 3.0 * (p[1] - p[2]) - p[3]) / (period_s * period_s * period_s);
 }
 
-static void look_at_axes(const struct course *course, double period_s,
-                         const struct stop_limits *limits, struct stop_use *use)
+static void evaluate_axes(const struct course *course, double period_s,
+                          const struct stop_limits *limits, struct stop_use *use)
 {
     for (uint32_t axis = 0; axis < course->interp.axis_count; axis++) {
         double d[3];
@@ -71,10 +71,10 @@ static void look_at_axes(const struct course *course, double period_s,
     }
 }
 
-/* Differences reach back: a brake's own jerk is that from its fourth tick on. The acceleration that a changing rate has
- * left it with may be above the program's limit; the difference before it lags two ticks behind. */
-static void look_along(struct course *course, double period_s, const struct stop_trial *trial,
-                       const struct stop_limits *limits, struct stop_use *use)
+/* Differences include earlier ticks: those of a brake alone are the ones from its fourth tick on. The acceleration at
+ * its start, with a changing override, may be above the program's limit; its difference is late by two ticks. */
+static void evaluate_along(struct course *course, double period_s, const struct stop_trial *trial,
+                           const struct stop_limits *limits, struct stop_use *use)
 {
     double d[3];
     differences(course, ARC, period_s, d);
@@ -119,10 +119,10 @@ static int step(struct course *course, struct stop_trial *trial)
                               ? course->brake_ticks + 1u
                               : 0u;
     if (course->count > HISTORY) {
-        look_at_axes(course, period_s, course->machine ? &trial->fault : &trial->hold,
-                     course->machine ? &trial->of_fault : &trial->of_hold);
-        look_along(course, period_s, trial, course->machine ? &trial->fault : &trial->hold,
-                   course->machine ? &trial->of_fault : &trial->of_hold);
+        evaluate_axes(course, period_s, course->machine ? &trial->fault : &trial->hold,
+                      course->machine ? &trial->of_fault : &trial->of_hold);
+        evaluate_along(course, period_s, trial, course->machine ? &trial->fault : &trial->hold,
+                       course->machine ? &trial->of_fault : &trial->of_hold);
     }
     return 0;
 }
@@ -153,8 +153,9 @@ static int prelude(struct course *course, struct stop_trial *trial, uint64_t *ra
     return 0;
 }
 
-/* Time to rest in ticks, those of waiting at a rate below 1 counted by the rate; below 0: an error, or no rest. */
-static double to_rest(struct course *course, struct stop_trial *trial)
+/* Time to standstill in ticks; ticks of waiting at an override below 1 are weighted by the override. Below 0: an error,
+ * or no standstill. */
+static double to_standstill(struct course *course, struct stop_trial *trial)
 {
     double ticks = 0.0;
     for (uint32_t i = 0; i < MOST_TICKS; i++) {
@@ -198,7 +199,7 @@ static void one(const struct course *from, struct stop_trial *trial, uint64_t se
         feed_override_fault_stop(&course.feed);
         course.machine = 1;
     }
-    const double ticks = to_rest(&course, trial);
+    const double ticks = to_standstill(&course, trial);
     if (ticks < 0.0) {
         trial->failures++;
     } else if (runs) {
@@ -233,7 +234,7 @@ static void clear(struct stop_trial *trial)
     trial->most = trial->longest = trial->failed = nothing;
 }
 
-/* A trial, and what it is remembered for. */
+/* Executes a trial and stores it if it has a greatest value. */
 static void remembered(const struct course *from, struct stop_trial *trial, uint64_t seed,
                        uint32_t tick)
 {

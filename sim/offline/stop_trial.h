@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Random sequences of hold, resume, override, stop and fault stop from all over a program, and what becomes of them
- * beside the limits and the bounds of its stop table. Setpoints only, no drives.
+ * stop_trial: executes random sequences of hold, resume, override, stop and fault stop in a program, and compares them
+ * with the limits and with the stop time bounds of its stop table. Setpoints only, no drives. Called by Python through
+ * host_tools/hodograph/native.
  *
- * A trial begins at a tick of the program at override 100 %, gives up to four commands with up to 60 ticks between them,
- * then a hold, stop or fault stop, and goes on to rest. What is looked at are the setpoints' own differences: first to
- * third, over the period to their power. No heap. Main loop of a host.
+ * A trial begins at a tick of the program at override 100 %, gives up to four commands with up to 60 ticks between
+ * them, then a hold, stop or fault stop, and runs to standstill. Velocity, acceleration and jerk are the first to third
+ * differences of the setpoints. No heap. Any thread; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_TRIAL_H
 #define HODOGRAPH_OFFLINE_STOP_TRIAL_H
@@ -15,12 +16,13 @@
 #include "core/program.h"
 #include "offline/stop_search.h"
 
-/* Greatest shares of limits: of the axes' velocity, acceleration and jerk, and of acceleration and jerk along the path. */
+/* Greatest shares of limits: of the axes' velocity, acceleration and jerk, and of acceleration and jerk along the
+ * path. */
 struct stop_use {
     double velocity, acceleration, jerk, path_acceleration, path_jerk;
 };
 
-/* A trial again: its seed, and its first tick. */
+/* Identifies a trial: its seed, and its first tick. */
 struct stop_case {
     uint64_t seed;
     uint32_t tick;
@@ -29,12 +31,12 @@ struct stop_case {
 struct stop_trial {
     uint64_t seed;
     uint32_t trials;
-    struct stop_limits
-        hold; /* program's limits: for everything but fault stops, those along the path for brakes only */
+    /* program's limits: for everything but fault stops, those along the path for brakes only */
+    struct stop_limits hold;
     struct stop_limits fault; /* machine's */
-    struct stop_use of_hold;  /* found: in brakes of hold and stop and in all other motion, */
+    struct stop_use of_hold;  /* result: in brakes of hold and stop and in all other motion, */
     struct stop_use of_fault; /* and in fault stops */
-    double of_bound[2];       /* greatest time to rest over the bound, by enum program_stop_kind */
+    double of_bound[2];       /* greatest stop time over its bound, by enum program_stop_kind */
     double longest_s[2];
     uint32_t measured
         [2]; /* stops whose time was compared: those that were requested while the program ran */
@@ -45,11 +47,11 @@ struct stop_trial {
     struct stop_case failed;  /* and of the last that failed */
 };
 
-/* Spreads the trials over the ticks of a program with coefficient records; the inputs are seed ... fault, the rest is set. Returns 0 or an error of the
- * interpolator. */
+/* Spreads the trials over the ticks of a program with coefficient records. The inputs are seed ... fault; the other
+ * fields are results. Returns 0 or an error of the interpolator. */
 int stop_trial_run(const struct program *p, struct stop_trial *trial);
 
-/* A single one: `seed` is its seed, `tick` its first tick. */
+/* Executes a single trial: `seed` is its seed, `tick` its first tick. */
 int stop_trial_again(const struct program *p, struct stop_trial *trial, uint32_t tick);
 
 #endif

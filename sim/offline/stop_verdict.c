@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed
+ * piece. */
 #include "offline/stop_verdict.h"
 
 #include <math.h>
 
-#define STEP_S         0.002  /* between two looks at a brake, */
-#define FINE_S         0.0005 /* and in the last look */
-#define BRAKE_EACH     5      /* ticks of a brake out of which another may begin, */
+#define STEP_S         0.002  /* between two samples of a brake, */
+#define FINE_S         0.0005 /* and in the strict test */
+#define BRAKE_EACH     5      /* ticks of a brake that another may replace, */
 #define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
 #define LONGEST_SHARE  0.1
-#define FAR_TICKS 20.0 /* and twice the brake: so far from its end a program has room for a brake */
+#define FAR_TICKS                                                                                  \
+    20.0 /* and twice the brake: so far from its end a brake fits before the end of the program */
 #define NO_BRAKE_S 10.0
 
 /* What a brake has to keep; `surely`: it does. */
@@ -30,13 +33,13 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
         double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
         double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
         double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
-        /* A brake longer than the rest of the program is not begun. The next instant may have a better one; not counted,
-         * or the worst numbers would be the best. */
+        /* A brake that is longer than the remaining program is not begun. The next instant may have a better one. It is
+         * not counted, otherwise the worst numbers would be the best. */
         int begins = stop_brake_begin(&brake, at, numbers, setting->period_s);
         double total_s = begins ? stop_brake_time(at, numbers, setting->period_s) : STOP_NEVER_S;
         if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
             left > 2.0 * total_s + FAR_TICKS * setting->period_s &&
-            !stop_has_room(setting, at, numbers)) {
+            !stop_fits_before_end(setting, at, numbers)) {
             return 0;
         }
         times->brakes[i - 1u] = total_s < left;
@@ -57,18 +60,18 @@ struct begun {
     double speed, rise, fall;
 };
 
-/* Bounds of all brakes that begin in the piece in states within these; returns the arc length that they do not pass. */
+/* Bounds of all brakes that begin in the piece in states within these; returns the arc length of their end at most. */
 static double begun_extent(const struct stop_setting *setting, const struct stop_piece *piece,
                            const struct path_brake_numbers *numbers, const struct begun *begun,
                            struct stop_extent *extent)
 {
     const struct stop_state most = {piece->at[piece->count - 1u].s, begun->speed, begun->rise};
     const double to_mm = stop_brake_extent(setting, numbers, &most, begun->fall, extent);
-    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent->path);
+    stop_stretch_from(&setting->lookup, piece->row[0], to_mm, &extent->path);
     return to_mm;
 }
 
-/* The states at any rate. */
+/* The states at any override. */
 static struct begun begun_at_any_rate(const struct stop_setting *setting,
                                       const struct stop_piece *piece)
 {
@@ -82,14 +85,14 @@ static struct begun begun_at_any_rate(const struct stop_setting *setting,
     return out;
 }
 
-/* Whether bounds alone show that all brakes out of such states keep the limits. */
+/* Whether bounds alone show that all brakes from such states keep the limits. */
 static int begun_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                       const struct stop_piece *piece, const struct path_brake_numbers *numbers,
                       const struct begun *begun)
 {
     struct stop_extent extent;
     (void)begun_extent(setting, piece, numbers, begun, &extent);
-    return stop_extent_keeps(&setting->road, inverse, &extent);
+    return stop_extent_keeps(&setting->lookup, inverse, &extent);
 }
 
 int stop_all_keep(const struct stop_setting *setting, struct stop_piece *piece,
@@ -133,7 +136,7 @@ static double quarter(const struct stop_setting *setting, const struct path_brak
            (setting->period_s * setting->period_s);
 }
 
-/* Whether a brake out of this state fits and keeps the limits, or need not fit; 1 for a state that there is not. */
+/* Whether a brake from this state fits and keeps the limits, or need not fit; 1 for a state that cannot occur. */
 static int overridden_keeps(const struct stop_setting *setting, const struct stop_piece *piece,
                             const struct keeping *keeping, const struct stop_overridden *which,
                             const struct path_brake_numbers *numbers)
@@ -144,8 +147,8 @@ static int overridden_keeps(const struct stop_setting *setting, const struct sto
     if (!stop_overridden_state(piece, which, little, &from)) {
         return 1;
     }
-    return (!keeping->surely && stop_strain(&setting->road, keeping->inverse,
-                                            &setting->road.rows[row], &from, 0.0) > 1.0) ||
+    return (!keeping->surely && stop_usage(&setting->lookup, keeping->inverse,
+                                           &setting->lookup.rows[row], &from, 0.0) > 1.0) ||
            state_keeps(setting, keeping, &from, row, numbers);
 }
 
@@ -187,7 +190,7 @@ static int overrides_keep(const struct stop_setting *setting, struct stop_piece 
     return 1;
 }
 
-/* The same at the rate 1 from instants close to each other. */
+/* The same at override 1 from instants close to each other. */
 static int close_keep(const struct stop_setting *setting, struct stop_piece *close,
                       const struct path_brake_numbers *numbers, int surely)
 {
@@ -205,7 +208,7 @@ static int close_keep(const struct stop_setting *setting, struct stop_piece *clo
     return 1;
 }
 
-/* Whether a brake out of one that has begun at this state with the numbers `before` keeps the limits. */
+/* Whether a brake keeps the limits that replaces one with the numbers `before`, begun in this state. */
 static int out_of_brake_keeps(const struct stop_setting *setting, const struct stop_state *from,
                               uint32_t row, const struct path_brake_numbers *before,
                               const struct path_brake_numbers *numbers)
@@ -216,7 +219,7 @@ static int out_of_brake_keeps(const struct stop_setting *setting, const struct s
         return 1;
     }
     path_brake_first(&first);
-    for (uint32_t k = 1; !path_brake_rests(&first); k++) {
+    for (uint32_t k = 1; !path_brake_ended(&first); k++) {
         if (k % BRAKE_EACH == 0u && path_brake_begin(&second, &first.at, numbers) &&
             !stop_brake_keeps(setting, &setting->at_any_rate, &second, from->s, row, FINE_S)) {
             return 0;
@@ -252,8 +255,8 @@ static int out_of_brakes_surely_keep(const struct stop_setting *setting,
     const struct stop_state most = {from_mm, extent.speed, begun.rise};
     const double fall = extent.acceleration;
     const double to_mm = stop_brake_extent(setting, numbers, &most, fall, &extent);
-    stop_stretch_from(&setting->road, piece->row[0], to_mm, &extent.path);
-    return stop_extent_keeps(&setting->road, &setting->at_any_rate, &extent);
+    stop_stretch_from(&setting->lookup, piece->row[0], to_mm, &extent.path);
+    return stop_extent_keeps(&setting->lookup, &setting->at_any_rate, &extent);
 }
 
 /* From some instants at a feed override, also while it changes. */
@@ -277,7 +280,7 @@ static int out_of_rate_keeps(const struct stop_setting *setting, struct stop_pie
     return 1;
 }
 
-/* At all overrides; the state that broke a limit last is looked at first. */
+/* At all overrides; the state that broke a limit last is evaluated first. */
 int stop_out_of_brakes_keeps(const struct stop_setting *setting, struct stop_piece *piece,
                              const int codes[3])
 {
@@ -326,8 +329,8 @@ int stop_strictly(const struct stop_setting *setting, struct stop_piece *piece, 
     const struct begun begun = begun_at_any_rate(setting, piece);
     struct stop_extent extent;
     (void)begun_extent(setting, piece, &numbers, &begun, &extent);
-    const struct keeping keeping = {inverse, stop_extent_keeps(&setting->road, inverse, &extent)};
-    const int surely = stop_extent_keeps(&setting->road, &setting->inverse, &extent);
+    const struct keeping keeping = {inverse, stop_extent_keeps(&setting->lookup, inverse, &extent)};
+    const int surely = stop_extent_keeps(&setting->lookup, &setting->inverse, &extent);
     return close_keep(setting, piece->close, &numbers, surely) &&
            overrides_keep(setting, piece, &keeping, &numbers) &&
            stop_out_of_brakes_keeps(setting, piece, codes);

@@ -93,7 +93,7 @@ static void take_over(struct offline_stream *s)
     s->moving += rests ? 0u : 1u;
 }
 
-/* At the end of a chunk, and the next one is not there. */
+/* At the end of a chunk without a next one. */
 static int misses_next(const struct offline_stream *s)
 {
     const struct offline_part *next = s->active->next;

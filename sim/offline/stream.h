@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A job in chunks without a bus: how the controller handles chunks, whenever they come (docs/reference/protocol.md 1.7).
- * Used by the host tools' native module and by tests. Chunks are opened, checked and taken over by the code of the
- * controller, one try before each tick; commands are those of the feed override. Dwells between chunks take their ticks,
- * program stops no time. Setpoints are those of the controller, bit for bit. Records exist only near the motion, as in the
- * controller (core/coefficient_cache.h); they are made before each tick.
+ * stream: simulates a job in chunks without a bus, as the controller handles chunks at any time of their arrival
+ * (docs/reference/protocol.md 1.7). Used by the host tools' native module and by tests. Chunks are opened, checked and
+ * taken over by the code of the controller, one attempt before each tick; commands are those of the feed override.
+ * Dwells between chunks take their ticks, program stops no time. Setpoints are those of the controller, bit for bit.
+ * Records exist only near the motion, as in the controller (core/coefficient_cache.h); they are made before each tick.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
- * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes of
- * each chunk. They have to stay as long as the stream. Not reentrant: one thread for each stream.
+ * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes
+ * of each chunk, which have to stay as long as the stream. One thread for each stream.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H
@@ -25,7 +25,7 @@
 /* A chunk that was given. */
 struct offline_part {
     struct chunk chunk;
-    struct offline_part *next; /* that was accepted behind it */
+    struct offline_part *next; /* the chunk accepted after it */
 };
 
 struct offline_stream {
@@ -41,28 +41,28 @@ struct offline_stream {
     uint32_t moving;                /* takeovers in motion, */
     uint32_t resting;               /* and at rest */
     uint32_t underruns;             /* rests at the end of a tail */
-    uint32_t rested;                /* 1: at the last tick it was at one */
-    uint32_t rest_ticks;            /* left before a chunk that begins at rest, */
+    uint32_t rested;                /* 1: at such a rest at the last tick */
+    uint32_t rest_ticks;            /* before a chunk that begins at rest, */
     uint32_t waited_ticks;          /* and at the end of its predecessor, without it */
     struct interpolator_point last; /* setpoint, with the arc length of the job */
 };
 
-/* The memory of the cache, aligned to COEFFICIENTS_ALIGNMENT: 8 KiB are as on a small controller. */
+/* `memory`: that of the cache, aligned to COEFFICIENTS_ALIGNMENT; a small controller has 8 KiB. */
 void offline_stream_begin(struct offline_stream *s, const struct kernel *kernel,
                           const struct program_limits *limits, uint8_t *memory, uint32_t size);
 
-/* Opens and checks a chunk behind the newest accepted one. 0, or enum program_error with *fault the same: the stream has
- * not changed, and the chunk may be given again. */
+/* Opens and checks a chunk as the successor of the newest accepted one. 0, or enum program_error, also in *fault: the
+ * stream has not changed, and the chunk may be given again. */
 int offline_stream_check(const struct offline_stream *s, struct offline_part *part,
                          const uint8_t *bytes, uint32_t size, struct program_fault *fault);
 
-/* Accepts a chunk that has just passed offline_stream_check. The first one begins the motion. 0, or COEFFICIENTS_ERR_SIZE: the
- * cache is too small. */
+/* Accepts a chunk that has just passed offline_stream_check. The first one begins the motion. 0, or
+ * COEFFICIENTS_ERR_SIZE: the cache is too small. */
 int offline_stream_add(struct offline_stream *s, struct offline_part *part);
 
-/* Up to `count` ticks; less when the job has ended or was stopped, and with `until_rest` at the end of a tail behind
- * which no chunk is known. Points have arc lengths of the job; `values`, where it is not NULL, are the outputs at them.
- * Returns how many ticks there were, or a negative INTERPOLATOR_ERR_.... */
+/* Executes up to `count` ticks. It ends earlier if the job has ended or was stopped, and with `until_rest` at the end
+ * of a tail without a next chunk. Points have arc lengths of the job; `values`, if not NULL, are the outputs at them.
+ * Returns the number of ticks, or a negative INTERPOLATOR_ERR_.... */
 int64_t offline_stream_run(struct offline_stream *s, uint32_t count, uint32_t until_rest,
                            struct interpolator_point *points, struct path_outputs_values *values);
 

@@ -8,7 +8,7 @@ static void drive_set_up_loop(struct drive *d, const struct drive_config *c)
     const double volts_s_rad = c->plant.torque_to_volts * c->pdff.k_pv_nm_s_rad;
     d->pdff.k_pp_rad_s_mm = c->pdff.k_pp_rad_s_mm;
     d->pdff.k_pf_rad_mm = c->pdff.k_pf_rad_mm;
-    /* What the present sample adds to the integral acts in it or not before the next. */
+    /* The contribution of the present sample to the integral acts in this sample, or from the next one on. */
     const double present =
         c->integral == DRIVE_INTEGRAL_BACKWARD ? c->pdff.k_iv_per_s * step_s : 0.0;
     d->pdff.step_s = step_s;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* One simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop,
- * motor, screw, encoder. No CAN and no clock: the caller advances it by whole bus periods. Model:
- * docs/theory/numerics.md section 13.
+/* drive: one simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop, motor, screw,
+ * encoder. No CAN and no clock: the caller advances it by whole bus periods. Used by sim/node/axis_motion and
+ * sim/offline. Model: docs/theory/numerics.md section 13.
  *
  * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report
  * drive_position_counts and drive_volts_mv (they are those of the instant of SYNC j), latch the
@@ -9,14 +9,13 @@
  * at SYNC j+1, in a straight line from the setpoint before, or along a cubic whose speed has no jumps. A drive without
  * interpolation commands it at once, at SYNC j.
  *
- * Parking (docs/reference/protocol.md section 3): an axis that has had one target for DRIVE_PARK_PERIODS
- * periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is put exactly at rest at
- * the target, the integrator empty. So what follows depends on the target alone, however the axis
- * came there.
+ * Standstill lock, called parking here (docs/reference/protocol.md section 3): an axis that has had one target for
+ * DRIVE_PARK_PERIODS periods and reads within DRIVE_PARK_INCREMENTS encoder increments of it is set exactly to
+ * standstill at the target, with an empty integrator. So its later motion depends on the target alone, not on its
+ * history.
  *
  * Arithmetic is double, in a fixed order, with + - * / only (compile with -ffp-contract=off): the
- * same bits on every IEEE 754 target. No heap, no I/O; each object is independent; not for use in
- * an interrupt.
+ * same bits on every IEEE 754 target. No heap, no I/O. One thread for each struct drive.
  */
 #ifndef HODOGRAPH_PLANT_DRIVE_H
 #define HODOGRAPH_PLANT_DRIVE_H
@@ -57,10 +56,10 @@ struct drive {
     bool cubic; /* interpolation */
     bool steps; /* no interpolation */
     bool delayed;
-    double
-        speed_per_distance; /* rad/s for a mm of difference between two samples; 0: exact speed */
-    double
-        distance_counts; /* of the last period, and what the command does in a period at the speed it */
+    /* rad/s for a mm of difference between two samples; 0: exact speed */
+    double speed_per_distance;
+    /* of the last period, and what the command does in a period at the speed it */
+    double distance_counts;
     double end_distance_counts; /* had at the end of that; both for cubic interpolation */
     int32_t target_counts;
     uint32_t same_target_periods; /* up to DRIVE_PARK_PERIODS */
@@ -71,11 +70,11 @@ struct drive {
  * or a negative enum drive_error; on error the object is not to be used. */
 int drive_init(struct drive *drive, const struct drive_config *config);
 
-/* Puts the axis at rest, parked at target_counts. */
+/* Places the axis at standstill, parked at target_counts. */
 void drive_place(struct drive *drive, int32_t target_counts);
 
-/* Drive not enabled, brake on: the axis is at rest where it is; the next period starts from the
- * encoder position. */
+/* Drive not enabled, brake closed: the axis is at standstill at its place; the next period starts from the encoder
+ * position. */
 void drive_hold(struct drive *drive);
 
 /* One bus period towards target_counts. */
@@ -96,8 +95,8 @@ bool drive_parked(const struct drive *drive);
 /* ---- The samples of a period, for callers that compute them themselves (influence.h) ---- */
 
 /* Setpoints of one period, at the beginning of sample i. Linear: start + i * step, at a constant speed; without
- * interpolation the step is 0.
- * Cubic: with u = i / samples, start + u (distance[0] + u (distance[1] + u distance[2])). */
+ * interpolation the step is 0. Cubic: with u = i / samples, start + u (distance[0] + u (distance[1] + u distance[2])).
+ * */
 struct drive_command {
     double start_mm;
     double step_mm;
@@ -124,7 +123,7 @@ static inline void drive_command_at(const struct drive_command *c, uint32_t i,
         c->per_s;
 }
 
-/* The speed that the loop sees at a sample, rad/s; notes the reading. */
+/* The speed that the loop uses at a sample, rad/s; stores the reading for the next sample. */
 static inline double drive_speed(const struct drive *d, struct drive_state *state, double read_mm)
 {
     const double distance_mm = read_mm - state->read_mm;
@@ -133,7 +132,7 @@ static inline double drive_speed(const struct drive *d, struct drive_state *stat
                                         : distance_mm * d->speed_per_distance;
 }
 
-/* The volts of the sample that begins, when these have been computed in it. */
+/* The volts of the sample that begins; `computed`: those that the loop has computed in it. */
 static inline double drive_volts(const struct drive *d, struct drive_state *state, double computed)
 {
     const double before = state->next_volts;
@@ -144,8 +143,8 @@ static inline double drive_volts(const struct drive *d, struct drive_state *stat
 /* The period's setpoints towards target_counts, which becomes the drive's target. */
 struct drive_command drive_command(struct drive *drive, int32_t target_counts);
 
-/* Counts the periods of one target and parks the axis when its time has come, if it may. Returns
- * whether it stays parked. */
+/* Counts the periods of one target and parks the axis after DRIVE_PARK_PERIODS, if may_park. Returns whether it is
+ * parked. */
 bool drive_stays_parked(struct drive *drive, int32_t target_counts, bool may_park);
 
 #endif

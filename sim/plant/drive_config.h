@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What describes a simulated axis: plant, gains, encoder, rates; and the check of all that. Pure functions. */
+/* drive_config: the configuration of a simulated axis: plant, gains, encoder, rates; and its check. Used by plant/drive
+ * and all that configure it. Pure functions, any thread. */
 #ifndef HODOGRAPH_PLANT_DRIVE_CONFIG_H
 #define HODOGRAPH_PLANT_DRIVE_CONFIG_H
 
@@ -10,7 +11,7 @@ struct drive_plant {
     double time_constant_s; /* at least one servo step */
     double screw_mm_rad;    /* more than 0 */
     double torque_to_volts; /* V/(N m), more than 0 */
-    double volts_limit;     /* more than 0, at most 32.767 (volts travel as i16 mV) */
+    double volts_limit;     /* more than 0, at most 32.767 (the bus has volts as i16 in mV) */
 };
 
 struct drive_pdff {
@@ -25,7 +26,7 @@ struct drive_pdff {
  * cubic, or not at all: the setpoint is the command from the beginning of its period. */
 enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1, DRIVE_NO_INTERPOLATION = 2 };
 
-/* Where the loop has its speed from: the motor itself, or the difference of the last two encoder samples. */
+/* Source of the speed for the loop: the motor itself, or the difference of the last two encoder samples. */
 enum drive_speed { DRIVE_SPEED_EXACT = 0, DRIVE_SPEED_DIFFERENCES = 1 };
 
 /* Which errors of the speed the loop's integral counts: those of all samples with the present one (backward Euler), or

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Encoder on the motor shaft: rounds the position to the nearest of its increments (ties to even).
+/* encoder: the encoder on the motor shaft: rounds the position to the nearest of its increments (ties to even). Used by
+ * plant/drive and plant/influence. Pure functions, any thread.
  *
- * An increment is 2 pi screw / counts_per_rev mm of table position. The electrical zero is half
- * an increment before the table's zero, so that rounding is to nearest and a table standing at 0
- * reads 0.
+ * An increment is 2 pi screw / counts_per_rev mm of table position. The electrical zero is half an increment before the
+ * table's zero, so that rounding is to nearest and a table at 0 reads 0.
  */
 #ifndef HODOGRAPH_PLANT_ENCODER_H
 #define HODOGRAPH_PLANT_ENCODER_H
@@ -20,8 +20,7 @@ struct encoder {
 void encoder_init(struct encoder *encoder, double screw_mm_rad, uint32_t counts_per_rev);
 
 /* Nearest integer, ties to even, as a double; |value| below 2^51. Adding and taking away 1.5 * 2^52
- * leaves no place for a fraction: no libm, no branch, the same bits everywhere. Needs the default
- * rounding mode. */
+ * leaves no bits for a fraction: no libm, no branch, the same bits everywhere. Needs the default rounding mode. */
 static inline double encoder_round(double value)
 {
     const double shift = 6755399441055744.0;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements plant/influence.h (see there): what acts on an axis beside its setpoints: load, friction, faults. */
+/* Implements plant/influence.h (see there): what acts on an axis in addition to its setpoints: load, friction, faults.
+ * */
 #include "plant/influence.h"
 
 void influence_none(struct influence *influence, const struct drive_config *config)
@@ -44,8 +45,8 @@ int32_t influence_read_counts(const struct influence *in, const struct drive *dr
     return encoder_to_i32(influence_read_mm(in, drive) * drive->counts_per_mm);
 }
 
-/* Motor, load and dry friction over one sample: friction works against the motion, or holds the
- * axis where it stands. It can stop a motion but not reverse it. */
+/* Motor, load and dry friction over one sample: friction works against the motion, or holds the axis where it stands.
+ * It can stop a motion but not reverse it. */
 static void influence_move(const struct motor *motor, struct motor_state *state, double volts,
                            double friction_volts)
 {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Motor and ball screw: a first-order lag from volts to shaft speed, integrated exactly.
+/* motor: motor and ball screw: a first-order lag from volts to shaft speed, integrated exactly. Used by plant/drive and
+ * plant/influence.
  *
  *     speed' = (gain * volts - speed) / time_constant        [rad/s, paper.md section 5, G(s)]
  *     position' = screw * speed                              [mm]

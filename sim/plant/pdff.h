@@ -6,26 +6,26 @@
  *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
- * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward Euler).
- * It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
+ * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward
+ * Euler). It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H
 
-/* The law, sorted by what is known early in the sample, so that little has to wait for the encoder:
+/* The control law, arranged so that few operations have to wait for the encoder:
  *     volts = volts_per_ref * speed_ref + (volts_per_integral * integral before - volts_per_speed * speed) */
 struct pdff {
     double k_pp_rad_s_mm;
     double k_pf_rad_mm;
     double step_s;
-    double
-        volts_per_ref; /* V per rad/s: torque_to_volts k_pv (k_vf + k_iv step); forward Euler: without the step */
+    /* V per rad/s: torque_to_volts k_pv (k_vf + k_iv step); forward Euler: without the step */
+    double volts_per_ref;
     double volts_per_integral; /* V per rad:   torque_to_volts k_pv k_iv */
     double volts_per_speed;    /* V per rad/s: torque_to_volts k_pv (1 + k_iv step); likewise */
     double volts_limit;
 };
 
-/* What one sample sees. */
+/* The inputs of one sample. */
 struct pdff_input {
     double command_mm;
     double command_mm_s; /* d(x_com)/dt */
@@ -52,8 +52,8 @@ static inline double pdff_step(const struct pdff *pdff, double *integral_rad,
     return volts;
 }
 
-/* The same with a feedforward from outside: rad/s added to the speed reference, volts to the output.
- * With both 0 the same bits. */
+/* The same with an external feedforward: rad/s added to the speed reference, volts to the output. With both 0 the same
+ * bits. */
 static inline double pdff_step_offset(const struct pdff *pdff, double *integral_rad,
                                       const struct pdff_input *in, double speed_offset_rad_s,
                                       double volts_offset)

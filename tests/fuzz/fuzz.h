@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Support of the fuzz harnesses. A harness is tests/fuzz/fuzz_NAME.c: it defines LLVMFuzzerTestOneInput, which reads the
- * bytes of an input as a script (what happens next) and aborts where a rule is broken. It is linked twice: with libFuzzer
- * and coverage by clang (`make fuzz`), and with replay.c by the compiler of the tests, which runs the corpus in
- * tests/data/fuzz/NAME. An input must give the same run each time.
+ * Support of the fuzz harnesses. A harness is tests/fuzz/fuzz_NAME.c: it defines LLVMFuzzerTestOneInput, which reads
+ * the bytes of an input as a script (what happens next) and aborts where a rule is broken. It is linked twice: with
+ * libFuzzer and coverage by clang (`make fuzz`), and with replay.c by the compiler of the tests, which runs the corpus
+ * in tests/data/fuzz/NAME. An input must give the same run each time.
  */
 #ifndef HODOGRAPH_TESTS_FUZZ_H
 #define HODOGRAPH_TESTS_FUZZ_H
@@ -33,7 +33,7 @@ void fuzz_frame(struct fuzz_input *in, struct can_msg *frame);
 /* Runs the harness on an input; a failed assertion of Unity inside, as those of the fakes, aborts. Returns 0. */
 int fuzz_run(void (*harness)(struct fuzz_input *in), const uint8_t *data, size_t size);
 
-/* A rule that has to hold: says which one, and aborts. */
+/* A rule that has to hold: if it does not, prints it and aborts. */
 #define FUZZ_CHECK(rule) ((rule) ? (void)0 : fuzz_broken(#rule, __FILE__, __LINE__))
 void fuzz_broken(const char *rule, const char *file, int line) __attribute__((noreturn));
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A line that is decoded is
- * a frame, and its line gives the same frame again; a request is replied to within the time that it names.
+ * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A line that is
+ * decoded is a frame, and its line gives the same frame again; a request is replied to within the time that it names.
  *
- * Input: requests (one byte each says how), then characters.
+ * Input: requests (one byte each selects the kind), then characters.
  */
 #include <string.h>
 
@@ -44,7 +44,7 @@ static void characters(struct fuzz_input *in)
     }
 }
 
-/* The gateway waits as pacing_wait_ns says; `frames` come at the given round. */
+/* The gateway waits for pacing_wait_ns; `frames` come at the given round. */
 static void request(struct fuzz_input *in, struct pacing *pacing, uint64_t *now_ns)
 {
     const uint8_t how = fuzz_byte(in);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chunks of a job with changes, always with the CRCs that they should have. What chunk_check accepts is taken over and runs
- * under holds, resumes, overrides, stops and fault stops at any tick, each chunk in time, late or never: setpoints do not
- * jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes longer than
- * its deadline.
+ * Chunks of a job with changes, always with the CRCs that they should have. What chunk_check accepts is taken over and
+ * runs under holds, resumes, overrides, stops and fault stops at any tick, each chunk in time, late or never: setpoints
+ * do not jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes
+ * longer than its deadline.
  *
- * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk is there,
- * then changes.
+ * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk
+ * is there, then changes.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -46,7 +46,7 @@ static struct job {
 
 /* As a job comes: its chunks with the changes of the input. */
 struct part {
-    uint8_t *bytes; /* exactly as long as it says, so that the sanitizer sees any read beyond */
+    uint8_t *bytes; /* exactly as long as its size, so that the sanitizer detects any read beyond */
     uint32_t size;
     struct chunk chunk;
     uint32_t from_tick;

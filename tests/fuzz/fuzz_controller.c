@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The whole controller on the fake port, with two fake drives, a host, and another node that sends any frames; frames
- * are lost and refused, ticks are late, the power fails. Rules: those of port.h (the fake port checks them); no setpoint of
- * an axis on the path is farther from the one before than its velocity limit allows; a program that a block transfer has
- * brought, or taken, is the one that was sent, whatever came between its frames; and where the configuration is still the
- * first one, a sound bus and a reset lead out of everything.
+ * are lost and refused, ticks are late, the power fails. Rules: those of port.h (the fake port checks them); no
+ * setpoint of an axis on the path is farther from the one before than its velocity limit allows; a program that a block
+ * transfer has brought, or taken, is the one that was sent, whatever came between its frames; and where the
+ * configuration is still the first one, a sound bus and a reset lead out of everything.
  *
- * Input: one byte says what happens next.
+ * Input: one byte selects what happens next.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -116,7 +116,7 @@ static void take_segment(const struct can_msg *frame)
 static void to_client(const struct can_msg *frame)
 {
     static const uint8_t object[3] = {0x00, 0x20, 0x01};
-    if (frame->id != COB_SDO_ANSWER + self.controller.node || frame->len != 8u) {
+    if (frame->id != COB_SDO_RESPONSE + self.controller.node || frame->len != 8u) {
         return;
     }
     if (frame->data[0] == 0x80u) {
@@ -208,7 +208,7 @@ static void period(uint32_t late_us)
 static void write(uint16_t index, uint8_t sub, uint32_t value, uint8_t size)
 {
     struct can_msg frame;
-    cob_frame(&frame, COB_SDO_ASK + self.controller.node, 8);
+    cob_frame(&frame, COB_SDO_REQUEST + self.controller.node, 8);
     frame.data[0] = (uint8_t)SDO_SIZE_CODE(size);
     cob_put(frame.data + 1, index, 2);
     frame.data[3] = sub;
@@ -310,8 +310,9 @@ static void neighbour(struct fuzz_input *in, uint8_t what)
     struct can_msg frame;
     fuzz_frame(in, &frame);
     if ((what & 1u) != 0u) { /* one of the identifiers that somebody listens to */
-        static const uint16_t functions[] = {COB_EMCY,       COB_TPDO2,     COB_TPDO1, COB_RPDO1,
-                                             COB_SDO_ANSWER, COB_HEARTBEAT, COB_TPDO3, COB_SDO_ASK};
+        static const uint16_t functions[] = {COB_EMCY,  COB_TPDO2,        COB_TPDO1,
+                                             COB_RPDO1, COB_SDO_RESPONSE, COB_HEARTBEAT,
+                                             COB_TPDO3, COB_SDO_REQUEST};
         frame.id = functions[(frame.id >> 3) & 7u] + 1u + frame.id % (DRIVES + 1u);
     }
     to_drives(&frame);
@@ -324,7 +325,7 @@ static void neighbour(struct fuzz_input *in, uint8_t what)
 static void send_request(const uint8_t request[8])
 {
     struct can_msg frame;
-    cob_frame(&frame, COB_SDO_ASK + self.controller.node, 8);
+    cob_frame(&frame, COB_SDO_REQUEST + self.controller.node, 8);
     memcpy(frame.data, request, 8);
     to_controller(&frame);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The SDO client and the boot of the drives on a bus where anything may happen to requests and answers, with any
- * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and with
- * drives that were switched on anew, it ends.
+ * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and
+ * with drives that were switched on anew, it ends.
  *
  * Input: writes to the configuration, then what becomes of each frame.
  */
@@ -84,7 +84,7 @@ static void check_sent(const struct can_msg *frame)
     bool to_a_drive = false;
     for (unsigned i = 0; i < self.config.axis_count; ++i) {
         const uint8_t node = self.config.node[i];
-        to_a_drive = to_a_drive || (frame->id == COB_SDO_ASK + node && frame->len == 8u) ||
+        to_a_drive = to_a_drive || (frame->id == COB_SDO_REQUEST + node && frame->len == 8u) ||
                      (frame->id == COB_NMT && frame->len == 2u && frame->data[1] == node);
     }
     FUZZ_CHECK(to_a_drive);
@@ -193,7 +193,7 @@ static void round_of_bus(struct fuzz_input *in, uint32_t us)
     deliver(in);
 }
 
-/* Whether fake drives can do what the configuration asks for. */
+/* Whether fake drives can do what the configuration requires. */
 static bool possible(void)
 {
     const struct config *config = &self.config;
@@ -234,7 +234,7 @@ static void harness(struct fuzz_input *in)
             round_of_bus(in, what < 0xC0u ? 1000u : (what - 0xBFu) * 20000u);
         } else if (what < 0xF8u) {
             fuzz_frame(in, &frame);
-            frame.id = COB_SDO_ANSWER + self.config.node[what & 1u];
+            frame.id = COB_SDO_RESPONSE + self.config.node[what & 1u];
             queue(&frame);
         } else {
             switch_drives_on();

@@ -2,7 +2,7 @@
 /*
  * A simulated drive with any frames at any time: what it sends are frames, and after a reset its SDO server answers.
  *
- * Input: one byte says what happens next.
+ * Input: one byte selects what happens next.
  */
 #include <string.h>
 
@@ -23,7 +23,7 @@ static void sent(void *context, const struct can_msg *frame)
 {
     (void)context;
     FUZZ_CHECK(frame->id <= CAN_ID_MAX && frame->len <= CAN_DATA_MAX);
-    self.answered = self.answered || frame->id == COB_SDO_ANSWER + DRIVE_BENCH_ID;
+    self.answered = self.answered || frame->id == COB_SDO_RESPONSE + DRIVE_BENCH_ID;
 }
 
 static void receive(uint32_t id, const uint8_t *data, uint8_t length)
@@ -64,7 +64,7 @@ static void write(struct fuzz_input *in)
     cob_put(request + 1, entry->index, 2);
     request[3] = entry->sub;
     fuzz_bytes(in, request + 4, 4);
-    receive(COB_SDO_ASK + DRIVE_BENCH_ID, request, sizeof request);
+    receive(COB_SDO_REQUEST + DRIVE_BENCH_ID, request, sizeof request);
 }
 
 static void step(struct fuzz_input *in)
@@ -86,7 +86,7 @@ static void step(struct fuzz_input *in)
     } else if (what < 0xD0u) {
         uint8_t request[8];
         fuzz_bytes(in, request, sizeof request);
-        receive(COB_SDO_ASK + DRIVE_BENCH_ID, request, sizeof request);
+        receive(COB_SDO_REQUEST + DRIVE_BENCH_ID, request, sizeof request);
     } else {
         fuzz_frame(in, &frame);
         drive_node_receive(&self.node, &frame);
@@ -100,7 +100,7 @@ static void answers(void)
     receive(COB_NMT, reset, sizeof reset);
     drive_node_process(&self.node, 0);
     self.answered = false;
-    receive(COB_SDO_ASK + DRIVE_BENCH_ID, request, sizeof request);
+    receive(COB_SDO_REQUEST + DRIVE_BENCH_ID, request, sizeof request);
     drive_node_process(&self.node, 0);
     FUZZ_CHECK(self.answered);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Fault rules: any text to their parser, and what the injector and the drives do by the rules that it takes. A refusal has
- * one line; all frames that come out are frames; time that is due comes.
+ * Fault rules: any text to their parser, and what the injector and the drives do by the rules that it takes. A refusal
+ * has one line; all frames that come out are frames; time that is due comes.
  *
  * Input: text up to the first byte 0, then frames and time.
  */

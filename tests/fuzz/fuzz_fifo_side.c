@@ -3,8 +3,8 @@
  * What an emulated board writes to its FIFO, in pieces of any size, while frames wait on the bus. Each complete request
  * gets one reply, of frames of the bus; only frames and filters go to the bus; a request that is none ends the service.
  *
- * Input: how many frames wait on the bus, and these; then requests. The FIFOs are a pair of sockets that keep the pieces
- * apart, so all of them can be written before the gateway reads.
+ * Input: how many frames wait on the bus, and these; then requests. The FIFOs are a pair of sockets that keep the
+ * pieces apart, so all of them can be written before the gateway reads.
  */
 #define _GNU_SOURCE
 #include <string.h>
@@ -90,7 +90,7 @@ static void fill_records(struct fuzz_input *in, struct exchange_message *request
     }
 }
 
-/* The board asks; it may stop in the middle, and then it is gone. */
+/* The board sends a request; it may stop in the middle, and then it has ended. */
 static void write_request(struct fuzz_input *in)
 {
     struct exchange_message request;

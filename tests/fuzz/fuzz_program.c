@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A program image: a golden one with changes, or any bytes, always with the CRC that it should have. What program_check
- * accepts for axes with limits runs to its end, or to the end of a stop, under holds, resumes, overrides and stops at any
- * tick: the setpoints keep the limits of each axis at every tick and stay within travel.
+ * accepts for axes with limits runs to its end, or to the end of a stop, under holds, resumes, overrides and stops at
+ * any tick: the setpoints keep the limits of each axis at every tick and stay within travel.
  *
  * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes.
  */

@@ -3,7 +3,7 @@
  * The SDO server with any frames, at any time, with hooks that refuse: it keeps to the rules of its hooks (checked in
  * small_od.c), leaves constants alone, and serves the next honest client.
  *
- * Input: one byte says what happens next: time, refusals, what an honest client would send next, the beginning of a
+ * Input: one byte selects what happens next: time, refusals, what an honest client would send next, the beginning of a
  * transfer, or any frame.
  */
 #include <string.h>
@@ -21,7 +21,7 @@ static void pass_time(uint32_t us)
 {
     int answers = 0;
     while (sdo_server_process(&talk.server, us, &talk.answer) != 0) {
-        FUZZ_CHECK(talk.answer.id == COB_SDO_ANSWER + TALK_NODE && talk.answer.len == 8u);
+        FUZZ_CHECK(talk.answer.id == COB_SDO_RESPONSE + TALK_NODE && talk.answer.len == 8u);
         FUZZ_CHECK(++answers < ANSWERS_MAX);
         us = 0;
     }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a controller finds in its store at power-on: any bytes, in banks with records that are right or wrong; and what a
- * loss of power at any operation leaves. With a store that it wrote itself the controller has the parameters from before
- * a save or those of the save, and nothing else.
+ * What a controller finds in its store at power-on: any bytes, in banks with records that are right or wrong; and what
+ * a loss of power at any operation leaves. With a store that it wrote itself the controller has the parameters from
+ * before a save or those of the save, and nothing else.
  *
  * Input: what is in the banks; then values to save, and when the power goes.
  */

@@ -11,7 +11,7 @@
 #define BRAKE_LEAST       ((int64_t)1 << 22) /* of a jerk and of a deceleration */
 #define BRAKE_MOST        ((int64_t)1 << 60)
 #define BRAKE_MOST_RISING ((int64_t)1 << 61) /* above the speed that one rises to */
-#define BRAKE_MOST_SETTLE 16384              /* ticks of the way to rest */
+#define BRAKE_MOST_SETTLE 16384              /* ticks of the release phase */
 
 #define IS_NUMBER(a) (BRAKE_LEAST <= (a) && (a) <= BRAKE_MOST)
 #define IS_NUMBERS(n)                                                                              \

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The program clock looks for its piece, in a program of any three pieces of which any first ones have records, from any of
- * these and at any time: it never asks for a record after the last, stops at the first piece that ends after the time, and
+ * The program clock searches its piece, in a program of any three pieces of which any first ones have records, from any of
+ * these and at any time: it never reads a record after the last, stops at the first piece that ends after the time, and
  * is at the duration in no other than the last state of the program.
  *
  * prover: cbmc
@@ -27,7 +27,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->program = &program;
     clock->duration_q42_s = qmath_q42_of_q32(program.header.duration_q32_s);
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
-    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = i;
     clock->record = &records[i];
@@ -55,7 +55,7 @@ void harness(void)
         const uint64_t passed_q42_s = program_clock_pass_end(&clock, time_q42_s);
         prove(passed_q42_s <= clock.duration_q42_s);
         prove(passed_q42_s < clock.duration_q42_s ||
-              (clock.time_q42_s == passed_q42_s && clock.rest == 0u && clock.fine == 0u));
+              (clock.time_q42_s == passed_q42_s && clock.remainder == 0u && clock.fine == 0u));
         prove(passed_q42_s == clock.duration_q42_s || i == last ||
               time_q42_s >= records[i + 1u].end_q42_s || clock.piece == i + 1u);
     }

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The override at rest: a tick that looks for a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
+ * A constant override: a tick that searches a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
  * reset.
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check
  * replaces: override_ticks_of:some_ticks override_step_of:some_step override_span_q32:some_span override_window_get:some_window override_change_of:some_change override_stage_of:some_stage override_limits_of:some_limits
- * shows: tick_of_decision come_to_rest comes_steady
+ * shows: tick_of_decision begin_from_0 comes_steady
  * mutant: core/override_plan.c: down ? -step_q56 : step_q56 => step_q56
  * mutant: core/override_plan.c: above ? OVERRIDE_STAY : OVERRIDE_CLIMB => OVERRIDE_STAY
  * mutant: core/override_plan.c: magnitude(change_q57) / 2 => magnitude(change_q57)
@@ -59,7 +59,7 @@ static void first(void)
     assume(IS_FACTOR(plan.guaranteed.factor_q14));
     plan.guaranteed_q57 = (int64_t)plan.guaranteed.factor_q14 << 43;
     assume(plan.kind <= OVERRIDE_CLIMB && plan.window <= OVERRIDE_WINDOWS);
-    come_to_rest(&plan);
+    begin_from_0(&plan);
     prove(is_sound(&plan, &way));
     plan.now.override_q57 = any_between(0, OVERRIDE_ONE);
     int steady = comes_steady(&plan);

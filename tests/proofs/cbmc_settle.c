@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The way of a brake to rest (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
+ * The release phase of a brake (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
  * in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
  *
  * prover: cbmc
  * options: --unwind 11 --unwinding-assertions --signed-overflow-check
  * replaces: qmath_div_up_u64:some_ticks qmath_div_u64:some_quotient
- * shows: path_brake_rests
+ * shows: path_brake_ended
  * mutant: core/path_brake.c: 3 * (int64_t)(q * n * (n - 1u)) - steady => 3 * (int64_t)(q * n * (n + 1u)) - steady
  * mutant: core/path_brake.c: q * (n * (n - 1u) / 2u * (4u * n + 1u))); => q * (n * (n - 1u) / 2u * (4u * n - 1u)));
  * mutant: core/path_brake.c: if (brake->settle_ticks == 0) { => if (brake->settle_ticks <= 1) {
@@ -46,16 +46,16 @@ static void rest(uint64_t n, uint64_t p, uint64_t q)
     quotients[1] = p;
     asked = 0;
     for (uint64_t i = 0; i < n; i++) {
-        prove(!path_brake_rests(&brake));
+        prove(!path_brake_ended(&brake));
         path_brake_step(&brake);
     }
-    prove(path_brake_rests(&brake));
+    prove(path_brake_ended(&brake));
     prove(brake.at.speed_q56 == 0 && brake.at.acceleration_q56 == 0);
     path_brake_step(&brake);
     prove(brake.at.speed_q56 == 0 && brake.at.acceleration_q56 == 0);
 }
 
-/* A tick with a jerk that is not negative, as those behind it are: they bring the acceleration to 0. */
+/* A tick with a jerk that is not negative, as all later ones are: they bring the acceleration to 0. */
 static void settle_one(void)
 {
     struct path_brake brake;
@@ -73,7 +73,7 @@ static void settle_one(void)
     prove(brake.at.speed_q56 <= before.at.speed_q56);
     prove(brake.at.acceleration_q56 == -6 * behind);
     prove(brake.settle_ticks == before.settle_ticks - 1u);
-    prove(path_brake_rests(&brake) == (brake.settle_ticks == 0));
+    prove(path_brake_ended(&brake) == (brake.settle_ticks == 0));
 }
 
 void harness(void)

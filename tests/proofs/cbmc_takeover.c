@@ -24,7 +24,7 @@
  * mutant: core/feed_override.c: || segment == NULL || => ||
  * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((bisects && record == NULL) ||
  * mutant: core/feed_override.c: if (((bisects || clock_is_here(f)) && record == NULL) || => if ((clock_is_here(f) && record == NULL) ||
- * mutant: core/feed_override.c: override_plan_let_go(&f->plan); =>
+ * mutant: core/feed_override.c: override_plan_forget_records(&f->plan); =>
  * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->phase == PHASE_PLAN;
  * mutant: core/feed_override.c: return f->phase == PHASE_PLAN && f->state == STATE_WAITING; => return f->state == FEED_HELD || f->state == STATE_WAITING;
  */
@@ -38,7 +38,7 @@ int nondet_int(void);
 #define PIECES 3u
 #define LENGTH POWER(61)
 
-/* --- Two chunks, the second behind the first --- */
+/* --- Two chunks, the second after the first --- */
 
 static struct chunk chunks[2];
 static struct coefficients_piece records[2][PIECES]; /* in order, without gaps */
@@ -146,7 +146,7 @@ void override_plan_carry(struct override_plan *plan, const struct program_overri
     carried++;
 }
 
-void override_plan_let_go(struct override_plan *plan)
+void override_plan_forget_records(struct override_plan *plan)
 {
     (void)plan;
     let_go++;
@@ -171,7 +171,7 @@ void override_plan_limit(struct override_plan *plan, int64_t most_q57)
     plan->most_q57 = most_q57;
 }
 
-void override_plan_rest(struct override_plan *plan)
+void override_plan_restart(struct override_plan *plan)
 {
     plan->started = 1;
 }
@@ -179,7 +179,7 @@ void override_plan_rest(struct override_plan *plan)
 void override_plan_set(struct override_plan *plan, uint32_t percent)
 {
     (void)percent;
-    plan->asked_q57 = any_between(0, OVERRIDE_MOST);
+    plan->requested_q57 = any_between(0, OVERRIDE_MOST);
 }
 
 void override_plan_hold(struct override_plan *plan)
@@ -192,7 +192,7 @@ void override_plan_release(struct override_plan *plan)
     plan->held = 0;
 }
 
-void override_plan_rise_no_more(struct override_plan *plan)
+void override_plan_end_rise(struct override_plan *plan)
 {
     (void)plan;
 }
@@ -255,7 +255,7 @@ int64_t interpolator_acceleration_q40(const struct interpolator *it,
     return any_between(-POWER(40), POWER(40));
 }
 
-void interpolator_point_copy_rest(struct interpolator_point *out,
+void interpolator_point_copy_others(struct interpolator_point *out,
                                   const struct interpolator_point *from, uint32_t axis_count)
 {
     (void)out;
@@ -367,7 +367,7 @@ void path_brake_step(struct path_brake *brake)
     brake->at.arc_length_q40_mm = any_between(0, LENGTH);
 }
 
-int path_brake_rests(const struct path_brake *brake)
+int path_brake_ended(const struct path_brake *brake)
 {
     (void)brake;
     return nondet_int() != 0;
@@ -461,7 +461,7 @@ static void any_motion(uint32_t n)
     segments[1].number = nondet_uint32() & 15u;
     f.clock.period_us = 1000;
     f.clock.period_log2 = 0;
-    f.clock.rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1u);
+    f.clock.remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1u);
     f.clock.fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     f.clock.duration_q42_s = f.clock.program->header.duration_q32_s << 10;
     it.duration_q42_s = f.clock.duration_q42_s;
@@ -504,7 +504,7 @@ static int holds(uint32_t state)
     return state == FEED_HOLDING || state == FEED_HELD;
 }
 
-/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program behind which nothing goes on ends. */
+/* A stop stays one; a hold, too, but for a command to go on or to stop. Only a program without a next chunk ends. */
 static void kept(const struct feed_override *before, int commanded)
 {
     const int ended = f.state == FEED_ENDED;
@@ -541,7 +541,7 @@ static void tick_or_command(uint32_t n)
     kept(&before, commanded);
 }
 
-/* In motion: the same instant in a shared piece, and what is on its way ends by the joint. */
+/* In motion: the same instant in a shared piece, and a ramp under way ends by the joint. */
 static void kept_in_motion(const struct feed_override *before)
 {
     const struct chunk *next = &chunks[1];
@@ -559,7 +559,7 @@ static void kept_in_motion(const struct feed_override *before)
           f.plan.now.slope_q56 == before->plan.now.slope_q56);
 }
 
-/* At rest: it rests, and looks for the place; a hold is still one. */
+/* At standstill: it stays there, and searches the place; a hold is still one. */
 static void kept_at_rest(const struct feed_override *before)
 {
     prove(!stops(before->state) && before->state != FEED_ENDED);
@@ -569,12 +569,12 @@ static void kept_at_rest(const struct feed_override *before)
     prove(f.point.arc_length_q40_mm >= starts[1][0]);
 }
 
-/* Behind a rest: as at the start of a program, running before and after. */
+/* After a rest: as at the start of a program, running before and after. */
 static void begun_at_rest(const struct feed_override *before)
 {
     prove(before->phase == PHASE_PLAN && before->state == STATE_WAITING);
     prove(f.phase == PHASE_PLAN && f.state == FEED_RUNNING && f.plan.started == 0);
-    prove(f.clock.piece == 0u && f.clock.time_q42_s == 0u && f.clock.rest == 0u &&
+    prove(f.clock.piece == 0u && f.clock.time_q42_s == 0u && f.clock.remainder == 0u &&
           f.clock.fine == 0u && f.point.arc_length_q40_mm == 0);
 }
 
@@ -600,7 +600,7 @@ static void take_over(void)
         kept(&before, 0);
         return;
     }
-    prove(f.clock.rest == before.clock.rest && f.clock.fine == before.clock.fine);
+    prove(f.clock.remainder == before.clock.remainder && f.clock.fine == before.clock.fine);
     prove(before.point.arc_length_q40_mm ==
           f.point.arc_length_q40_mm + chunks[1].arc_shift_q40_mm);
     if (resting) {

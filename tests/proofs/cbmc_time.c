@@ -28,7 +28,7 @@ static uint64_t present_q32_s; /* duration of the piece that is evaluated */
 static int rounds;
 static uint64_t left; /* before the round */
 
-/* Before the only round: any state; behind it: not out of bounds, and half as much left. */
+/* Before the only round: any state; after it: not out of bounds, and half as much remains. */
 static int goes_on(uint64_t *low, uint64_t *high)
 {
     if (rounds++ == 0) {

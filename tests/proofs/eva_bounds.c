@@ -41,7 +41,7 @@ static void state(const struct feed_state *s)
     prove(s->acceleration_q16_mm_s2 < POWER(62) && s->acceleration_q16_mm_s2 > -POWER(62));
 }
 
-/* Bounds of all eighths, held as the header says. */
+/* Bounds of all eighths, limited as in the header. */
 static void parts(const struct program_piece *c, enum feed_derivative derivative)
 {
     int64_t low[FEED_PARTS];

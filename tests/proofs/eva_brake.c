@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The brake along the path, for every code of the stop table, every state that it may be asked to begin from, and every
+ * The brake along the path, for every code of the stop table, every state that it may begin from, and every
  * state of a tick: nothing overflows, no shift is out of range, no division by 0. What comes out of the table and of the
- * begin is in the ranges that the ticks start from. The way to rest by ranges of its number of ticks.
+ * begin is in the ranges that the ticks start from. The release phase by ranges of its number of ticks.
  *
  * prover: eva
  * options: -eva-slevel 5000
@@ -120,7 +120,7 @@ static void fall(int64_t least_speed, int64_t least, int64_t most)
     prove(brake.at.fine_q56_mm < 65536);
 }
 
-/* --- The way to rest --- */
+/* --- The release phase --- */
 
 static int64_t least_ticks;
 static int64_t most_ticks;
@@ -158,7 +158,7 @@ static void settle_ticks(void)
     path_brake_step(&brake);
     prove(brake.phase == RESTING || brake.settle_ticks > 0);
     prove(brake.settle_ticks < BRAKE_MOST_SETTLE);
-    prove(path_brake_rests(&brake) == 0 || brake.settle_ticks == 0);
+    prove(path_brake_ended(&brake) == 0 || brake.settle_ticks == 0);
 }
 
 int main(void)

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A tick of the program clock and of the plan of its override, for any program of three pieces, wherever its
- * time is and after any command: nothing overflows, no window asks for what is behind the last piece. What the
+ * time is and after any command: nothing overflows, no window needs a piece after the last one. What the
  * plan decides: cbmc_plan.c. Which piece the clock is in: cbmc_ends.c.
  *
  * prover: eva
  * options: -eva-slevel 10
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/program_clock.h: program_clock_find_piece(clock, time_q42_s, PROGRAM_CLOCK_MOST_ENDS); => (void)program_clock_find_piece;
- * assumes: qmath_div_u64 override_bounds_of come_to_rest next_slope tick_of_decision comes_steady
- * shows: override_window_get override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
+ * assumes: qmath_div_u64 override_bounds_of begin_from_0 next_slope tick_of_decision comes_steady
+ * shows: override_window_get override_plan_begin override_plan_restart override_plan_hold override_plan_release override_plan_set override_plan_tick program_clock_set
  * mutant: core/override_plan.c: clock->record->ahead[window] => clock->record->ahead[window + 1u]
- * mutant: core/override_plan.c: qmath_lesser(plan->asked_q57, most_q57) => plan->asked_q57 + most_q57
+ * mutant: core/override_plan.c: qmath_lesser(plan->requested_q57, most_q57) => plan->requested_q57 + most_q57
  * mutant: core/program_clock.c: 3 * from->override_q57 => 64 * from->override_q57
  */
 #include "core/override_plan.h"
@@ -27,7 +27,7 @@
             plan->return_q32_s \from \nothing;
     ensures plan->now.override_q57 == 0 && plan->now.slope_q56 == 0 && plan->steady == 0;
     ensures \initialized(&plan->ramp); */
-static void come_to_rest(struct override_plan *plan);
+static void begin_from_0(struct override_plan *plan);
 
 /*@ requires is_plan(plan);
     assigns \result, plan->ramp, plan->task, plan->kind, plan->step, plan->window, plan->target_q57 \from plan->now.override_q57;
@@ -89,7 +89,7 @@ static void place(struct program_clock *clock, uint32_t i)
     clock->time_q42_s = (uint64_t)any_between(0, INT64_MAX);
     clock->piece = i;
     clock->record = coefficients_piece_at(p, p->coefficients_for, i);
-    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
 }
 
@@ -122,7 +122,7 @@ static void tick(const struct program *p)
         override_plan_tick(&plan, &clock);
         program_clock_set(&clock, (uint64_t)any_between(0, INT64_MAX), i,
                           coefficients_piece_at(p, p->coefficients_for, i));
-        override_plan_rest(&plan);
+        override_plan_restart(&plan);
     }
 }
 

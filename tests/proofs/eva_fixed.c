@@ -17,7 +17,7 @@
  * mutant: core/kernel_fixed.c: qmath_shift(i * c, i - 20 - n) => qmath_shift(i * c, i - 18 - n)
  * mutant: core/kernel_fixed.c: quadratic(k->v_q28, z) * 8 => quadratic(k->v_q28, z) * 16
  * mutant: core/kernel_fixed.c: reciprocal_q15 * (1 << 11) => reciprocal_q15 * (1 << 13)
- * mutant: core/kernel_fixed.c: qmath_clamp32(place.rest_q48_mm >> 4) => (place.rest_q48_mm >> 4)
+ * mutant: core/kernel_fixed.c: qmath_clamp32(place.remainder_q48_mm >> 4) => (place.remainder_q48_mm >> 4)
  * mutant: core/kernel_fixed.c: (uint32_t)(a_q30 >> 14) => (uint32_t)(a_q30 >> 28)
  */
 #include "kernel_bounds.h"

@@ -23,7 +23,7 @@ static int32_t last_q26;
 
 #include "core/kernel_fixed.c"
 
-/* first_guess asks for t only: with this scale it is as wide as s_q30 / 2. */
+/* first_guess needs t only: with this scale it is as wide as s_q30 / 2. */
 static void guess(struct kernel_fixed_arc *k, int64_t from, int64_t to)
 {
     int32_t s_q30 = (int32_t)any_between(from, to);

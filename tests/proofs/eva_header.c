@@ -52,7 +52,7 @@ int limit_check_all(const struct program *p, const struct program_limits *limits
 int main(void)
 {
     static uint8_t image[PROGRAM_HEADER_SIZE -
-                         16]; /* behind the name nothing but the reserved bytes is read */
+                         16]; /* after the name only the reserved bytes are read */
     static uint8_t whole[PROGRAM_HEADER_SIZE];
     struct program p;
     struct program_limits limits;

@@ -167,7 +167,7 @@ static void place(struct interpolator *it, uint32_t i)
     it->segment = coefficients_segment_at(it->program, it->kernel, i);
 }
 
-/* Records of pieces and of segments stand behind one another: neither is taken for the other. */
+/* Records of segments follow those of pieces in memory: neither is taken for the other. */
 static void stays(const struct interpolator *it)
 {
     prove((const void *)it->piece <

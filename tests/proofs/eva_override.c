@@ -10,7 +10,7 @@
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;
  * instead: core/qmath.h: int32_t low = (int32_t)((uint32_t)a >> 1); => int32_t low = (int32_t)any_between(0, INT32_MAX);
  * instead: core/feed_override.c: qmath_magnitude(feed) >= MOST_FEED_Q32 => feed >= MOST_FEED_Q32 || feed <= -MOST_FEED_Q32
- * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_rest override_plan_hold override_plan_release override_plan_set override_plan_rise_no_more override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_rests interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step
+ * assumes: qmath_div_u64 qmath_shift_clamp program_clock_set override_plan_begin override_plan_restart override_plan_hold override_plan_release override_plan_set override_plan_end_rise override_plan_tick path_brake_numbers_of path_brake_begin path_brake_fits path_brake_first path_brake_step path_brake_ended interpolator_at_piece interpolator_at_arc_length interpolator_acceleration_q40 interpolator_search_begin interpolator_search_step
  * mutant: core/feed_override.c: ((int64_t)1 << 45) => ((int64_t)1 << 49)
  * mutant: core/feed_override.c: program_stop_get(f->clock.program, f->clock.piece, (enum => program_stop_get(f->clock.program, f->clock.piece + 1u, (enum
  * mutant: core/feed_override.c: slope_q56 >> 26 => slope_q56 >> 25
@@ -46,7 +46,7 @@ void program_clock_begin(struct program_clock *clock, const struct program *p, u
     clock->period_us = period_us;
     clock->period_log2 = (uint32_t)any_between(0, 3);
     clock->time_q42_s = time_q42_s;
-    clock->rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    clock->remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     clock->fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     clock->piece = (uint32_t)any_between(0, COUNT - 1);
     clock->record = &record;
@@ -76,7 +76,7 @@ static void place(struct feed_override *f)
     f->plan.started = (uint32_t)any_between(0, 1);
     f->plan.saturated = (uint32_t)any_between(0, 1);
     f->clock.piece = (uint32_t)any_between(0, COUNT - 1);
-    f->clock.rest = (uint32_t)any_between(0, PROGRAM_CLOCK_REST_UNIT - 1);
+    f->clock.remainder = (uint32_t)any_between(0, PROGRAM_CLOCK_REMAINDER_UNIT - 1);
     f->clock.fine = (uint32_t)any_between(0, (1 << PROGRAM_CLOCK_FINE_BITS) - 1);
     f->brake.at = any_at();
     f->brake.numbers = any_numbers();

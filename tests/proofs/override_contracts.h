@@ -34,7 +34,7 @@
 /* --- core/program_clock.h, core/override_plan.h: eva_clock.c --- */
 
 /*@ requires piece < clock->program->header.piece_count;
-    assigns clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
+    assigns clock->time_q42_s, clock->remainder, clock->fine, clock->piece, clock->even_q62_s \from time_q42_s, piece;
     ensures is_clock(clock); */
 void program_clock_set(struct program_clock *clock, uint64_t time_q42_s, uint32_t piece,
                        const struct coefficients_piece *record);
@@ -46,7 +46,7 @@ void override_plan_begin(struct override_plan *plan, const struct program *p);
 /*@ requires is_plan(plan);
     assigns *plan \from *plan;
     ensures \initialized(plan) && plan->now.override_q57 == 0 && plan->now.slope_q56 == 0; */
-void override_plan_rest(struct override_plan *plan);
+void override_plan_restart(struct override_plan *plan);
 
 /*@ requires is_plan(plan);
     assigns plan->held, plan->steady \from \nothing; */
@@ -62,10 +62,10 @@ void override_plan_set(struct override_plan *plan, uint32_t percent);
 
 /*@ requires is_plan(plan);
     assigns plan->ramp \from plan->ramp; */
-void override_plan_rise_no_more(struct override_plan *plan);
+void override_plan_end_rise(struct override_plan *plan);
 
 /*@ requires is_plan(plan) && is_clock(clock);
-    assigns \result, *plan, clock->time_q42_s, clock->rest, clock->fine, clock->piece, clock->even_q62_s
+    assigns \result, *plan, clock->time_q42_s, clock->remainder, clock->fine, clock->piece, clock->even_q62_s
             \from *plan, clock->time_q42_s;
     ensures \initialized(plan) && is_plan(plan) && is_clock(clock); */
 uint64_t override_plan_tick(struct override_plan *plan, struct program_clock *clock);
@@ -105,7 +105,7 @@ void path_brake_step(struct path_brake *brake);
 
 /*@ assigns \result \from brake->phase;
     ensures \result == 0 || \result == 1; */
-int path_brake_rests(const struct path_brake *brake);
+int path_brake_ended(const struct path_brake *brake);
 
 /* --- core/interpolator.h: eva_interpolator.c --- */
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What holds of the plan of the override before and after every tick, `is_sound`: the override is in [0, 2], so is where a
- * ramp ends, no slope is greater than a way, and what is looked for or about to begin can be. cbmc_plan.c shows it for ticks at
+ * ramp ends, no slope is greater than a change, and a ramp that is searched or about to begin is possible. cbmc_plan.c shows it for ticks at
  * rest, with every command, and from the first tick on; docs/theory/numerics.md section 15.4 argues it for ticks of a ramp.
  *
  * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut would
@@ -19,8 +19,8 @@
 
 /* --- What the plan stands on: override_contracts.h --- */
 
-static int64_t begun_q57; /* the way that a step was made for */
-static struct program_override ahead; /* bounds of the window that is looked at */
+static int64_t begun_q57; /* the change that a step was made for */
+static struct program_override ahead; /* bounds of the window that is evaluated */
 
 void some_ticks(struct ramp_ticks *ticks, const struct ramp_limits *limits, int64_t change_q57)
 {
@@ -59,7 +59,7 @@ void some_change(struct ramp_change *out, int64_t from_q57, int64_t to_q57)
     assume(IS_CHANGE(out));
 }
 
-/* Between both ends; a rest on the way is that of a level below 1. */
+/* Between both ends; the end of a stage is that of a level below 1. */
 void some_stage(struct ramp_stage *out, const struct program_override *bounds,
                 const struct ramp_change *change)
 {
@@ -130,7 +130,7 @@ static int is_way(const struct override_plan *plan, const struct way *way)
 
 static int is_above(const struct override_plan *plan)
 {
-    return next_rest(plan) > plan->guaranteed_q57;
+    return next_constant(plan) > plan->guaranteed_q57;
 }
 
 /* What the steps of a search leave to the next ones. */
@@ -143,7 +143,7 @@ static int search_is_sound(const struct override_plan *plan)
         return 0;
     }
     if (plan->step == OVERRIDE_STAGES && plan->kind != OVERRIDE_STAY &&
-        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_rest(plan) &&
+        !(IS_CHANGE(&plan->change) && plan->change.from_q57 == next_constant(plan) &&
           plan->change.to_q57 == plan->target_q57)) {
         return 0;
     }

@@ -16,7 +16,7 @@
 #define IS_OVERRIDE(q57)  (0 <= (q57) && (q57) <= OVERRIDE_MOST)
 #define IS_TICKS(t)   (1 <= (t)->rise && (t)->rise <= (t)->half && (t)->half <= MOST_HALF)
 #define IS_LIMITS(p)                                                                                 \
-    ((p)->turns >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
+    ((p)->rate_ticks >= 1 && (p)->inverse_slope <= 0x80000001 && (p)->inverse_root <= 0x80040000)
 #define IS_CHANGE(c)                                                                                 \
     (IS_OVERRIDE((c)->from_q57) && IS_OVERRIDE((c)->to_q57) && (c)->first < PROGRAM_LEVELS &&        \
      (c)->last < PROGRAM_LEVELS)

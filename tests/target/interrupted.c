@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * An image to test the counter of instructions with: the same work a hundred times, with SysTick interrupts at any place
- * in it, which must not be counted. The first word is the file that gets the number of interrupts, a u32.
+ * An image to test the counter of instructions with: the same work a hundred times, with SysTick interrupts at any
+ * place in it, which must not be counted. The first word is the file that gets the number of interrupts, a u32.
  */
 #include <stdint.h>
 

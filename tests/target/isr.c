@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * An image that runs the whole tick of the controller, with two drives that follow unless trouble.h says otherwise, on a
- * port that is only memory: to count what the timer interrupt costs on every core, also where no emulated board has a CAN bus. The words are those
- * of setpoints.c, KERNEL FILE COMMANDS; FILE gets a u32 for each counted tick: what it took by the core's own clock
- * (clock.h). The store holds one program image or several. A FILE of a name that trouble.h has is not written: it makes
- * the drives misbehave, in every program.
+ * An image that runs the whole tick of the controller, with two drives that follow unless trouble.h says otherwise, on
+ * a port that is only memory: to count what the timer interrupt costs on every core, also where no emulated board has a
+ * CAN bus. The words are those of setpoints.c, KERNEL FILE COMMANDS; FILE gets a u32 for each counted tick: what it
+ * took by the core's own clock (clock.h). The store holds one program image or several. A FILE of a name that trouble.h
+ * has is not written: it makes the drives misbehave, in every program.
  *
  * What a real port adds: its own handler, and writing a frame into the controller's registers instead of memory.
  */
@@ -105,7 +105,7 @@ static void write_times(void)
     times.count = 0;
 }
 
-/* A tick between two looks at the clock; inlined, its argument would be computed between them. */
+/* A tick between two readings of the clock; inlined, its argument would be computed between them. */
 __attribute__((noinline)) static void timed_isr(uint32_t now_us)
 {
     const uint32_t before = clock_now();

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * An image that runs programs without a bus: KERNEL FILE [COMMANDS [TIMES]], KERNEL 0 fixed or 1 float. The store (which the
- * emulator fills) holds one program image, or several one after the other; the setpoints of all ticks of all of them,
- * i32 of all path axes, go to FILE on the host. So every target can be asked for its bits, however little memory it has. What
- * is run is what the controller's tick runs.
+ * An image that runs programs without a bus: KERNEL FILE [COMMANDS [TIMES]], KERNEL 0 fixed or 1 float. The store
+ * (which the emulator fills) holds one program image, or several one after the other; the setpoints of all ticks of all
+ * of them, i32 of all path axes, go to FILE on the host. So every target can be asked for its bits, however little
+ * memory it has. What is run is what the controller's tick runs.
  *
  * COMMANDS is a file (commands.h) that each of the programs is run with. A hold that nothing ends lasts until the last
- * command; then the run of that program is over. COMMANDS is - for none. TIMES gets a u32 for each tick: what it took by
- * the core's own clock (clock.h).
+ * command; then the run of that program is over. COMMANDS is - for none. TIMES gets a u32 for each tick: what it took
+ * by the core's own clock (clock.h).
  */
 #include <stdbool.h>
 #include <stdint.h>
@@ -43,7 +43,7 @@ __attribute__((noinline)) static int tick(int32_t *target_counts)
     return motion_step(&motion, target_counts);
 }
 
-/* A tick between two looks at the clock. */
+/* A tick between two readings of the clock. */
 static int timed_tick(size_t slot)
 {
     const uint32_t before = clock_now();

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The proof of the stops of a program (core/brake_check.h), to count what it costs: piece by piece, hold and fault stop,
- * with the stop parameters that the program has. Exit status 0, whether or not they are proved.
+ * The proof of the stops of a program (core/brake_check.h), to count what it costs: piece by piece, hold and fault
+ * stop, with the stop parameters that the program has. Exit status 0, whether or not they are proved.
  */
 #include <stdint.h>
 

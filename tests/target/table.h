@@ -9,8 +9,8 @@
 
 #define TABLE_AT 0x14000u /* of the store: what is before is for programs */
 
-/* Makes the records of a program for a kernel and gives them to it; those of the program before are lost. 0, or -1 when they
- * do not fit. */
+/* Makes the records of a program for a kernel and gives them to it; those of the program before are lost. 0, or -1 when
+ * they do not fit. */
 int table_make(struct program *program, uint32_t kernel);
 
 #endif

@@ -56,7 +56,8 @@ static int prepare(const struct path *path)
     return 0;
 }
 
-/* r, r' and r'' of both coordinates: a triangle of means whose last but one and last but two rows give the derivatives. */
+/* r, r' and r'' of both coordinates: a triangle of means whose last but one and last but two rows give the
+ * derivatives. */
 static void de_boor(float u, float r[2][3])
 {
     const int k = curve.span;

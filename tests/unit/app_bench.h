@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * app_bench: a whole controller on the fake port, with two fake drives, if wanted an I/O module, and an SDO client as host,
- * on a bus without delays.
+ * app_bench: a whole controller on the fake port, with two fake drives, optionally an I/O module, and an SDO client as
+ * host, on a bus without delays.
  */
 #ifndef TESTS_UNIT_APP_BENCH_H
 #define TESTS_UNIT_APP_BENCH_H
@@ -52,7 +52,7 @@ uint32_t app_bench_until(struct app_bench *bench, enum machine_state state, uint
 /* From boot: the drives are switched on and have stood still long enough for a start. */
 void app_bench_make_ready(struct app_bench *bench);
 
-/* Delivers all frames that are under way, and lets the main loop do what they ask for. */
+/* Delivers all frames that are under way, and lets the main loop handle them. */
 void app_bench_settle(struct app_bench *bench);
 
 /* The host. Results: abort codes. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * chunk_image: chunks of a job that is small enough to be written by hand: straight along x, from rest to 16 mm/s in 0.5 s
- * (4 mm), then pieces of 1/32 s (0.5 mm) at 16 mm/s. The end of each chunk brakes to rest in 0.5 s (4 mm). Segments of
- * 4 mm. Pieces allow an override of 150 %.
+ * chunk_image: chunks of a job that is small enough to be written by hand: straight along x, from rest to 16 mm/s in
+ * 0.5 s (4 mm), then pieces of 1/32 s (0.5 mm) at 16 mm/s. The end of each chunk brakes to rest in 0.5 s (4 mm).
+ * Segments of 4 mm. Pieces allow an override of 150 %.
  */
 #ifndef TESTS_UNIT_CHUNK_IMAGE_H
 #define TESTS_UNIT_CHUNK_IMAGE_H
@@ -32,8 +32,8 @@ struct chunk_plan {
 uint32_t chunk_image_make(uint8_t *bytes, const struct chunk_plan *plan, int32_t x_mm,
                           int32_t y_mm);
 
-/* Adds those of these events that are on the path of the chunk, in their order; places are arc lengths of the job. Returns the new
- * size. */
+/* Adds those of these events that are on the path of the chunk, in their order; places are arc lengths of the job.
+ * Returns the new size. */
 uint32_t chunk_image_switch(uint8_t *bytes, const struct program_event *events, uint32_t count);
 
 /* Puts the right CRCs into a chunk that was changed. */

@@ -154,11 +154,11 @@ void chunked_add_events(struct override_program *p, uint32_t count, uint64_t *ra
 /* --- Tail: a quintic --- */
 
 struct quintic {
-    double c[6]; /* way from the joint by powers of t / duration */
+    double c[6]; /* distance from the joint by powers of t / duration */
     double duration_s;
 };
 
-/* Way and its first three derivatives at a part of the duration. */
+/* Distance and its first three derivatives at a part of the duration. */
 static void at_part(const struct quintic *q, double x, double d[4])
 {
     memset(d, 0, 4 * sizeof *d);

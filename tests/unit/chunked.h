@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * chunked: a program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
- * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has the
- * events of the program on its segments.
+ * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has
+ * the events of the program on its segments.
  */
 #ifndef TESTS_UNIT_CHUNKED_H
 #define TESTS_UNIT_CHUNKED_H
@@ -34,12 +34,12 @@ struct chunked {
     uint32_t sizes[CHUNKED_MOST];
 };
 
-/* The program with pieces of at most this duration, as many as OVERRIDE_PIECES allows: the same motion but for rounding. Its
- * limits are to be set again. */
+/* The program with pieces of at most this duration, as many as OVERRIDE_PIECES allows: the same motion but for
+ * rounding. Its limits are to be set again. */
 void chunked_refine(struct override_program *p, double longest_s);
 
-/* The program with so many events of analogue output 0, whose values are their numbers from 1 on: at random places, at both ends,
- * at starts of segments, and some at the same place as the one before. */
+/* The program with so many events of analogue output 0, whose values are their numbers from 1 on: at random places, at
+ * both ends, at starts of segments, and some at the same place as the one before. */
 void chunked_add_events(struct override_program *p, uint32_t count, uint64_t *random);
 
 /* Cuts with the joints and first pieces given: 1, or 0 where there is no tail inside the limits. */

@@ -122,7 +122,7 @@ static void take_setpoint(struct fake_drive *drive, const struct pdo_setpoint *s
     }
 }
 
-/* Comes to rest where it is. */
+/* Stops at its position. */
 static void brake(struct fake_drive *drive)
 {
     const enum cia402_action action = cia402_device_action(&drive->state);
@@ -143,7 +143,7 @@ static int answer(struct fake_drive *drive, const struct pdo_actual *actual, str
     return drive->mute ? 0 : 1;
 }
 
-/* What it says now; or, late, what it wanted to say to the last SYNC. When it is late no more, both. */
+/* Its present answer; or, while it is late, its answer to the last SYNC. With the first answer in time, both. */
 static int answers(struct fake_drive *drive, const struct pdo_actual *actual, struct can_msg out[2])
 {
     int count = 0;

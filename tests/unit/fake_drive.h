@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * fake_drive: an ideal CiA 402 drive for tests of the controller: the drive's dictionary and
- * protocol objects, a motor that is always where it is wanted two SYNCs later, and switches for
- * misbehaviour.
+ * fake_drive: an ideal CiA 402 drive for tests of the controller: the drive's dictionary and protocol objects, a motor
+ * that always reaches its target two SYNCs later, and switches for misbehaviour.
  */
 #ifndef TESTS_UNIT_FAKE_DRIVE_H
 #define TESTS_UNIT_FAKE_DRIVE_H
@@ -47,7 +46,7 @@ struct fake_drive {
     uint32_t homing_syncs; /* how long it takes to find home: then its position is the offset */
     uint32_t homing_left;
     bool homing_fails;
-    bool homed;          /* once it has, it says so whenever it is enabled in homing mode */
+    bool homed;          /* then it reports so whenever it is enabled in homing mode */
     uint32_t deaf;       /* so many of the next setpoint frames are lost */
     bool fixed_mapping;  /* PDO parameters are read-only */
     uint16_t lacks[8];   /* objects that it has not */

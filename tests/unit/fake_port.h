@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * fake_port: port.h for tests: time that the test moves, sent frames that the test takes,
- * interrupts that the test calls. Ends the test when a rule of port.h about the lock is broken.
+ * fake_port: port.h for tests: time that the test moves, sent frames that the test takes, interrupts that the test
+ * calls. Ends the test when a rule of port.h about the lock is broken.
  */
 #ifndef TESTS_UNIT_FAKE_PORT_H
 #define TESTS_UNIT_FAKE_PORT_H
@@ -33,21 +33,21 @@ bool fake_port_ready(void);          /* port_tick_ready since the last tick */
 unsigned fake_port_wakes(void);
 unsigned fake_port_progress(void); /* calls of port_progress */
 
-/* What port_timing() says from now on. */
+/* Sets the result of port_timing() from now on. */
 void fake_port_set_timing(enum port_timing timing);
 
 /* So many of the next frames that pass this filter are refused. */
 void fake_port_refuse(const struct can_match *refused, uint32_t times);
 
-/* What port_can_delivered says from now on: frames of ticks wait for the bus, or not. */
+/* Sets the result of port_can_delivered from now on: frames of ticks wait for the bus, or not. */
 void fake_port_hold_frames(bool hold);
 
 /* From now on port_can_send, or port_store_write, fails. */
 void fake_port_fail_send(bool fail);
 void fake_port_fail_store(bool fail);
 
-/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has gone;
- * 0: it takes all. Returns how many operations there were since the last call. */
+/* From its n-th operation on (the erasing of a bank, or a byte) the store takes nothing more, as when the power has
+ * gone; 0: it takes all. Returns how many operations there were since the last call. */
 uint32_t fake_port_cut_store(uint32_t operation);
 
 /* fake_port_reset, but what is in the store stays, as over a loss of power. */
@@ -75,7 +75,7 @@ void fake_port_use_store(const struct fake_port_store *store);
 
 /* Called once, after the next critical section: an interrupt between two of them. */
 void fake_port_on_unlock(void (*hook)(void *context), void *context);
-/* What port_stop_insisted says from now on. */
+/* Sets the result of port_stop_insisted from now on. */
 void fake_port_insist(bool insisted);
 
 /* Called by port_progress; may be NULL. */

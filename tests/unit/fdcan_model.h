@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * fdcan_model: FDCAN1 of an STM32G4 as its reference manual describes it (RM0440 chapter 44), for one node on a bus that
- * the test plays: configuration protocol, message RAM, filters, FIFOs, flags, bus-off.
+ * fdcan_model: FDCAN1 of an STM32G4 as its reference manual describes it (RM0440 chapter 44), for one node on a bus
+ * that the test plays: configuration protocol, message RAM, filters, FIFOs, flags, bus-off.
  */
 #ifndef TESTS_UNIT_FDCAN_MODEL_H
 #define TESTS_UNIT_FDCAN_MODEL_H

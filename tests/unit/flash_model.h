@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * flash_model: the flash of an STM32G474 in dual-bank mode as its reference manual describes it (RM0440 chapter 3): keys,
- * erasing pages and programming double words of bank 2, error flags; and a supply that can fail at any of
+ * flash_model: the flash of an STM32G474 in dual-bank mode as its reference manual describes it (RM0440 chapter 3):
+ * keys, erasing pages and programming double words of bank 2, error flags; and a supply that can fail at any of
  * these operations.
  */
 #ifndef TESTS_UNIT_FLASH_MODEL_H
@@ -40,8 +40,8 @@ const uint8_t *flash_model_memory(uint32_t address);
 /* Erases and writes of double words since flash_model_new(). */
 uint32_t flash_model_operations(void);
 
-/* The power fails at the operation with this number (from 0): longjmp(*where, 1). UINT32_MAX: never. `seed` decides which
- * bits change. */
+/* The power fails at the operation with this number (from 0): longjmp(*where, 1). UINT32_MAX: never. `seed` decides
+ * which bits change. */
 void flash_model_cut(uint32_t operation, enum flash_model_remains remains, uint32_t seed,
                      jmp_buf *where);
 

@@ -26,8 +26,8 @@ struct golden_precomputed {
     void *records;
 };
 
-/* A copy of an opened program, with records for a kernel; ends the process when there is no memory. The image has to stay.
- * Free with golden_discard. */
+/* A copy of an opened program, with records for a kernel; ends the process when there is no memory. The image has to
+ * stay. Free with golden_discard. */
 void golden_precompute(struct golden_precomputed *out, const struct program *p,
                        enum kernel_number kernel);
 void golden_discard(struct golden_precomputed *precomputed);

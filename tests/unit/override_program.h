@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Programs for the override's property test: random feed over a straight line, or a golden image, with override bounds
- * and a stop table made in C from chosen limits, as docs/theory/numerics.md section 7 says.
+ * and a stop table made in C from chosen limits by docs/theory/numerics.md section 7.
  */
 #ifndef HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
 #define HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
@@ -66,8 +66,8 @@ struct override_differences {
 int override_trace_add(struct override_trace *trace, int64_t arc_q40_mm, double h,
                        struct override_differences *out);
 
-/* Distance in 2^-40 mm of a point from the exact curve at its arc length, over all axes. `exact` has the same program and stands at or
- * before that place. */
+/* Distance in 2^-40 mm of a point from the exact curve at its arc length, over all axes. `exact` has the same program
+ * and stands at or before that place. */
 double override_distance_q40(struct interpolator *exact, const struct interpolator_point *point);
 
 /* Uniform in [low, high). */

@@ -18,12 +18,12 @@ bool sdo_talk_send(struct sdo_talk *talk, const uint8_t request[8])
 {
     struct can_msg in;
 
-    cob_frame(&in, COB_SDO_ASK + TALK_NODE, 8);
+    cob_frame(&in, COB_SDO_REQUEST + TALK_NODE, 8);
     memcpy(in.data, request, 8);
     if (!sdo_server_receive(&talk->server, &in, &talk->answer)) {
         return false;
     }
-    TEST_ASSERT_EQUAL_HEX32(COB_SDO_ANSWER + TALK_NODE, talk->answer.id);
+    TEST_ASSERT_EQUAL_HEX32(COB_SDO_RESPONSE + TALK_NODE, talk->answer.id);
     TEST_ASSERT_EQUAL_UINT8(8, talk->answer.len);
     return true;
 }

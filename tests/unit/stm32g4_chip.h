@@ -24,7 +24,7 @@ void chip_poke(uint32_t address, uint32_t value);
 /* Writes to an address since power-on. */
 unsigned chip_writes(uint32_t address);
 
-/* What the console (LPUART1) was given since this was last asked: the first kilobyte. */
+/* The text sent to the console (LPUART1) since the last call: the first kilobyte. */
 const char *chip_said(void);
 
 /* Ends the test: the access breaks a rule of the manual. */
@@ -35,7 +35,7 @@ uint8_t chip_held(void);
 void chip_in_handler(bool in_handler);
 bool chip_interrupt_is_on(uint32_t number, uint8_t *priority);
 
-/* What happens while the core sleeps; and how often it was asked to start anew. */
+/* Sets what happens while the core sleeps; the number of requested restarts. */
 void chip_on_sleep(void (*hook)(void));
 unsigned chip_resets(void);
 

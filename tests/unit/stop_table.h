@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* stop_table: the stop table of an image that a test has made, with the bounds that the check wants. */
+/* stop_table: the stop table of an image that a test has made, with the bounds that the check requires. */
 #ifndef TESTS_UNIT_STOP_TABLE_H
 #define TESTS_UNIT_STOP_TABLE_H
 

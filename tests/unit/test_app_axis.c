@@ -63,7 +63,7 @@ static void test_a_quick_stop_takes_the_target_that_was_sent(void)
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
 }
 
-/* One wrong statusword, with a wrong position beside it, moves nothing. */
+/* One wrong statusword, with a wrong position in the same frame, moves nothing. */
 static void test_a_statusword_that_lies_once_does_not_move_the_target(void)
 {
     axis.goal = CIA402_GOAL_ENABLED;
@@ -167,15 +167,15 @@ static void hold(int32_t position_counts, uint32_t syncs)
 static void test_standstill_needs_250_syncs_at_the_target(void)
 {
     hold(0, AXIS_STANDSTILL_SYNCS - 1u);
-    TEST_ASSERT_FALSE(axis_still(&axis));
+    TEST_ASSERT_FALSE(axis_stands(&axis));
     hold((int32_t)TOLERANCE, 1);
-    TEST_ASSERT_TRUE(axis_still(&axis));
+    TEST_ASSERT_TRUE(axis_stands(&axis));
     hold((int32_t)TOLERANCE + 1, 1);
-    TEST_ASSERT_FALSE(axis_still(&axis));
+    TEST_ASSERT_FALSE(axis_stands(&axis));
     hold(0, AXIS_STANDSTILL_SYNCS);
     axis.target_counts = 1;
     hold(0, 1);
-    TEST_ASSERT_FALSE(axis_still(&axis));
+    TEST_ASSERT_FALSE(axis_stands(&axis));
 }
 
 static void test_a_drive_that_is_off_does_not_stand_still(void)
@@ -184,7 +184,7 @@ static void test_a_drive_that_is_off_does_not_stand_still(void)
         answer(CIA402_SWITCH_ON_DISABLED, 0, 0);
         (void)sent();
     }
-    TEST_ASSERT_FALSE(axis_still(&axis));
+    TEST_ASSERT_FALSE(axis_stands(&axis));
 }
 
 /* The frame is kept and only what changes is written: it must be the one that would be made anew. */

@@ -139,7 +139,7 @@ static void test_every_axis_object_is_read(void)
 }
 
 /* An axis that turns has its own counts of a degree; what is configured for mm holds for degrees. */
-static void test_an_axis_that_turns(void)
+static void test_a_rotary_axis(void)
 {
     struct od_controller values = od_controller_defaults;
     struct od od;
@@ -190,6 +190,6 @@ int main(void)
     RUN_TEST(test_values_that_make_no_sense);
     RUN_TEST(test_which_objects_concern_the_drives);
     RUN_TEST(test_every_axis_object_is_read);
-    RUN_TEST(test_an_axis_that_turns);
+    RUN_TEST(test_a_rotary_axis);
     return UNITY_END();
 }

@@ -283,7 +283,7 @@ static void test_a_refused_image_leaves_the_old_program(void)
     TEST_ASSERT_EQUAL_INT32(X_COUNTS + 4000000, app_bench_read(&bench, 0x2000, 14));
 }
 
-static void test_what_is_told_of_the_program(void)
+static void test_what_is_reported_of_the_program(void)
 {
     for (uint8_t sub = 2; sub <= 15u; ++sub) {
         TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2000, sub));
@@ -440,7 +440,7 @@ static void test_a_drive_that_is_gone_while_off_is_looked_for_again(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* A stall of the main loop counts as no silence of the client: its transfer goes on. */
+/* A stall of the main loop does not count in the client's timeout: its transfer continues. */
 static void test_a_busy_main_loop_ends_no_transfer(void)
 {
     struct can_msg frame;
@@ -456,8 +456,9 @@ static void test_a_busy_main_loop_ends_no_transfer(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
 }
 
-/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of it. */
-static void test_a_check_tells_the_port_of_its_progress(void)
+/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of
+ * it. */
+static void test_a_check_reports_its_progress_to_the_port(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     const unsigned before = fake_port_progress();
@@ -561,7 +562,7 @@ static void start_in_wait(void *context)
     ++*(unsigned *)context;
 }
 
-static void test_on_the_way_out_nothing_begins_any_more(void)
+static void test_nothing_begins_during_shutdown(void)
 {
     unsigned waits = 0;
     run_some(250);
@@ -696,7 +697,7 @@ int main(void)
     RUN_TEST(test_disable_and_stop_when_there_is_nothing_to_do);
     RUN_TEST(test_upload_while_running_changes_nothing);
     RUN_TEST(test_a_refused_image_leaves_the_old_program);
-    RUN_TEST(test_what_is_told_of_the_program);
+    RUN_TEST(test_what_is_reported_of_the_program);
     RUN_TEST(test_the_active_image_can_be_read_back);
     RUN_TEST(test_configuration_only_while_off_and_same_values_cost_nothing);
     RUN_TEST(test_the_period_changes_everywhere);
@@ -707,13 +708,13 @@ int main(void)
     RUN_TEST(test_a_drive_that_restarts_while_off_is_configured_again);
     RUN_TEST(test_a_drive_that_is_gone_while_off_is_looked_for_again);
     RUN_TEST(test_a_busy_main_loop_ends_no_transfer);
-    RUN_TEST(test_a_check_tells_the_port_of_its_progress);
+    RUN_TEST(test_a_check_reports_its_progress_to_the_port);
     RUN_TEST(test_simulated_drives_are_awaited_and_hurried_while_something_moves);
     RUN_TEST(test_real_drives_are_never_awaited);
     RUN_TEST(test_late_ticks_of_a_run_are_counted);
     RUN_TEST(test_shutting_down_while_running_stops_on_the_path);
     RUN_TEST(test_shutting_down_at_any_instant);
-    RUN_TEST(test_on_the_way_out_nothing_begins_any_more);
+    RUN_TEST(test_nothing_begins_during_shutdown);
     RUN_TEST(test_whoever_insists_gets_the_quick_stop);
     RUN_TEST(test_a_hold_beyond_its_deadline);
     RUN_TEST(test_a_stop_beyond_its_deadline);

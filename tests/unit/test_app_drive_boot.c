@@ -74,7 +74,7 @@ static void test_a_drive_of_another_identity_is_refused(void)
     }
 }
 
-/* It says nothing of itself, but something is expected. */
+/* It reports no identity, but one is expected. */
 static void test_a_drive_without_identity_is_not_the_expected_one(void)
 {
     bench.drives[0].lacks[0] = 0x1018;
@@ -108,7 +108,7 @@ static void test_times_heartbeats_and_reactions(void)
     uint32_t counter = 0;
     boot();
     const struct od_drive *values = &drive(1)->values;
-    TEST_ASSERT_EQUAL_HEX32(0x00010000u + DRIVE_CONTROLLER_SILENT_MS,
+    TEST_ASSERT_EQUAL_HEX32(0x00010000u + DRIVE_CONTROLLER_TIMEOUT_MS,
                             values->consumer_heartbeat_time[0]);
     TEST_ASSERT_EQUAL_INT(3, values->abort_connection_option_code);
     TEST_ASSERT_EQUAL_INT(2, values->quick_stop_option_code);
@@ -201,7 +201,7 @@ static void test_a_fixed_mapping_passes_if_it_is_the_right_one(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
 }
 
-/* TPDO3 is a convenience: a drive that cannot is asked by SDO. */
+/* TPDO3 is not required: without it the inputs are read by SDO. */
 static void test_inputs_without_their_pdo(void)
 {
     drive(0)->lacks[0] = 0x1802;
@@ -233,7 +233,7 @@ static void test_inputs_by_their_pdo(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x201B, 1));
 }
 
-/* Each drive is asked a few times a second, not more. */
+/* Each drive is polled a few times a second, not more. */
 static void test_looking_costs_little(void)
 {
     boot();
@@ -299,7 +299,7 @@ static void test_a_mode_that_is_not_taken(void)
     boot();
 }
 
-static void test_a_value_that_is_refused_is_told(void)
+static void test_a_value_that_is_refused_is_reported(void)
 {
     drive(1)->refuses = 0x607D02;
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 2, 123, 4));
@@ -309,7 +309,7 @@ static void test_a_value_that_is_refused_is_told(void)
     boot();
 }
 
-static void test_a_node_that_is_given_twice_is_told(void)
+static void test_a_node_that_is_given_twice_is_reported(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 2, 2, 1));
     expect_trouble(2, 0x200502, SDO_ABORT_INCOMPATIBLE);
@@ -318,7 +318,7 @@ static void test_a_node_that_is_given_twice_is_told(void)
     TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2025, 1));
 }
 
-static void test_an_axis_at_the_controllers_own_node_is_told(void)
+static void test_an_axis_at_the_controllers_own_node_is_reported(void)
 {
     struct drive_boot attempt;
     struct config config = bench.controller.config;
@@ -332,7 +332,7 @@ static void test_an_axis_at_the_controllers_own_node_is_told(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_INCOMPATIBLE, attempt.trouble.abort_code);
 }
 
-static void test_what_a_drive_says_of_itself_is_kept(void)
+static void test_what_a_drive_reports_is_kept(void)
 {
     drive(1)->values.identity_object.vendor_id = 0x123;
     drive(1)->values.identity_object.serial_number = 99;
@@ -368,9 +368,9 @@ int main(void)
     RUN_TEST(test_a_drive_without_the_mode);
     RUN_TEST(test_a_device_of_another_profile);
     RUN_TEST(test_a_mode_that_is_not_taken);
-    RUN_TEST(test_a_value_that_is_refused_is_told);
-    RUN_TEST(test_a_node_that_is_given_twice_is_told);
-    RUN_TEST(test_an_axis_at_the_controllers_own_node_is_told);
-    RUN_TEST(test_what_a_drive_says_of_itself_is_kept);
+    RUN_TEST(test_a_value_that_is_refused_is_reported);
+    RUN_TEST(test_a_node_that_is_given_twice_is_reported);
+    RUN_TEST(test_an_axis_at_the_controllers_own_node_is_reported);
+    RUN_TEST(test_what_a_drive_reports_is_kept);
     return UNITY_END();
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the controller does when drives, bus or operator want something else than the program. Numbers of ticks are
+/* The reaction of the controller to drives, bus or operator that interrupt the program. Numbers of ticks are
  * those of docs/reference/architecture.md. */
 #include <string.h>
 
@@ -229,7 +229,7 @@ static void test_off_has_more_patience(void)
     TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2003, 1));
 }
 
-/* --- Drives that go their own way --- */
+/* --- Drives that do not follow --- */
 
 /* A heartbeat that stops while the drive follows: the stop is on the path, then all are off. */
 static void test_a_fault_with_all_drives_obeying_stops_on_the_path(void)
@@ -486,7 +486,7 @@ static void test_quick_stop_without_end_is_a_fault(void)
     drive(1)->position_counts += 2 * (int32_t)bench.controller.config.start_tolerance_counts;
     app_bench_periods(&bench, 2);
     refused(COMMAND_RESET, MACHINE_MOVING);
-    app_bench_periods(&bench, AXIS_REST_SYNCS);
+    app_bench_periods(&bench, AXIS_UNMOVED_SYNCS);
     recover();
 }
 
@@ -776,7 +776,7 @@ static void test_a_drive_that_does_not_follow_without_a_word(void)
     recover();
 }
 
-/* Without a window nothing is said on the way: but the program has not been run. */
+/* Without a window no deviation is reported during the motion: but the program has not been completed. */
 static void test_ready_means_at_the_target(void)
 {
     run_some(450);
@@ -864,7 +864,7 @@ static void test_a_fault_in_the_middle_of_a_write(void)
 
 /* --- Reset --- */
 
-/* A statusword that says Fault, for ever, and no EMCY with it: the mapping may be another one. */
+/* A statusword with Fault, for ever, and no EMCY with it: the mapping may be another one. */
 static void test_a_reset_configures_a_drive_that_speaks_nonsense(void)
 {
     run_some(100);
@@ -937,7 +937,7 @@ static void test_a_reset_with_one_more_axis_leads_to_boot(void)
 }
 
 /* The same fault of another drive is reported again. */
-static void test_each_fault_is_told(void)
+static void test_each_fault_is_reported(void)
 {
     switch_on();
     (void)cia402_device_fault(&drive(0)->state);
@@ -953,7 +953,7 @@ static void test_each_fault_is_told(void)
 }
 
 /* A host that has just reset the communication learns what is wrong without asking. */
-static void test_a_fault_that_stays_is_told_after_a_reset_of_the_communication(void)
+static void test_a_fault_that_stays_is_reported_after_a_reset_of_the_communication(void)
 {
     struct can_msg reset;
     nmt_master_command(NMT_RESET_COMMUNICATION, 1, &reset);
@@ -1019,7 +1019,7 @@ static void watch_host(uint32_t time_ms)
                             app_bench_write(&bench, 0x1016, 1, HOST_NODE << 16 | time_ms, 4));
 }
 
-static void test_a_host_that_falls_silent_stops_the_axes_on_the_path(void)
+static void test_a_host_that_stops_sending_stops_the_axes_on_the_path(void)
 {
     watch_host(100);
     run_some(50);
@@ -1111,7 +1111,7 @@ static void test_at_standstill_the_main_loop_may_take_its_time(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_a_host_that_falls_silent_stops_the_axes_on_the_path);
+    RUN_TEST(test_a_host_that_stops_sending_stops_the_axes_on_the_path);
     RUN_TEST(test_a_host_that_restarts_is_lost_too);
     RUN_TEST(test_a_host_is_watched_from_its_first_heartbeat_on);
     RUN_TEST(test_without_an_entry_no_host_is_watched);
@@ -1155,8 +1155,8 @@ int main(void)
     RUN_TEST(test_a_reset_while_the_cause_persists_gives_the_fault_again);
     RUN_TEST(test_a_reset_without_the_drive_leaves_it_to_boot);
     RUN_TEST(test_a_reset_with_one_more_axis_leads_to_boot);
-    RUN_TEST(test_each_fault_is_told);
-    RUN_TEST(test_a_fault_that_stays_is_told_after_a_reset_of_the_communication);
+    RUN_TEST(test_each_fault_is_reported);
+    RUN_TEST(test_a_fault_that_stays_is_reported_after_a_reset_of_the_communication);
     RUN_TEST(test_a_node_has_one_entry_in_1016);
     RUN_TEST(test_heartbeat_time_is_object_1016);
     RUN_TEST(test_an_error_that_was_cleared_is_not_the_cause_of_a_later_fault);

@@ -85,8 +85,8 @@ static void test_both(void)
     expect_nothing();
 }
 
-/* velocity(k) goes with the way from setpoint k-1 to setpoint k. */
-static void test_velocity_belongs_to_the_way_of_its_setpoint(void)
+/* velocity(k) belongs to the distance from setpoint k-1 to setpoint k. */
+static void test_velocity_belongs_to_the_distance_of_its_setpoint(void)
 {
     prepare(2);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
@@ -135,7 +135,7 @@ static void expect_pdo(uint16_t index, uint8_t sub, uint32_t value)
     TEST_ASSERT_EQUAL_HEX32(value, (uint32_t)app_bench_read(&bench, index, sub));
 }
 
-static void test_the_dictionary_says_what_is_sent_without_offsets(void)
+static void test_the_dictionary_describes_what_is_sent_without_offsets(void)
 {
     prepare(0);
     expect_pdo(0x1400, 1, 0x182);
@@ -150,7 +150,7 @@ static void test_the_dictionary_says_what_is_sent_without_offsets(void)
     expect_pdo(0x1A06, 1, 0);
 }
 
-static void test_the_dictionary_says_what_is_sent_with_offsets(void)
+static void test_the_dictionary_describes_what_is_sent_with_offsets(void)
 {
     prepare(3);
     expect_pdo(0x1A00, 0, 3);
@@ -173,10 +173,10 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_off);
     RUN_TEST(test_both);
-    RUN_TEST(test_velocity_belongs_to_the_way_of_its_setpoint);
+    RUN_TEST(test_velocity_belongs_to_the_distance_of_its_setpoint);
     RUN_TEST(test_nothing_while_held_and_off);
-    RUN_TEST(test_the_dictionary_says_what_is_sent_without_offsets);
-    RUN_TEST(test_the_dictionary_says_what_is_sent_with_offsets);
+    RUN_TEST(test_the_dictionary_describes_what_is_sent_without_offsets);
+    RUN_TEST(test_the_dictionary_describes_what_is_sent_with_offsets);
     RUN_TEST(test_gains_change_without_a_new_boot);
     return UNITY_END();
 }

@@ -159,7 +159,7 @@ static void test_an_axis_that_is_pushed_while_it_is_heard_keeps_it(void)
     TEST_ASSERT_TRUE(homed(1));
 }
 
-static void test_a_homing_that_is_broken_off_costs_the_axis_under_way_only(void)
+static void test_an_interrupted_homing_affects_only_the_axis_under_way(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2012, 2, 37, 1));
     boot();
@@ -379,7 +379,7 @@ int main(void)
     RUN_TEST(test_a_refused_start_ends_the_permission);
     RUN_TEST(test_a_fault_reset_keeps_it);
     RUN_TEST(test_an_axis_that_is_pushed_while_it_is_heard_keeps_it);
-    RUN_TEST(test_a_homing_that_is_broken_off_costs_the_axis_under_way_only);
+    RUN_TEST(test_an_interrupted_homing_affects_only_the_axis_under_way);
     RUN_TEST(test_a_homing_that_is_broken_off_loses_the_elder_zero);
     RUN_TEST(test_a_drive_that_restarts_loses_it);
     RUN_TEST(test_a_drive_that_restarts_while_it_is_configured_loses_it);

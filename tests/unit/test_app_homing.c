@@ -196,7 +196,7 @@ static void test_a_mode_that_is_not_taken_is_a_fault(void)
     expect_way_out();
 }
 
-static void test_a_silent_drive_is_a_fault(void)
+static void test_a_drive_that_stops_sending_is_a_fault(void)
 {
     want(1, 17, 0);
     boot();
@@ -238,7 +238,7 @@ static void test_stop_and_quick_stop_break_it_off(void)
     break_off(COMMAND_DISABLE);
 }
 
-static void test_time_for_the_way_there_and_back(void)
+static void test_time_for_the_whole_travel(void)
 {
     struct config config = {0};
     config.axis[2].homing_speed_towards_counts_s = 10000000;
@@ -251,7 +251,7 @@ static void test_time_for_the_way_there_and_back(void)
     TEST_ASSERT_EQUAL_UINT32(HOMING_MAX_S, homing_time_s(&config, 2));
 }
 
-/* Homed before, the drive says so until it receives the command to home again; frames of that command are lost. */
+/* A drive that was homed reports so until it receives the command to home again; frames of that command are lost. */
 static void test_an_old_success_is_not_taken_for_a_new_one(void)
 {
     want(1, 37, 1000);
@@ -281,9 +281,9 @@ int main(void)
     RUN_TEST(test_a_homing_error_is_a_fault);
     RUN_TEST(test_no_end_is_a_fault);
     RUN_TEST(test_a_mode_that_is_not_taken_is_a_fault);
-    RUN_TEST(test_a_silent_drive_is_a_fault);
+    RUN_TEST(test_a_drive_that_stops_sending_is_a_fault);
     RUN_TEST(test_stop_and_quick_stop_break_it_off);
-    RUN_TEST(test_time_for_the_way_there_and_back);
+    RUN_TEST(test_time_for_the_whole_travel);
     RUN_TEST(test_an_old_success_is_not_taken_for_a_new_one);
     return UNITY_END();
 }

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The table of handlers against the dictionary: what is computed is computed for every entry that says so. */
+/* The table of handlers against the dictionary: a value with a handler is computed for every entry of the row. */
 #include "app/objects.h"
 #include "canopen/sdo_abort.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Outputs of the path at an I/O module: through the dictionary, beside the positions of ideal drives, on a bus without delays. */
+/* Outputs of the path at an I/O module: through the dictionary, compared with the positions of ideal drives, on a bus
+ * without delays. */
 #include <string.h>
 
 #include "app/commands.h"
@@ -114,7 +115,8 @@ void tearDown(void)
 {
 }
 
-/* The outputs are those of the place where the axes are, at this very SYNC; the valve's places are no counts exactly. */
+/* The outputs are those of the place where the axes are, at this very SYNC; the valve's places are no counts
+ * exactly. */
 static void check_place(void)
 {
     const int32_t at = place_counts();
@@ -189,7 +191,7 @@ static void test_a_hold_at_any_instant_keeps_them(void)
     }
 }
 
-/* In mid-program, behind the places where both go on. */
+/* In mid-program, after the places where both switch on. */
 static void start_with_outputs_on(uint32_t behaviour)
 {
     configure(4, behaviour, 1);

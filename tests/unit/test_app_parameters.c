@@ -20,7 +20,7 @@
 
 #define FEED_UM_S   30000u
 #define OTHER_UM_S  40000u
-#define VALUES_AT   12u /* of the content: behind layout, CRC, flag */
+#define VALUES_AT   12u /* of the content: after layout, CRC, flag */
 #define CONTENT_MAX 2032u
 
 enum { STATE_NONE = 0, STATE_CONFIRMED = 1, STATE_RESTORED = 2 };
@@ -66,7 +66,7 @@ static uint32_t forget(void)
     return app_bench_write(&bench, 0x1011, 1, LOAD, 4);
 }
 
-/* Everything that is configured here beside the defaults; returns the CRC. */
+/* All values of these tests that differ from the defaults; returns the CRC. */
 static uint32_t configure(uint32_t feed_um_s)
 {
     write(0x2004, 2, feed_um_s, 4);
@@ -478,7 +478,7 @@ static void test_a_stored_node_number_holds_from_the_next_power_on(void)
     TEST_ASSERT_EQUAL_HEX32(0x605, read_u32(0x1200, 1));
     TEST_ASSERT_EQUAL_HEX32(0x85, read_u32(0x1014, 0));
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
-    TEST_ASSERT_EQUAL_HEX32(0x00050000u + DRIVE_CONTROLLER_SILENT_MS,
+    TEST_ASSERT_EQUAL_HEX32(0x00050000u + DRIVE_CONTROLLER_TIMEOUT_MS,
                             bench.drives[0].values.consumer_heartbeat_time[0]);
     write(0x2054, 0, 0, 1);
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, save());

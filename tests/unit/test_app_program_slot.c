@@ -112,7 +112,7 @@ static void test_a_truncated_image_is_refused_though_the_bank_holds_more(void)
     expect_active(image);
 }
 
-static void test_a_refusal_says_what_and_where(void)
+static void test_a_refusal_names_error_and_place(void)
 {
     image[200 + 28] = 1; /* c2 of piece 0 is 2^-8 mm: it does not begin at rest */
     app_image_seal(image);
@@ -233,7 +233,7 @@ int main(void)
     RUN_TEST(test_a_check_lets_the_main_loop_give_signs_of_life);
     RUN_TEST(test_an_upload_may_break_off_anywhere);
     RUN_TEST(test_a_truncated_image_is_refused_though_the_bank_holds_more);
-    RUN_TEST(test_a_refusal_says_what_and_where);
+    RUN_TEST(test_a_refusal_names_error_and_place);
     RUN_TEST(test_what_the_store_cannot_take);
     RUN_TEST(test_a_new_configuration_is_applied_to_the_old_program);
     RUN_TEST(test_the_records_are_those_of_the_kernel);

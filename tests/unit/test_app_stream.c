@@ -647,7 +647,8 @@ static uint32_t act_at_random(uint32_t next)
     }
 }
 
-/* Every setpoint is on the path, and no further from the one before than the feed allows; the path is not left backwards. */
+/* Every setpoint is on the path, and no further from the one before than the feed allows; the path is not left
+ * backwards. */
 static void expect_path(void)
 {
     for (uint32_t k = 1; k < bench.recorded; ++k) {
@@ -785,7 +786,8 @@ static void test_another_configuration_refuses_start_and_chunks(void)
     command(COMMAND_START);
 }
 
-/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job runs. */
+/* The tick comes to the end of the records: no point, so the drives stop by themselves; a reset, and the next job
+ * runs. */
 static void test_a_main_loop_that_makes_no_records(void)
 {
     expect_sent(&parts[0]);
@@ -804,7 +806,7 @@ static void test_a_main_loop_that_makes_no_records(void)
 }
 
 /* The motion is followed with the records that there are in the cache of a small controller. */
-static void test_the_motion_asks_for_records(void)
+static void test_the_motion_requests_records(void)
 {
     expect_sent(&parts[0]);
     command(COMMAND_START);
@@ -904,7 +906,7 @@ static void test_a_dwell_takes_its_ticks(void)
 }
 
 /* Comes in the dwell, or long after it: an underrun, and no second dwell. */
-static void test_a_chunk_behind_a_rest_may_be_late(void)
+static void test_a_chunk_after_a_rest_may_be_late(void)
 {
     const struct chunk_plan second = behind_rest(200, 0);
     for (uint32_t late = 0; late < 500; late += 111) {
@@ -999,7 +1001,7 @@ static void test_a_stop_in_a_dwell_ends_the_job(void)
     }
 }
 
-static void test_what_is_behind_a_rest_has_to_fit(void)
+static void test_what_follows_a_rest_has_to_fit(void)
 {
     struct chunk_plan second = behind_rest(0, 0);
     const struct chunk_plan moving = {
@@ -1019,7 +1021,7 @@ static void test_what_is_behind_a_rest_has_to_fit(void)
 }
 
 /* The end of a tail is an end too. */
-static void test_a_rest_behind_a_tail(void)
+static void test_a_rest_after_a_tail(void)
 {
     struct chunk_plan first = path_1;
     const struct chunk_plan second = behind_rest(20, 0);
@@ -1096,15 +1098,15 @@ int main(void)
     RUN_TEST(test_the_power_takes_the_job_away);
     RUN_TEST(test_another_configuration_refuses_start_and_chunks);
     RUN_TEST(test_a_main_loop_that_makes_no_records);
-    RUN_TEST(test_the_motion_asks_for_records);
+    RUN_TEST(test_the_motion_requests_records);
     RUN_TEST(test_a_dwell_takes_its_ticks);
-    RUN_TEST(test_a_chunk_behind_a_rest_may_be_late);
+    RUN_TEST(test_a_chunk_after_a_rest_may_be_late);
     RUN_TEST(test_a_program_stop_waits_for_resume);
     RUN_TEST(test_an_optional_stop_has_a_switch);
     RUN_TEST(test_commands_in_a_dwell);
     RUN_TEST(test_a_stop_in_a_dwell_ends_the_job);
-    RUN_TEST(test_what_is_behind_a_rest_has_to_fit);
-    RUN_TEST(test_a_rest_behind_a_tail);
+    RUN_TEST(test_what_follows_a_rest_has_to_fit);
+    RUN_TEST(test_a_rest_after_a_tail);
     RUN_TEST(test_override_over_a_rest);
     RUN_TEST(test_a_small_ring);
     return UNITY_END();

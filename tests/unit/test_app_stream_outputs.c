@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Outputs of a job in chunks at an I/O module: each event of the job acts once, at its place, whenever the chunks come. */
+/* Outputs of a job in chunks at an I/O module: each event of the job acts once, at its place, whenever the chunks
+ * come. */
 #include "app/commands.h"
 #include "app/stream.h"
 #include "app_bench.h"
@@ -232,8 +233,8 @@ static void send_rounds(void)
     send(&second, X_MM + ROUND_UM / 1000, 101);
 }
 
-/* Those at the end of a path act with its last setpoint, those at the start of the next one with its first: behind the dwell. They
- * stay in the dwell, where nothing is missing. */
+/* Those at the end of a path act with its last setpoint, those at the start of the next one with its first: after the
+ * dwell. They stay in the dwell, where nothing is missing. */
 static void test_outputs_over_a_rest(void)
 {
     for (uint32_t behaviour = 0; behaviour <= OFF_IN_HOLD; behaviour += OFF_IN_HOLD) {

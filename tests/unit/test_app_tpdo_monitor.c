@@ -34,7 +34,8 @@ static uint32_t sync(unsigned count)
     return tpdo_monitor_close_sync(&monitor, now_us, sync_us, wait_us, missed_max);
 }
 
-/* What the tick uses has to do exactly what tpdo_monitor_close_sync does, wherever it says that it has done it. */
+/* tpdo_monitor_close_answered, which the tick uses, has the effect of tpdo_monitor_close_sync whenever it returns true.
+ * */
 static void test_the_quick_end_of_a_sync_is_the_same_as_the_thorough_one(void)
 {
     static const uint8_t counts[] = {1, 1, 0, 1, 2, 1, 0, 0, 3, 1, 1, 0, 0, 0, 1, 1, 2, 0, 1, 5, 1};

@@ -69,7 +69,7 @@ static void test_settled_is_within_the_window(void)
     TEST_ASSERT_FALSE(axis_motion_settled(&axis, 99));
 }
 
-static void test_stop_works_both_ways(void)
+static void test_stop_works_in_both_directions(void)
 {
     for (int k = 1; k <= 10; k++) {
         axis_motion_follow(&axis, -2000000 - 5000 * k);
@@ -92,8 +92,8 @@ static void test_stop_ends_with_the_smallest_deceleration(void)
     TEST_ASSERT_TRUE(axis_motion_ramp(&axis, 0, 0));
 }
 
-/* The brake is as strong as the motor: 5 V of 83 rad/s/V over 0.2 s take 3310 mm/s^2, and the
- * damping helps. From 50 mm/s the way is below v^2 / 2a = 0.38 mm. */
+/* The brake is as strong as the motor: 5 V of 83 rad/s/V over 0.2 s take 3310 mm/s^2, and the damping helps. From 50
+ * mm/s the braking distance is below v^2 / 2a = 0.38 mm. */
 static void test_without_power_the_brake_stops_the_motor(void)
 {
     for (int k = 1; k < 200; k++) {
@@ -109,7 +109,7 @@ static void test_without_power_the_brake_stops_the_motor(void)
     const int32_t position = axis_motion_position(&axis);
     TEST_ASSERT_GREATER_THAN_INT(10, periods);
     TEST_ASSERT_INT32_WITHIN(60000, 340000, position - from);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&axis));
     for (int k = 0; k < 300; k++) {
         TEST_ASSERT_TRUE(axis_motion_hold(&axis));
         TEST_ASSERT_EQUAL_INT32(position, axis_motion_position(&axis));
@@ -185,7 +185,7 @@ int main(void)
     RUN_TEST(test_stop_is_a_ramp_of_the_deceleration);
     RUN_TEST(test_targets_saturate);
     RUN_TEST(test_settled_is_within_the_window);
-    RUN_TEST(test_stop_works_both_ways);
+    RUN_TEST(test_stop_works_in_both_directions);
     RUN_TEST(test_stop_ends_with_the_smallest_deceleration);
     RUN_TEST(test_without_power_the_brake_stops_the_motor);
     RUN_TEST(test_a_load_stronger_than_the_brake_moves_it);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h). The
- * chunks are cut from golden programs (chunked.h), so that the whole program says which setpoints are right.
+ * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h).
+ * The chunks are cut from golden programs (chunked.h), so that the whole program gives the right setpoints.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -213,7 +213,7 @@ static void test_any_byte_of_the_shared_part_is_compared(void)
     expect_shared_bytes_compared();
     TEST_ASSERT_TRUE(chunks[1].shared_segments > 1u && chunks[1].shared_pieces == 28u);
     const struct layout r = layout_of_next();
-    const struct program_fault fault = /* behind the joint: the rules of a program */
+    const struct program_fault fault = /* after the joint: the rules of a program */
         fault_with_bit(r.pieces_at + chunks[1].shared_pieces * r.piece_size + 17u);
     TEST_ASSERT_TRUE(fault.code > PROGRAM_ERR_CHUNK_FORMAT && fault.code < 0);
 }
@@ -321,7 +321,7 @@ static uint32_t shared_events(void)
            program_first_event_from(before, chunks[1].arc_shift_q40_mm);
 }
 
-/* Any bit of those on the shared segments; one behind them is an event of the next chunk alone. */
+/* Any bit of those on the shared segments; one after them is an event of the next chunk alone. */
 static void test_events_of_the_shared_part_are_the_predecessors(void)
 {
     struct program_fault fault;
@@ -393,7 +393,7 @@ static void test_one_event_more_or_less_is_refused(void)
     cut_in_two();
     TEST_ASSERT_EQUAL_INT(0, check_chunk(0, &fault));
     change_events(1, shared,
-                  0); /* the first one behind the predecessor's end: nothing to compare with */
+                  0); /* the first one after the predecessor's end: nothing to compare with */
     TEST_ASSERT_EQUAL_INT(0, check_chunk(1, &fault));
 }
 
@@ -615,8 +615,8 @@ static void test_no_takeover_while_a_stop_or_a_search_is_under_way(void)
     TEST_ASSERT_FALSE(take_over(&m)); /* a window is evaluated */
 }
 
-/* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the joint.
- * Returns 0 where it is refused. */
+/* In a ramp: a takeover gives the setpoints that this chunk would have had, and only where the ramp ends before the
+ * joint. Returns 0 where it is refused. */
 static int goes_on_in_ramp(const struct motion *m)
 {
     struct motion branch = *m;
@@ -712,7 +712,7 @@ static void test_the_tail_ends_at_rest_and_the_motion_goes_on_from_there(void)
     golden_discard(&exact);
 }
 
-/* Commands while it waits at the end of a tail, or on the way there. */
+/* Commands while it waits at the end of a tail, or moves there. */
 static void test_commands_at_the_end_of_a_tail(void)
 {
     struct motion m;

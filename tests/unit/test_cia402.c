@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Both sides of the CiA 402 state machine, each against the standard's tables and against each
- * other. */
+/* Both sides of the CiA 402 state machine, each against the standard's tables and against each other. */
 #include "canopen/cia402.h"
 
 #include "canopen/cia402_device.h"
@@ -315,7 +314,7 @@ static void test_master_stays_at_its_goal(void)
     }
 }
 
-static void test_master_leaves_a_fault_only_when_told(void)
+static void test_master_leaves_a_fault_only_by_command(void)
 {
     for (unsigned lag = 0; lag < 3; lag++) {
         put_in(CIA402_FAULT);
@@ -328,7 +327,8 @@ static void test_master_leaves_a_fault_only_when_told(void)
     }
 }
 
-/* Transitions of CiA 402-2 by goal, one letter a state: 6, 7, F are the commands, 0 and Q off and quick stop, R reset. */
+/* Transitions of CiA 402-2 by goal, one letter a state: 6, 7, F are the commands, 0 and Q off and quick stop, R
+ * reset. */
 static void test_master_commands_are_those_of_the_standard(void)
 {
     static const char *const letters[CIA402_GOALS] = {"00000000", "06666000", "06777000",
@@ -391,7 +391,7 @@ int main(void)
     RUN_TEST(test_master_reaches_each_goal_from_each_state);
     RUN_TEST(test_master_enables_in_three_steps);
     RUN_TEST(test_master_stays_at_its_goal);
-    RUN_TEST(test_master_leaves_a_fault_only_when_told);
+    RUN_TEST(test_master_leaves_a_fault_only_by_command);
     RUN_TEST(test_master_commands_are_those_of_the_standard);
     RUN_TEST(test_master_quick_stop);
     RUN_TEST(test_modes);

@@ -146,7 +146,7 @@ static void test_records_of_a_window(void)
     const struct coefficients_window *w = coefficient_cache_prepare(&cache, &plain, &place);
     TEST_ASSERT_NOT_NULL(w);
     TEST_ASSERT_EQUAL_UINT32(9, w->first_piece);
-    TEST_ASSERT_EQUAL_UINT32(2, w->first_segment); /* one behind */
+    TEST_ASSERT_EQUAL_UINT32(2, w->first_segment); /* one before */
     TEST_ASSERT_TRUE(w->piece_count >= 3u && w->segment_count >= 3u);
     TEST_ASSERT_NULL(coefficients_window_piece(w, 8));
     TEST_ASSERT_NULL(coefficients_window_piece(w, 9u + w->piece_count));
@@ -175,7 +175,7 @@ static void test_records_of_a_window(void)
     close();
 }
 
-/* The main loop stands still: the setpoints go on to the end of the window, then there is none. */
+/* The main loop stalls: setpoints continue to the end of the window, then there is none. */
 static void test_a_record_that_is_not_there_refuses_the_tick(void)
 {
     const struct kernel *kernel = kernel_find(KERNEL_FIXED);
@@ -201,7 +201,7 @@ static void test_a_record_that_is_not_there_refuses_the_tick(void)
     }
 }
 
-/* Before it is so far, the motion has said that it wants more. */
+/* Before that the motion has requested more records. */
 static void test_it_wants_records_in_the_middle_of_the_window(void)
 {
     const struct kernel *kernel = kernel_find(KERNEL_FIXED);

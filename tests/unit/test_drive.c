@@ -111,7 +111,7 @@ static void test_sampling_converges_to_the_continuous_loop(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.3, 4.0, usual / fine);
 }
 
-/* A drive of the figures of drive_bench beside one of `config`, in either order. */
+/* A drive of the figures of drive_bench together with one of `config`, in either order. */
 static void check_pair(void)
 {
     struct drive b = made();
@@ -188,7 +188,7 @@ static void test_parked_drive_does_not_move(void)
     TEST_ASSERT_INT32_WITHIN(5, -1234567, position);
 }
 
-/* Whatever way an axis came, once parked it has the state of one placed there. */
+/* After any motion a parked axis has the state of one placed there. */
 static void test_parks_after_250_periods_in_the_same_state(void)
 {
     struct drive d = made(), placed = made();
@@ -260,7 +260,7 @@ static void test_volts_saturate_on_a_jump(void)
     TEST_ASSERT_INT32_WITHIN(20, 1000000, drive_position_counts(&d));
 }
 
-/* Still on its way after 250 periods of one target: not parked, from either side. */
+/* Still moving after 250 periods of one target: not parked, from either side. */
 static void test_far_from_the_target_is_not_parked(void)
 {
     for (int sign = -1; sign <= 1; sign += 2) {
@@ -341,7 +341,7 @@ static void test_speed_by_differences_and_delay(void)
     }
 }
 
-/* The paper's loop is slow beside a sample: the motion is nearly the same, but its bits differ. */
+/* The paper's loop is slow compared with a sample: the motion is nearly the same, but its bits differ. */
 static void test_sensing_changes_little(void)
 {
     struct drive plain = made();

@@ -256,7 +256,7 @@ static void test_silence_stops_the_drive(void)
     TEST_ASSERT_EQUAL_HEX16(EMCY_NO_ERROR, emcy.code);
 }
 
-/* One long gap is this process asleep, not the bus silent. */
+/* One long gap means that this process slept, not that the bus had no frames. */
 static void test_a_sleeping_process_is_no_silence(void)
 {
     enable();

@@ -165,7 +165,7 @@ static void test_halt_holds_homing_up(void)
     TEST_ASSERT_EQUAL_HEX16(DONE, home());
 }
 
-static void test_disabled_on_the_way(void)
+static void test_disabled_while_enabling(void)
 {
     prepare(17, 0);
     bench.word = START;
@@ -173,7 +173,7 @@ static void test_disabled_on_the_way(void)
     bench.word = CIA402_DISABLE_VOLTAGE;
     drive_bench_run(100);
     TEST_ASSERT_EQUAL_HEX16(NOT_STARTED, drive_bench_statusword() & HOMING_BITS);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&bench.node.servo.axis));
 }
 
 static void test_modes_change_at_rest_only(void)
@@ -251,7 +251,7 @@ int main(void)
     RUN_TEST(test_the_wrong_end_is_an_error);
     RUN_TEST(test_interrupted_and_begun_again);
     RUN_TEST(test_halt_holds_homing_up);
-    RUN_TEST(test_disabled_on_the_way);
+    RUN_TEST(test_disabled_while_enabling);
     RUN_TEST(test_modes_change_at_rest_only);
     RUN_TEST(test_no_homing_while_setpoints_move);
     RUN_TEST(test_without_sync);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* What the drive watches: following error, switches, software limits, overload, supply, encoder,
+/* What the drive supervises: following error, switches, software limits, overload, supply, encoder,
  * deadlines, short frames; and its objects for scaling, feedforward and actual values. */
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
@@ -119,7 +119,7 @@ static void test_an_encoder_that_fails(void)
     TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state()); /* nothing to stop with */
     drive_bench_expect_emcy(EMCY_POSITION_SENSOR_1, EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
     drive_bench_run(100);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&bench.node.servo.axis));
     reset(CIA402_FAULT);
     drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FAULT}, false);
     reset(CIA402_SWITCH_ON_DISABLED);

@@ -36,7 +36,7 @@ static void put(uint16_t index, int64_t value)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(index, 0, value));
 }
 
-/* Periods until the state is left; the axis' way meanwhile in counts. */
+/* Periods until the state is left; the distance of the axis meanwhile in counts. */
 static int32_t way;
 static int leave(enum cia402_state from)
 {
@@ -146,7 +146,8 @@ static void test_quick_stop_codes(void)
     }
 }
 
-/* Way of a motor that is braked from `speed` mm/s with constant volts, mm: the solution of its equation (plant/motor.h). */
+/* Braking distance of a motor from `speed` mm/s with constant volts, mm: the solution of its equation
+ * (plant/motor.h). */
 static double braking_way_mm(double speed_mm_s, double volts)
 {
     const struct drive_plant *plant = &drive_bench_config.plant;
@@ -290,13 +291,13 @@ static void test_a_stop_ends_when_the_motor_stands(void)
     drive_bench_run(reference + 10);
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
     TEST_ASSERT_EQUAL_INT64(0, bench.node.servo.axis.speed_counts_period);
-    TEST_ASSERT_FALSE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_FALSE(axis_motion_at_standstill(&bench.node.servo.axis));
     (void)leave(CIA402_QUICK_STOP_ACTIVE);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
     TEST_ASSERT_INT32_WITHIN(1000000, 0, axis_motion_speed(&bench.node.servo.axis));
 }
 
-/* A motor that never comes to rest is left to its brake after a second. */
+/* After a second the brake has to stop a motor that never stands. */
 static void test_patience_ends(void)
 {
     put(0x605A, 6);
@@ -319,11 +320,11 @@ static void test_power_off_is_the_brake(void)
     drive_bench_run(1);
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
     drive_bench_run(50);
-    TEST_ASSERT_TRUE(axis_motion_at_rest(&bench.node.servo.axis));
+    TEST_ASSERT_TRUE(axis_motion_at_standstill(&bench.node.servo.axis));
     TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.servo.axis) - from);
 }
 
-static void test_reset_says_no_error(void)
+static void test_reset_reports_no_error(void)
 {
     drive_bench_enable();
     drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x4210}, true);
@@ -385,7 +386,8 @@ static void test_error_behaviour(void)
     }
 }
 
-/* A heartbeat just before time passes for the node: what has passed before it is no silence. Never early, one nap late. */
+/* A heartbeat just before time passes for the node: what has passed before it does not count. Never early, one nap
+ * late. */
 static void test_the_masters_heartbeat_is_not_missed_early(void)
 {
     struct can_msg beat;
@@ -447,7 +449,7 @@ int main(void)
     RUN_TEST(test_a_stop_ends_when_the_motor_stands);
     RUN_TEST(test_patience_ends);
     RUN_TEST(test_power_off_is_the_brake);
-    RUN_TEST(test_reset_says_no_error);
+    RUN_TEST(test_reset_reports_no_error);
     RUN_TEST(test_abort_connection_codes);
     RUN_TEST(test_error_behaviour);
     RUN_TEST(test_the_masters_heartbeat_is_not_missed_early);

@@ -96,7 +96,7 @@ static void give_write(uint8_t node, uint16_t index, uint8_t sub, uint32_t value
     cob_put(data + 1, index, 2);
     data[3] = sub;
     cob_put(data + 4, value, 4);
-    give((uint32_t)COB_SDO_ASK + node, data, sizeof data);
+    give((uint32_t)COB_SDO_REQUEST + node, data, sizeof data);
 }
 
 /* The next frame of the drives with this identifier; others are passed over. False: there is none. */
@@ -190,9 +190,9 @@ static void test_filters_are_what_the_drives_want(void)
     expect_match(&filters[0], COB_NMT, CAN_ID_MAX);
     expect_match(&filters[1], COB_SYNC, CAN_ID_MAX);
     expect_match(&filters[2], COB_HEARTBEAT, 0x780);
-    expect_match(&filters[3], COB_SDO_ASK + FIRST, CAN_ID_MAX);
+    expect_match(&filters[3], COB_SDO_REQUEST + FIRST, CAN_ID_MAX);
     expect_match(&filters[4], COB_RPDO1 + FIRST, CAN_ID_MAX);
-    expect_match(&filters[5], COB_SDO_ASK + SECOND, CAN_ID_MAX);
+    expect_match(&filters[5], COB_SDO_REQUEST + SECOND, CAN_ID_MAX);
     expect_match(&filters[6], COB_RPDO1 + SECOND, CAN_ID_MAX);
     TEST_ASSERT_EQUAL_UINT16(7, next_filters(LOCAL_BUS_FILTER).count);
     TEST_ASSERT_FALSE(drives.nodes[0].pdos.moved || drives.nodes[1].pdos.moved);
@@ -302,7 +302,7 @@ static void test_boot_up_and_answers(void)
     TEST_ASSERT_TRUE(next_frame(COB_HEARTBEAT + SECOND, &frame));
     give_write(SECOND, 0x1017, 0, 0);
     (void)drives_receive(&drives);
-    TEST_ASSERT_TRUE(next_frame(COB_SDO_ANSWER + SECOND, &frame));
+    TEST_ASSERT_TRUE(next_frame(COB_SDO_RESPONSE + SECOND, &frame));
 }
 
 static void test_only_acyclic_frames_want_process(void)
@@ -323,7 +323,7 @@ static void test_only_acyclic_frames_want_process(void)
     TEST_ASSERT_TRUE(drives_receive(&drives));
 }
 
-/* In a flood the wall clock goes on, too. */
+/* In a flood the wall clock advances as well. */
 static void test_so_many_frames_at_a_time(void)
 {
     struct local_bus_frame rest;

@@ -134,8 +134,8 @@ static void test_a_piece_stays_between_its_ends(void)
     }
 }
 
-/* With the largest coefficients nothing leaves 64 bits (the sanitizer looks). */
-static void test_the_way_of_extreme_coefficients(void)
+/* With the largest coefficients nothing leaves 64 bits (checked by the sanitizer). */
+static void test_the_distance_of_extreme_coefficients(void)
 {
     struct program_piece c = {.duration_q32_s = UINT64_C(1) << 32};
     for (int k = 0; k < 7; k++) {
@@ -172,7 +172,7 @@ int main(void)
     RUN_TEST(test_ends);
     RUN_TEST(test_extreme_durations);
     RUN_TEST(test_a_piece_stays_between_its_ends);
-    RUN_TEST(test_the_way_of_extreme_coefficients);
+    RUN_TEST(test_the_distance_of_extreme_coefficients);
     RUN_TEST(test_what_cannot_be_decided_is_refused);
     return UNITY_END();
 }

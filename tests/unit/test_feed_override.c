@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* When a hold may begin at once: far from the end of the program, by the worst stops of its header, or where it fits before
- * the end of the path. */
+/* When a hold may begin at once: far from the end of the program, by the worst stops of its header, or where it fits
+ * before the end of the path. */
 #include "core/feed_override.h"
 
 #include "golden.h"
@@ -52,7 +52,7 @@ static int brakes_at_once(int64_t left_um, uint32_t worst_um, uint32_t worst_us)
     return feed_override_actual_q30(&feed) == 0u;
 }
 
-/* As long as the way that is left is enough: not when a micrometre of it is missing. */
+/* As long as the remaining distance is enough: not when a micrometre of it is missing. */
 static void test_way_to_the_end(void)
 {
     TEST_ASSERT_TRUE(brakes_at_once(SHORT_UM, SHORT_UM, 0));

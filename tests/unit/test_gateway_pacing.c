@@ -73,7 +73,7 @@ static void test_ticks_that_await_nobody_follow_the_clock(void)
     TEST_ASSERT_EQUAL_UINT64(1000u * MS, now_ns - began_ns);
 }
 
-static void test_a_late_board_is_told_how_late(void)
+static void test_a_late_board_gets_its_lateness(void)
 {
     request(EXCHANGE_TICK);
     (void)wait_out();
@@ -148,7 +148,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_filters_and_the_end_are_answered_at_once);
     RUN_TEST(test_ticks_that_await_nobody_follow_the_clock);
-    RUN_TEST(test_a_late_board_is_told_how_late);
+    RUN_TEST(test_a_late_board_gets_its_lateness);
     RUN_TEST(test_frames_are_handed_on_while_they_are_awaited);
     RUN_TEST(test_without_answers_the_guard_time_passes);
     RUN_TEST(test_a_stall_hardly_counts_as_guard_time);

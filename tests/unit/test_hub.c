@@ -216,8 +216,7 @@ static void test_paths_of_killed_hubs_are_served_again(void)
     TEST_ASSERT_NOT_EQUAL(0, access(own, F_OK));
     hub_close(&second);
     (void)unlink(left);
-    TEST_ASSERT_EQUAL(0,
-                      mkdir(left, 0700)); /* no socket: it stays, and nothing is left beside it */
+    TEST_ASSERT_EQUAL(0, mkdir(left, 0700)); /* no socket: it stays, and no other file is left */
     TEST_ASSERT_EQUAL(-EADDRINUSE, hub_open(&second, paths, 1, (struct hub_options){0}, &failed));
     TEST_ASSERT_NOT_EQUAL(0, access(own, F_OK));
     TEST_ASSERT_EQUAL(0, rmdir(left));

@@ -140,7 +140,7 @@ static void take_four(struct can_socket *listener, struct can_msg got[CAN_SOCKET
     can_socket_close(listener);
 }
 
-static void test_time_passes_as_asked_and_not_otherwise(void)
+static void test_time_passes_as_requested_and_not_otherwise(void)
 {
     const uint64_t begin_ns = clock_ns();
     TEST_ASSERT_EQUAL_UINT64(VIRTUAL_TIME_BEGIN_NS, begin_ns);
@@ -186,7 +186,7 @@ static void test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_orde
 }
 
 /* So two that answer each other at once leave room for the others. */
-static void test_an_answer_comes_behind_what_waits_already(void)
+static void test_an_answer_comes_after_waiting_frames(void)
 {
     struct pollfd fds = {.fd = mine.fd, .events = POLLIN};
     struct can_msg got[CAN_SOCKET_BATCH];
@@ -205,7 +205,8 @@ static void test_an_answer_comes_behind_what_waits_already(void)
     TEST_ASSERT_EQUAL(0x302, got[3].id);
 }
 
-/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too long. */
+/* What a connection of no participant, as a recorder's, finds in its socket: the sum of the frames, each packet not too
+ * long. */
 static int frames_in(int fd)
 {
     struct local_bus_frame packet[LOCAL_BUS_PACKET + 1u];
@@ -520,7 +521,7 @@ static void test_a_signal_before_the_wait_ends_it_too(void)
     TEST_ASSERT_EQUAL_UINT64(begin_ns + 1000u, clock_ns());
 }
 
-static void test_the_others_are_told_who_leaves(void)
+static void test_the_others_are_notified_who_leaves(void)
 {
     say_wait(&other, LOCAL_BUS_NEVER);
     clock_leave();
@@ -550,10 +551,10 @@ static void test_another_version_is_refused(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_time_passes_as_asked_and_not_otherwise);
+    RUN_TEST(test_time_passes_as_requested_and_not_otherwise);
     RUN_TEST(test_a_frame_takes_its_bits_and_wakes);
     RUN_TEST(test_the_lowest_identifier_goes_first_and_equal_ones_keep_their_order);
-    RUN_TEST(test_an_answer_comes_behind_what_waits_already);
+    RUN_TEST(test_an_answer_comes_after_waiting_frames);
     RUN_TEST(test_many_frames_come_in_packets_and_in_order);
     RUN_TEST(test_one_that_slept_beside_a_busy_bus_gets_its_grant);
     RUN_TEST(test_frames_that_wake_nobody_are_not_lost_however_many);
@@ -566,7 +567,7 @@ int main(void)
     RUN_TEST(test_a_descriptor_of_ones_own_ends_the_wait_at_once);
     RUN_TEST(test_a_signal_ends_the_wait);
     RUN_TEST(test_a_signal_before_the_wait_ends_it_too);
-    RUN_TEST(test_the_others_are_told_who_leaves);
+    RUN_TEST(test_the_others_are_notified_who_leaves);
     RUN_TEST(test_the_end_of_the_hub_is_noticed);
     RUN_TEST(test_another_version_is_refused);
     return UNITY_END();

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/influence.h: what acts on an axis beside its setpoints. */
+/* Tests of plant/influence.h: what acts on an axis in addition to its setpoints. */
 #include "plant/influence.h"
 
 #include <math.h>
@@ -53,7 +53,7 @@ static void test_nothing_has_the_bits_of_the_plain_drive(void)
     nothing_has_the_bits_of_the_plain_drive();
 }
 
-static void test_nor_has_it_others_with_everything_that_may_be_asked_for(void)
+static void test_nor_has_it_others_with_everything_that_may_be_configured(void)
 {
     struct drive_config config = drive_bench_config;
     config.interpolation = DRIVE_CUBIC;
@@ -117,9 +117,8 @@ static void test_velocity_offset_takes_the_lag_away(void)
     TEST_ASSERT_TRUE(fabs(left_um) < 0.1 * fabs(lag_um));
 }
 
-/* Accelerating by a takes T a / (g K) volts more than the speed. Without an integral and without
- * the paper's feedforward the following error has to make them; as torque offset they come by
- * themselves. */
+/* Accelerating by a takes T a / (g K) volts more than the speed. Without an integral and without the paper's
+ * feedforward the following error has to make them; as torque offset they come by themselves. */
 static void test_torque_offset_helps_to_accelerate(void)
 {
     const double mm_s2 = 1000.0;
@@ -182,7 +181,7 @@ static void test_a_frozen_and_a_jumped_encoder(void)
     TEST_ASSERT_TRUE(other.state.motor.position_mm > 1.0); /* it runs away */
 }
 
-/* 2 / 1 for 3 s fills (4 - 1) * 3 s; at rest it empties by one second a second. */
+/* 2 / 1 for 3 s fills (4 - 1) * 3 s; without load it empties by one second a second. */
 static void test_overload(void)
 {
     struct overload overload;
@@ -212,7 +211,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_nothing_has_the_bits_of_the_plain_drive);
-    RUN_TEST(test_nor_has_it_others_with_everything_that_may_be_asked_for);
+    RUN_TEST(test_nor_has_it_others_with_everything_that_may_be_configured);
     RUN_TEST(test_each_figure_acts);
     RUN_TEST(test_a_load_is_held_by_the_integral);
     RUN_TEST(test_velocity_offset_takes_the_lag_away);

@@ -28,7 +28,7 @@ static struct {
     char text[SENT_MAX];
 } model;
 
-/* The port asks for the registers at each access: what it has written last is taken then. */
+/* The port gets the registers at each access: the value written last is taken then. */
 static void *uart_model(void)
 {
     if (model.registers.data != NOTHING_WRITTEN) {
@@ -82,7 +82,7 @@ void interrupts_receive(const struct can_msg *message)
     (void)message;
 }
 
-/* The other end takes so many characters, and the transmitter asks for more. */
+/* The other end takes so many characters, and the transmitter's interrupt requests more. */
 static void let_out(uint32_t characters)
 {
     model.room += characters;

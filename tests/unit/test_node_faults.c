@@ -199,7 +199,7 @@ static void test_code_is_a_fault(void)
     TEST_ASSERT_EQUAL_HEX16(0x4210, drive_bench_read(0x603F, 0));
 }
 
-static void test_a_second_error_in_a_fault_is_told_too(void)
+static void test_a_second_error_in_a_fault_is_reported_as_well(void)
 {
     drive_bench_enable();
     drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x4210}, true);
@@ -232,7 +232,7 @@ int main(void)
     RUN_TEST(test_restart_boots);
     RUN_TEST(test_heartbeat_stop);
     RUN_TEST(test_code_is_a_fault);
-    RUN_TEST(test_a_second_error_in_a_fault_is_told_too);
+    RUN_TEST(test_a_second_error_in_a_fault_is_reported_as_well);
     RUN_TEST(test_saturate);
     RUN_TEST(test_a_rule_acts_on_its_drive_for_its_ticks);
     RUN_TEST(test_every_kind_of_rule);

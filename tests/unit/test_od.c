@@ -43,7 +43,7 @@ static void test_finds_every_entry_and_no_other(void)
     TEST_ASSERT_NULL(od_find(&small.od, 0xFFFF, 0xFF));
 }
 
-static void test_says_what_is_missing(void)
+static void test_reports_what_is_missing(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_NO_OBJECT, od_missing(&small.od, 0x1001, 0));
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_NO_OBJECT, od_missing(&small.od, 0xFFFF, 0));
@@ -187,7 +187,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_finds_every_entry_and_no_other);
-    RUN_TEST(test_says_what_is_missing);
+    RUN_TEST(test_reports_what_is_missing);
     RUN_TEST(test_reads_numbers_little_endian);
     RUN_TEST(test_reads_strings_without_their_padding);
     RUN_TEST(test_refuses_reads);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Property test of the feed override: random programs, instants and sequences of hold, resume, override, stop and fault
- * stop. Each tick is checked against what docs/reference/protocol.md 1.3 and 1.4 and docs/theory/numerics.md sections 7 and 12 promise:
- * bounds of every piece touched, feed, acceleration and jerk on the path (from the rate and F, and by differences of the
- * setpoints), setpoints on the curve, brakes inside their numbers, stops inside their bounds, states, end.
+ * stop. Each tick is checked against what docs/reference/protocol.md 1.3 and 1.4 and docs/theory/numerics.md sections 7
+ * and 12 promise: bounds of every piece touched, feed, acceleration and jerk on the path (from the rate and F, and by
+ * differences of the setpoints), setpoints on the curve, brakes inside their numbers, stops inside their bounds,
+ * states, end.
  *
  * HODOGRAPH_CASES: how many; HODOGRAPH_SEED: another sequence.
  */
@@ -375,7 +376,7 @@ static void choose(uint64_t random)
     }
 }
 
-/* At the start, or at any instant, from rest or already at rate 1. */
+/* At the start, or at any instant, from standstill or already at override 1. */
 static void begin(uint64_t *random)
 {
     uint64_t duration_q42 = chosen.p->program.header.duration_q32_s << 10;

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/override_plan.h: which override ramp comes next on the way to the commanded override, and a tick
+/* Tests of core/override_plan.h: which override ramp comes next towards the commanded override, and a tick
  * of it. */
 #include "core/override_plan.h"
 
@@ -252,13 +252,13 @@ static void test_commands_while_held(void)
     }
 }
 
-/* The path came to rest otherwise: the override rises from 0 there. */
+/* A path stop has ended: the override rises from 0 there. */
 static void test_rest(void)
 {
     begin_at(1000, 0);
     steps(300);
     program_clock_set(&clock, clock.time_q42_s, clock.piece, clock.record);
-    override_plan_rest(&plan);
+    override_plan_restart(&plan);
     TEST_ASSERT_EQUAL_UINT32(0, override_q30());
     (void)step();
     TEST_ASSERT_TRUE(override_q30() < 1u << 30);
@@ -309,7 +309,7 @@ static void set_factor(uint32_t first, uint32_t behind, uint32_t factor_q14)
     }
 }
 
-/* Up to the factor where there is room for the way back, down again before a piece that allows less. */
+/* Up to the factor if the return ramp fits, down again before a piece that allows less. */
 static void test_override_saturates(void)
 {
     uint32_t most = 0;

@@ -68,8 +68,8 @@ static struct override_ramp ramp_of(const struct bounds *b, const struct overrid
     return ramp;
 }
 
-/* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it rises
- * to, and it rests where the ramp said. Gives the program time in ticks at override 1. */
+/* Runs it to its end, or to a cut after so many ticks: the slope changes by the step at most, never beyond what it
+ * rises to, and it ends where the ramp computed. Gives the program time in ticks at override 1. */
 static double run(struct override_ramp *ramp, struct override_state *rate, uint64_t cut)
 {
     const int64_t step = ramp->step_q56;
@@ -180,7 +180,8 @@ static void test_bounds_at_the_ends_of_the_format(void)
     }
 }
 
-/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a tick. */
+/* All codes: never above R and S, and no more than a rounding below; the last ones stand for a whole change in a
+ * tick. */
 static void test_limits_of_all_codes(void)
 {
     for (uint32_t period_log2 = 0; period_log2 < 4; period_log2++) {
@@ -191,9 +192,10 @@ static void test_limits_of_all_codes(void)
                 const double root = ldexp(1, 45) / b.limits.inverse_root;
                 TEST_ASSERT_TRUE(slope <= b.slope && root * root <= b.second);
                 TEST_ASSERT_TRUE(slope >= b.slope * 0.8 && root * root >= b.second * 0.8);
-                const double turns = fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
-                TEST_ASSERT_TRUE(b.limits.turns >= turns * 0.9);
-                TEST_ASSERT_TRUE(b.limits.turns <= turns * 1.25 + 2);
+                const double rate_ticks =
+                    fmin(b.slope, ldexp(1, 56)) / fmin(b.second, ldexp(1, 56));
+                TEST_ASSERT_TRUE(b.limits.rate_ticks >= rate_ticks * 0.9);
+                TEST_ASSERT_TRUE(b.limits.rate_ticks <= rate_ticks * 1.25 + 2);
             }
         }
     }
@@ -245,7 +247,7 @@ static void test_stages(void)
     }
 }
 
-/* Where a rest between two levels would gain nothing there is none. */
+/* A ramp does not end between two levels if that would gain nothing. */
 static void test_levels_that_are_alike_are_one(void)
 {
     struct program_override bounds = {.factor_q14 = 1u << 14};

@@ -147,7 +147,7 @@ static void test_of_a_book(void)
     struct path_brake brake;
     int ticks = 0;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, &from, &numbers));
-    for (; !path_brake_rests(&brake) && ticks < 100; ticks++) {
+    for (; !path_brake_ended(&brake) && ticks < 100; ticks++) {
         path_brake_step(&brake);
     }
     TEST_ASSERT_INT_WITHIN(2, 71, ticks);
@@ -180,10 +180,10 @@ static void test_acceleration_goes_to_the_deceleration(void)
     expect_first_step(-most - 5 * jerk, jerk);
 }
 
-/* A state from which the way to rest just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration as it
- * is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise before
- * the way to rest. */
-static void test_no_rise_before_the_way_to_rest(void)
+/* A state from which the release phase just fits, b^2 + 6 j b = 2 j v, at so low a jerk that the greatest deceleration
+ * as it is computed is below b (docs/theory/numerics.md section 12, "Path stop"): b stays for a tick, and does not rise
+ * before the release phase. */
+static void test_no_rise_before_the_release_phase(void)
 {
     const int64_t jerk = (int64_t)1 << 34;
     const int64_t fall = (int64_t)1 << 44;
@@ -214,7 +214,7 @@ static void expect_first_tick(int64_t a, int64_t change)
     TEST_ASSERT_INT64_WITHIN(slack, a + change, brake.at.acceleration_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a + change / 2, brake.at.speed_q56);
     TEST_ASSERT_INT64_WITHIN(slack, from.speed_q56 + a / 2 + change / 6, way_q56(&from, &brake.at));
-    TEST_ASSERT_FALSE(path_brake_rests(&brake));
+    TEST_ASSERT_FALSE(path_brake_ended(&brake));
 }
 
 /* An acceleration above 0 falls by the first jerk at most, and as far as 0; one below stays. */
@@ -228,8 +228,8 @@ static void test_first_tick(void)
     expect_first_tick(-jerk, 0);
 }
 
-/* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to the
- * state after. `slack`: what rounding may add to the last jerk. */
+/* The state and its numbers in 2^-56 mm and ticks keep what they promise in one tick: a cubic from the state before to
+ * the state after. `slack`: what rounding may add to the last jerk. */
 static void check_tick(const struct path_state *a, const struct path_state *b,
                        const struct path_brake_numbers *n, int64_t first_acceleration,
                        int64_t slack)
@@ -249,13 +249,13 @@ static void check_tick(const struct path_state *a, const struct path_state *b,
     TEST_ASSERT_TRUE(way >= 0);
 }
 
-/* Ticks until rest. */
+/* Ticks until standstill. */
 static int check_brake(struct path_brake *brake, const struct path_brake_numbers *n)
 {
     const int64_t first_acceleration = brake->at.acceleration_q56;
     struct path_state before = brake->at;
     int ticks = 0;
-    for (; !path_brake_rests(brake); ticks++) {
+    for (; !path_brake_ended(brake); ticks++) {
         path_brake_step(brake);
         const int64_t settling = (int64_t)brake->settle_ticks + 16;
         check_tick(&before, &brake->at, n, first_acceleration, 8 * settling * settling + 64);
@@ -278,7 +278,7 @@ static bool ordinary(const struct brake_case *c)
            c->most < 4000 * c->period * fmin(c->down, c->up) && c->speed > least;
 }
 
-/* What path_brake_fits takes for the distance of a brake: the least distance in which it says that one fits. */
+/* The distance that path_brake_fits computes for a brake: the least one in which a brake fits by its result. */
 static int64_t bound_of(const struct path_state *from, const struct path_brake_numbers *n)
 {
     int64_t low = 0;
@@ -297,13 +297,14 @@ static int64_t way_of_stop(const struct path_state *from, const struct path_brak
     struct path_brake brake;
     TEST_ASSERT_TRUE(path_brake_begin(&brake, from, n));
     path_brake_first(&brake);
-    while (!path_brake_rests(&brake)) {
+    while (!path_brake_ended(&brake)) {
         path_brake_step(&brake);
     }
     return way_from(from, &brake.at);
 }
 
-/* A brake out of a motion that comes to its end needs no more than is promised, and at most two ticks of its speed less. */
+/* A brake out of a motion that comes to its end needs no more than is promised, and at most two ticks of its speed
+ * less. */
 static void test_bound_near_the_end_of_a_program(void)
 {
     for (uint32_t i = 0; i < CASES / 10; i++) {
@@ -348,10 +349,10 @@ static void test_brakes_nearest_to_the_bound(void)
     }
 }
 
-/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and the
- * acceleration is below half the deceleration, there is one. No brake takes
- * MORE_TICKS more than the continuous one; a short one with a slow last jerk takes MORE_IN_SHORT.
- * path_brake_fits never promises less than a brake takes, with its first tick in place of a step or without. */
+/* Any brake keeps its numbers in every tick and rests exactly. Where the continuous one takes 30 ticks and more, and
+ * the acceleration is below half the deceleration, there is one. No brake takes MORE_TICKS more than the continuous
+ * one; a short one with a slow last jerk takes MORE_IN_SHORT. path_brake_fits never promises less than a brake takes,
+ * with its first tick in place of a step or without. */
 static void test_random_brakes(void)
 {
     uint32_t found = 0;
@@ -406,7 +407,8 @@ static void test_refused_states(void)
     refused(PATH_BRAKE_MOST_SPEED, 0);              /* too many ticks */
 }
 
-/* Whatever the state and the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at rest. */
+/* Whatever the state and the numbers are, nothing overflows (the sanitizers watch) and a brake that is found ends at
+ * rest. */
 static void test_extreme_numbers(void)
 {
     for (uint32_t i = 0; i < CASES; i++) {
@@ -426,7 +428,7 @@ static void test_extreme_numbers(void)
             continue;
         }
         if (path_brake_begin(&brake, &from, &n)) {
-            for (int tick = 0; !path_brake_rests(&brake); tick++) {
+            for (int tick = 0; !path_brake_ended(&brake); tick++) {
                 TEST_ASSERT_TRUE(tick < 300000);
                 path_brake_step(&brake);
             }
@@ -445,7 +447,7 @@ int main(void)
     RUN_TEST(test_code_0_is_no_brake);
     RUN_TEST(test_of_a_book);
     RUN_TEST(test_acceleration_goes_to_the_deceleration);
-    RUN_TEST(test_no_rise_before_the_way_to_rest);
+    RUN_TEST(test_no_rise_before_the_release_phase);
     RUN_TEST(test_first_tick);
     RUN_TEST(test_random_brakes);
     RUN_TEST(test_bound_near_the_end_of_a_program);

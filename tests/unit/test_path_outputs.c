@@ -172,7 +172,8 @@ static uint32_t tick_of(const struct interpolator_point *points, uint32_t count,
     return tick;
 }
 
-/* Random tables along a run at changing override: each event acts at the first setpoint at or past its place, in order. */
+/* Random tables along a run at changing override: each event acts at the first setpoint at or past its place, in
+ * order. */
 static void test_random_tables_act_in_the_right_tick(void)
 {
     enum { MOST_TICKS = 20000 };
@@ -268,7 +269,8 @@ static void set_values(const int64_t places[], uint32_t count, int32_t first_val
     TEST_ASSERT_EQUAL_INT(0, open_with(count));
 }
 
-/* A program that begins at 5 of another one, where that has two events: each acts once, wherever the takeover happens. */
+/* A program that begins at 5 of another one, where that has two events: each acts once, wherever the takeover
+ * happens. */
 static void test_a_takeover_goes_on_with_the_same_event(void)
 {
     const int64_t places[] = {0, 5, 5, 9};

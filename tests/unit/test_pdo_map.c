@@ -203,7 +203,7 @@ static void test_deadline(void)
     TEST_ASSERT_TRUE(pdo_map_overdue(&rpdo, 1));
     TEST_ASSERT_FALSE(pdo_map_overdue(&rpdo, 50000));
     (void)pdo_map_receive(&rpdo, &in);
-    pdo_map_rest(&rpdo);
+    pdo_map_restart(&rpdo);
     TEST_ASSERT_FALSE(pdo_map_overdue(&rpdo, 50000));
 }
 

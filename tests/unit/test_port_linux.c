@@ -306,7 +306,7 @@ static void test_a_refused_frame_is_not_waited_for(void)
 static void test_frames_that_are_lost_are_given_up_after_a_tenth_of_a_second(void)
 {
     TEST_ASSERT_EQUAL_INT(0, send_frame(0x080, true));
-    pass_ms(1000); /* counted from the first tick that asks */
+    pass_ms(1000); /* counted from the first tick that reads it */
     TEST_ASSERT_FALSE(linux_can_delivered());
     pass_ms(100);
     TEST_ASSERT_FALSE(linux_can_delivered());

@@ -73,7 +73,7 @@ static void test_who_is_not_ready_in_time_makes_the_tick_late(void)
     TEST_ASSERT_EQUAL_UINT64(2u * MS, tick(2u * MS));
 }
 
-/* Two thirds of the time at most: the rest is for the main loop. */
+/* Two thirds of the time at most: the remainder is for the main loop. */
 static void test_a_slow_machine_rests_half_of_what_it_worked(void)
 {
     const uint64_t start_ns = schedule.due_ns;
@@ -154,9 +154,9 @@ static void test_a_stall_counts_as_one_slice_of_20_ms(void)
 }
 
 /* Whether the tick that is due is put off; the main loop has had `had_ns` of the processor. */
-static bool put_off(uint64_t now_ns, uint32_t turns, uint64_t had_ns)
+static bool put_off(uint64_t now_ns, uint32_t sleeps, uint64_t had_ns)
 {
-    return schedule_overdue(&schedule, now_ns, turns) && schedule_yield(&schedule, now_ns, had_ns);
+    return schedule_overdue(&schedule, now_ns, sleeps) && schedule_yield(&schedule, now_ns, had_ns);
 }
 
 static void test_a_main_loop_that_sleeps_now_and_then_delays_nothing(void)
@@ -185,7 +185,7 @@ static void starve(void)
         (void)tick(0);
         TEST_ASSERT_TRUE_MESSAGE(++ticks < 30u, "nobody yields");
     }
-    TEST_ASSERT_TRUE(ticks > SCHEDULE_TURN_NS / MS);
+    TEST_ASSERT_TRUE(ticks > SCHEDULE_SLEEPLESS_NS / MS);
 }
 
 static void test_a_starved_main_loop_gets_10_ms_before_each_tick(void)
@@ -226,9 +226,9 @@ static void test_no_tick_is_put_off_for_real_drives(void)
 {
     schedule_begin(&schedule, 0, 1000000u, false);
     (void)schedule_overdue(&schedule, 0, 1);
-    TEST_ASSERT_TRUE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
+    TEST_ASSERT_TRUE(schedule_overdue(&schedule, SCHEDULE_SLEEPLESS_NS + 1u, 1));
     schedule.urgent = true;
-    TEST_ASSERT_FALSE(schedule_overdue(&schedule, SCHEDULE_TURN_NS + 1u, 1));
+    TEST_ASSERT_FALSE(schedule_overdue(&schedule, SCHEDULE_SLEEPLESS_NS + 1u, 1));
 }
 
 static void test_a_main_loop_that_is_stuck_is_left(void)

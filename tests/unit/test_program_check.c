@@ -147,8 +147,8 @@ static uint32_t least_velocity_limit(const struct program *p, struct program_lim
     return high;
 }
 
-/* A main loop has work to do while segments, pieces, their limits and both kinds of stops are checked, and at each of the
- * many parts of a piece near the limits of an axis. */
+/* A main loop has work to do while segments, pieces, their limits and both kinds of stops are checked, and at each of
+ * the many parts of a piece near the limits of an axis. */
 static void test_a_check_attends_to_other_work_all_the_time(void)
 {
     struct program p;

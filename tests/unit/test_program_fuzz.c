@@ -2,8 +2,8 @@
 /*
  * Seeded mutations of golden programs, with a right CRC so that they reach the checks. Whatever happens, nothing
  * is read beyond the image and nothing is undefined (the sanitizers watch); and what is accepted runs: every kernel, at
- * two periods a tick, without a jump and without leaving the travel limits; and where the axes have limits, its setpoints
- * keep them. HODOGRAPH_FUZZ_CASES changes the number.
+ * two periods a tick, without a jump and without leaving the travel limits; and where the axes have limits, its
+ * setpoints keep them. HODOGRAPH_FUZZ_CASES changes the number.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -79,8 +79,8 @@ static void run_accepted(const struct program *p, const struct program_limits *l
     }
 }
 
-/* What a drive sees between setpoints: differences over period, its square and its cube are means of velocity, acceleration
- * and jerk. Of four points, the last one first. */
+/* What a drive sees between setpoints: differences over period, its square and its cube are means of velocity,
+ * acceleration and jerk. Of four points, the last one first. */
 static void keeps_axis_limits(const struct program_limits *limits, double period_s,
                               uint32_t axis_count, const double mm[4][PROGRAM_AXES])
 {

@@ -41,7 +41,7 @@ static void test_any_arc_length(void)
         uint64_t time = program_time_at_q42(&p, arc);
         TEST_ASSERT_TRUE(arc_at(time) >= arc);
         TEST_ASSERT_TRUE(arc_at(time - 1u) < arc);
-        TEST_ASSERT_TRUE(arc_at(time) - arc < 200); /* way of 2^-42 s at 100 mm/s: 25 units */
+        TEST_ASSERT_TRUE(arc_at(time) - arc < 200); /* distance of 2^-42 s at 100 mm/s: 25 units */
     }
 }
 

@@ -86,8 +86,8 @@ static void test_divisions(void)
     }
 }
 
-/* docs/theory/numerics.md section 15.2: never above floor(a / n), less than 2.1 below a / n. Multiples, their neighbours, powers of
- * two, and the ends of the range, where 2^-64 |a| is largest. */
+/* docs/theory/numerics.md section 15.2: never above floor(a / n), less than 2.1 below a / n. Multiples, their
+ * neighbours, powers of two, and the ends of the range, where 2^-64 |a| is largest. */
 static void test_thirds_and_fifths_at_the_corners(void)
 {
     const int64_t most = ((int64_t)1 << 62) - 1;

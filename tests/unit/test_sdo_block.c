@@ -28,8 +28,8 @@ void tearDown(void)
 
 /* ---- download: a client that repeats what was lost ---- */
 
-/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. In downloads
- * the first of a block always comes: when all of a block is lost the server can but time out. */
+/* Which transmission of a segment (counted from 0 over the whole transfer) is lost. In downloads the first of a block
+ * always comes: when all of a block is lost the server can but time out. */
 static bool never(uint32_t transmission)
 {
     (void)transmission;
@@ -251,7 +251,7 @@ static void test_domain_refuses_in_the_middle(void)
     TEST_ASSERT_EQUAL_INT(1, talk.small.aborted);
 }
 
-/* A client that sends a block does not listen. What follows the abort looks like requests: 0x23
+/* A client that sends a block does not receive. Its frames after the abort have the form of requests: 0x23
  * with these bytes would write to 0x2003. */
 static void test_the_rest_of_a_block_after_an_abort_is_no_request(void)
 {
@@ -311,7 +311,8 @@ static void test_a_second_client_inside_a_block(void)
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
 }
 
-/* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the value. */
+/* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the
+ * value. */
 static void test_a_second_client_that_hits_the_next_number(void)
 {
     const uint8_t request[7] = {0x03, 0x20, 0x00, 1, 2, 3, 4};

@@ -25,7 +25,7 @@ void tearDown(void)
 {
 }
 
-/* Carries frames between client and server until both are silent. */
+/* Carries frames between client and server until both send nothing. */
 static void run(int begun)
 {
     struct can_msg answer;
@@ -46,7 +46,7 @@ static bool hear(const uint8_t data[8])
 {
     struct can_msg in;
 
-    cob_frame(&in, COB_SDO_ANSWER + TALK_NODE, 8);
+    cob_frame(&in, COB_SDO_RESPONSE + TALK_NODE, 8);
     memcpy(in.data, data, 8);
     return sdo_client_receive(&client, &in, &frame);
 }
@@ -92,7 +92,7 @@ static void test_long_values_of_every_length(void)
     }
 }
 
-static void test_says_why_the_server_refused(void)
+static void test_reports_why_the_server_refused(void)
 {
     run(sdo_client_write_number(&client, TALK_NODE, 0x2000, 0, 9, 1, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_REFUSED, client.status);
@@ -117,7 +117,7 @@ static void test_timeout(void)
     TEST_ASSERT_FALSE(sdo_client_process(&client, CLIENT_TIMEOUT_US - 1, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
     TEST_ASSERT_TRUE(sdo_client_process(&client, 1, &frame));
-    TEST_ASSERT_EQUAL_HEX32(COB_SDO_ASK + TALK_NODE, frame.id);
+    TEST_ASSERT_EQUAL_HEX32(COB_SDO_REQUEST + TALK_NODE, frame.id);
     TEST_ASSERT_EQUAL_HEX8(0x80, frame.data[0]);
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_TIMEOUT, cob_get(frame.data + 4, 4));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_FAILED, client.status);
@@ -156,7 +156,7 @@ static void test_ignores_late_and_foreign_frames(void)
     TEST_ASSERT_FALSE(hear(about_another));
     TEST_ASSERT_FALSE(hear(abort_of_another));
     TEST_ASSERT_FALSE(hear(abort_of_0x6000));
-    cob_frame(&foreign, COB_SDO_ANSWER + TALK_NODE + 1, 8);
+    cob_frame(&foreign, COB_SDO_RESPONSE + TALK_NODE + 1, 8);
     foreign.data[0] = 0x80;
     TEST_ASSERT_FALSE(sdo_client_receive(&client, &foreign, &frame));
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_BUSY, client.status);
@@ -215,7 +215,7 @@ int main(void)
     RUN_TEST(test_writes_and_reads_numbers);
     RUN_TEST(test_wide_numbers_go_segmented);
     RUN_TEST(test_long_values_of_every_length);
-    RUN_TEST(test_says_why_the_server_refused);
+    RUN_TEST(test_reports_why_the_server_refused);
     RUN_TEST(test_a_value_that_does_not_fit_is_given_up);
     RUN_TEST(test_timeout);
     RUN_TEST(test_arguments);

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked
- * in small_od.c), touch no byte that is not its own (sanitizers), leave constants alone, and serve
- * the next honest client. */
+/* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked in small_od.c), touch no
+ * byte that is not its own (sanitizers), leave constants alone, and serve the next honest client. */
 #include "canopen/sdo_client.h"
 #include "canopen/sdo_server.h"
 
@@ -166,7 +165,7 @@ static void random_answer(const struct sdo_client *client, struct can_msg *answe
 {
     static const uint8_t kinds[] = {0x60, 0x20, 0x41, 0x43, 0x4F, 0x42, 0x00, 0x10, 0x01, 0x80};
 
-    cob_frame(answer, COB_SDO_ANSWER + TALK_NODE, 8);
+    cob_frame(answer, COB_SDO_RESPONSE + TALK_NODE, 8);
     random_bytes(answer->data, 8);
     if (random_below(10) != 0) {
         answer->data[0] = kinds[random_below(sizeof kinds)];
@@ -183,7 +182,7 @@ static void test_random_answers_to_the_client(void)
     struct sdo_client client;
     struct can_msg in;
     struct can_msg out;
-    uint8_t value[30] = {0}; /* the sanitizer watches its end */
+    uint8_t value[30] = {0}; /* the sanitizer checks its end */
     int done = 0;
 
     random_state = 20260101;

@@ -152,10 +152,10 @@ static void test_ignores_what_is_not_for_it(void)
 {
     struct can_msg in;
 
-    cob_frame(&in, COB_SDO_ASK + TALK_NODE + 1, 8);
+    cob_frame(&in, COB_SDO_REQUEST + TALK_NODE + 1, 8);
     in.data[0] = 0x40;
     TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
-    cob_frame(&in, COB_SDO_ASK + TALK_NODE, 7);
+    cob_frame(&in, COB_SDO_REQUEST + TALK_NODE, 7);
     in.data[0] = 0x40;
     TEST_ASSERT_FALSE(sdo_server_receive(&talk.server, &in, &talk.answer));
     TEST_ASSERT_FALSE(sdo_talk_ask(&talk, 0x80, 0x2003, 0, SDO_ABORT_GENERAL));
@@ -294,7 +294,7 @@ static void test_domain_refused_at_the_end(void)
     TEST_ASSERT_EQUAL_INT(0, talk.small.ended);
 }
 
-static void test_an_abort_midway_is_told_to_the_domain(void)
+static void test_an_abort_midway_is_reported_to_the_domain(void)
 {
     const uint8_t data[7] = {0};
 
@@ -357,7 +357,7 @@ static void test_an_urgent_write_is_done_beside_a_transfer(void)
     TEST_ASSERT_EQUAL_INT(1, talk.small.ended);
 }
 
-/* One whose client is gone still ends by its time-out. */
+/* A transfer without its client still ends by its timeout. */
 static void test_an_urgent_write_does_not_keep_a_transfer_alive(void)
 {
     sdo_talk_ask(&talk, 0x20, 0x2005, 0, 0);
@@ -378,7 +378,7 @@ static void test_a_transfer_that_is_left_times_out_all_the_same(void)
     expect_abort(SDO_ABORT_TIMEOUT);
 }
 
-static void test_a_lost_answer_to_the_first_request_is_asked_for_again(void)
+static void test_a_lost_answer_to_the_first_request_is_requested_again(void)
 {
     const uint8_t data[7] = {0};
 
@@ -412,7 +412,7 @@ static void test_each_frame_restarts_the_timeout(void)
     TEST_ASSERT_TRUE(sdo_talk_busy(&talk));
 }
 
-static void test_reset_is_silent(void)
+static void test_reset_sends_nothing(void)
 {
     sdo_talk_ask(&talk, 0x21, 0x2005, 0, 21);
     sdo_server_reset(&talk.server);
@@ -447,15 +447,15 @@ int main(void)
     RUN_TEST(test_wrong_kind_of_segment);
     RUN_TEST(test_segmented_download_of_a_domain);
     RUN_TEST(test_domain_refused_at_the_end);
-    RUN_TEST(test_an_abort_midway_is_told_to_the_domain);
+    RUN_TEST(test_an_abort_midway_is_reported_to_the_domain);
     RUN_TEST(test_a_second_client_is_refused);
     RUN_TEST(test_an_urgent_write_is_done_beside_a_transfer);
     RUN_TEST(test_an_urgent_write_does_not_keep_a_transfer_alive);
     RUN_TEST(test_a_transfer_that_is_left_times_out_all_the_same);
-    RUN_TEST(test_a_lost_answer_to_the_first_request_is_asked_for_again);
+    RUN_TEST(test_a_lost_answer_to_the_first_request_is_requested_again);
     RUN_TEST(test_timeout);
     RUN_TEST(test_each_frame_restarts_the_timeout);
-    RUN_TEST(test_reset_is_silent);
+    RUN_TEST(test_reset_sends_nothing);
     RUN_TEST(test_abort_texts);
     return UNITY_END();
 }

@@ -97,7 +97,7 @@ static void test_what_is_no_frame_is_passed_over(void)
     TEST_ASSERT_EQUAL(1, decode("t0000\r"));
 }
 
-static void test_what_only_looks_like_a_frame_is_refused(void)
+static void test_what_only_has_the_form_of_a_frame_is_refused(void)
 {
     static const char *const lines[] = {
         "t\r",        "t080\r",  "t0801\r", "t0801F\r",     "t0801FFF\r",     "t0801G0\r",
@@ -129,7 +129,7 @@ int main(void)
     RUN_TEST(test_a_line_that_closes_is_noted);
     RUN_TEST(test_a_time_stamp_is_allowed);
     RUN_TEST(test_what_is_no_frame_is_passed_over);
-    RUN_TEST(test_what_only_looks_like_a_frame_is_refused);
+    RUN_TEST(test_what_only_has_the_form_of_a_frame_is_refused);
     RUN_TEST(test_a_line_without_end_does_no_harm);
     return UNITY_END();
 }

@@ -108,7 +108,7 @@ static void test_ticks_come_a_period_apart(void)
     TEST_ASSERT_EQUAL_UINT32(51, irq_ticks());
 }
 
-static void test_a_late_tick_is_told_and_made_up_for(void)
+static void test_a_late_tick_is_reported_and_made_up_for(void)
 {
     start(1000);
     chip_advance_100ns(PERIOD + 5000u);
@@ -252,11 +252,11 @@ static void test_the_watchdog_is_fed_while_ticks_go_on(void)
     }
 }
 
-static void test_a_bite_is_told_once_and_forgotten(void)
+static void test_a_restart_by_the_watchdog_is_reported_once(void)
 {
-    TEST_ASSERT_FALSE(watchdog_has_bitten());
+    TEST_ASSERT_FALSE(watchdog_has_reset());
     chip_poke(RCC + 0x94u, 1u << 29);
-    TEST_ASSERT_TRUE(watchdog_has_bitten());
+    TEST_ASSERT_TRUE(watchdog_has_reset());
     TEST_ASSERT_BITS_HIGH(1u << 23, chip_peek(RCC + 0x94u));
 }
 
@@ -324,7 +324,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_clocks_of_the_port);
     RUN_TEST(test_ticks_come_a_period_apart);
-    RUN_TEST(test_a_late_tick_is_told_and_made_up_for);
+    RUN_TEST(test_a_late_tick_is_reported_and_made_up_for);
     RUN_TEST(test_a_tick_that_outlasts_the_next_due_time_is_followed_at_once);
     RUN_TEST(test_after_more_than_a_period_the_clock_is_set_anew);
     RUN_TEST(test_the_counter_may_wrap);
@@ -333,7 +333,7 @@ int main(void)
     RUN_TEST(test_the_main_loop_stays_back_before_a_tick);
     RUN_TEST(test_on_the_slowest_bus_the_main_loop_has_its_turn);
     RUN_TEST(test_the_watchdog_is_fed_while_ticks_go_on);
-    RUN_TEST(test_a_bite_is_told_once_and_forgotten);
+    RUN_TEST(test_a_restart_by_the_watchdog_is_reported_once);
     RUN_TEST(test_the_clock_tree);
     RUN_TEST(test_without_a_crystal_there_is_no_clock);
     RUN_TEST(test_pins_are_given_to_their_peripherals);

@@ -38,7 +38,7 @@ static void start(void)
     TEST_ASSERT_TRUE(fdcan_model_active());
 }
 
-/* What the receive interrupt does, as long as the line asks for it. */
+/* The receive interrupt, as long as its line is active. */
 static void serve(void)
 {
     for (unsigned i = 0; fdcan_model_interrupt(); ++i) {
@@ -349,7 +349,7 @@ static void test_after_bus_off_it_comes_back_with_nothing_old(void)
     }
 }
 
-static void test_errors_are_told(void)
+static void test_errors_are_reported(void)
 {
     uint8_t transmit = 0;
     uint8_t receive = 0;
@@ -384,6 +384,6 @@ int main(void)
     RUN_TEST(test_frames_of_the_interrupts_are_delivered_when_they_are_on_the_bus);
     RUN_TEST(test_frames_of_the_main_loop_are_not_waited_for);
     RUN_TEST(test_after_bus_off_it_comes_back_with_nothing_old);
-    RUN_TEST(test_errors_are_told);
+    RUN_TEST(test_errors_are_reported);
     return UNITY_END();
 }

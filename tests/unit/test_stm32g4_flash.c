@@ -103,7 +103,7 @@ static void test_nothing_stale_stays_in_the_cache(void)
     TEST_ASSERT_EQUAL_HEX32_MESSAGE(0x80000000u, flash_model_read(0x40022014u), "locked again");
 }
 
-static void test_errors_of_the_chip_are_told_and_do_not_stay(void)
+static void test_errors_of_the_chip_are_reported_and_do_not_stay(void)
 {
     static const uint8_t word[8] = {0};
     flash_model_refuse_next();
@@ -470,7 +470,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_a_page_and_a_double_word);
     RUN_TEST(test_nothing_stale_stays_in_the_cache);
-    RUN_TEST(test_errors_of_the_chip_are_told_and_do_not_stay);
+    RUN_TEST(test_errors_of_the_chip_are_reported_and_do_not_stay);
     RUN_TEST(test_words_that_cannot_be_corrected);
     RUN_TEST(test_a_bank_takes_pieces_of_any_size);
     RUN_TEST(test_erasing_takes_one_page_only);

@@ -267,7 +267,7 @@ static void test_the_store_is_the_flash(void)
     TEST_ASSERT_EQUAL_INT(PORT_ERR_STORE, port_store_erase(PORT_STORE_BANKS_ALL));
 }
 
-static void test_trouble_on_the_bus_is_told_once_a_second(void)
+static void test_trouble_on_the_bus_is_reported_once_a_second(void)
 {
     start();
     for (unsigned i = 0; i < 300u; ++i) {
@@ -287,7 +287,7 @@ static void test_trouble_on_the_bus_is_told_once_a_second(void)
     TEST_ASSERT_EQUAL_UINT(once, said());
 }
 
-static void test_error_counters_are_told_when_the_chip_turns_error_passive(void)
+static void test_error_counters_are_reported_when_the_chip_becomes_error_passive(void)
 {
     start();
     port_wait(1000000);
@@ -317,7 +317,7 @@ int main(void)
     RUN_TEST(test_spoiled_words_are_taken_before_the_start_only);
     RUN_TEST(test_a_spoiled_word_of_the_code_is_the_end_at_any_time);
     RUN_TEST(test_the_store_is_the_flash);
-    RUN_TEST(test_trouble_on_the_bus_is_told_once_a_second);
-    RUN_TEST(test_error_counters_are_told_when_the_chip_turns_error_passive);
+    RUN_TEST(test_trouble_on_the_bus_is_reported_once_a_second);
+    RUN_TEST(test_error_counters_are_reported_when_the_chip_becomes_error_passive);
     return UNITY_END();
 }

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop and
- * fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside its
- * limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case ends with
- * a host that sends no more: then the motion comes to rest. In each tick as many events of the path have acted as are at or
- * before the farthest setpoint: none acts twice, is left out or is late. Records are those of a coefficient cache, from the least that
- * does to one for whole chunks; where it has room to spare, the main loop is late with them by a tick.
+ * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop
+ * and fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside
+ * its limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case
+ * ends with a host that sends no more: then the motion comes to rest. In each tick as many events of the path have
+ * acted as are at or before the farthest setpoint: none acts twice, is left out or is late. Records are those of a
+ * coefficient cache, from the least that does to one for whole chunks; where it has room to spare, the main loop is
+ * late with them by a tick.
  *
  * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
  */
@@ -28,7 +29,7 @@
 #define SPACE_PART 8u /* of the cuts there is one in space for so many in the plane */
 #define CHAINS     6u /* of each whole program */
 #define MOST_TICKS 6000u
-#define LONGEST    20000u /* until rest */
+#define LONGEST    20000u /* until standstill */
 #define CACHE_MOST 131072u
 #define EVENTS     40u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
@@ -350,7 +351,7 @@ static int rests(void)
     return over() || feed_override_state(&now.m.feed) == FEED_HELD ||
            feed_override_waits(&now.m.feed) ||
            (feed_override_state(&now.m.feed) == FEED_RUNNING && now.m.feed.plan.started != 0 &&
-            now.m.feed.plan.asked_q57 == 0 && now.m.feed.plan.now.override_q57 == 0);
+            now.m.feed.plan.requested_q57 == 0 && now.m.feed.plan.now.override_q57 == 0);
 }
 
 /* --- A case --- */
@@ -375,7 +376,7 @@ static void command(uint64_t *random)
     }
 }
 
-/* A chunk comes damaged, or one that is not wanted: refused, and nothing changes. */
+/* A chunk comes damaged, or in the wrong order: refused, and nothing changes. */
 static void refuse(uint64_t *random)
 {
     const struct program_limits limits = golden_no_limits();
@@ -459,7 +460,7 @@ static void begin(uint64_t *random, uint32_t first, uint32_t count)
 /* The host sends no more: to rest, unless the override is nothing or it has been held there. */
 static void end(uint64_t *random)
 {
-    if (now.m.feed.plan.asked_q57 < OVERRIDE_ONE / 2) {
+    if (now.m.feed.plan.requested_q57 < OVERRIDE_ONE / 2) {
         feed_override_set(&now.m.feed, 60u + (uint32_t)(golden_random(random) % 100u));
     }
     for (uint32_t i = 0; i < LONGEST && !rests(); i++) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Who gets the next grant, and when time goes on. */
+/* Who gets the next grant, and when time advances. */
 #include "hub/virtual_time.h"
 #include "unity.h"
 

@@ -59,7 +59,7 @@ void drive_boot_begin(struct drive_boot *boot, const struct config *config)
     pause_for(boot, DRIVE_BOOT_PAUSE_US);
 }
 
-/* ---- What the answers of a drive mean: go on, read back, ask again, or give up ---- */
+/* ---- SDO response handling: next object, read back, read again, or fail ---- */
 
 static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
 {
@@ -75,7 +75,7 @@ static bool as_wanted(const struct drive_op *op, uint32_t value)
     return ((value ^ op->value) & op->mask) == 0u;
 }
 
-/* What a write should have set, or what only the drive knows. */
+/* A value that a write should have set, or a property of the drive. */
 static void judge_read(struct drive_boot *boot)
 {
     const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
@@ -254,7 +254,7 @@ bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can
     return boot->phase == DRIVE_BOOT_START && start_next(boot, out);
 }
 
-void drive_boot_silent(struct drive_boot *boot, uint8_t node)
+void drive_boot_unresponsive(struct drive_boot *boot, uint8_t node)
 {
     if (boot->phase == DRIVE_BOOT_IDLE) {
         boot->trouble = (struct drive_trouble){

@@ -3,8 +3,8 @@
  * drive_boot: finds the drives and the I/O module, configures them by SDO (drive_configuration) and starts them (NMT),
  * one after the other, and begins again from the first when one does not answer or refuses.
  *
- * A refused write is no error if the object already has the wanted value. So a drive with a fixed PDO mapping is accepted
- * if the mapping is the right one.
+ * A refused write is no error if the object already has the value. So a drive with a fixed PDO mapping is
+ * accepted if the mapping is the right one.
  *
  * Called by app/controller.c. Frames in, frames out; main loop.
  */
@@ -46,32 +46,32 @@ struct drive_boot {
     struct config config;
     struct drive_configuration configuration;
     struct drive_op op;
-    struct drive_properties
-        properties[DRIVE_NODES]; /* of the drives configured so far, then the I/O module */
+    /* of the drives, then of the I/O module */
+    struct drive_properties properties[DRIVE_NODES];
     struct drive_trouble trouble;
     enum drive_boot_phase phase;
     uint32_t pause_us;
-    uint32_t refused_code; /* why the write was refused that is now read back */
+    uint32_t refused_code; /* abort code of the refused write that is now read back */
     uint8_t axis;
     uint8_t reads; /* of the present object, without the right answer */
     bool reading_back;
-    bool simulated; /* every drive so far is one of ours (0x1018) */
+    bool simulated; /* all drives up to this one are simulated (0x1018) */
 };
 
 void drive_boot_init(struct drive_boot *boot);
 
-/* Begins, also in the middle of an attempt. */
+/* Begins an attempt; ends one that is under way. */
 void drive_boot_begin(struct drive_boot *boot, const struct config *config);
 
-/* Takes a frame; others than SDO answers are ignored. Returns true when *out is to be sent. */
+/* Takes a frame; ignores all except SDO responses. Returns true when *out is to be sent. */
 bool drive_boot_receive(struct drive_boot *boot, const struct can_msg *in, struct can_msg *out);
 
 /* Lets time pass. Returns true when *out is to be sent: then call again with elapsed_us 0. */
 bool drive_boot_process(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out);
 
-/* Names a drive that was configured and started but gives no process data: trouble of object 0 until
- * the next attempt begins; node 0: no trouble. Only between attempts; else nothing happens. */
-void drive_boot_silent(struct drive_boot *boot, uint8_t node);
+/* Reports a drive that was configured and started but sends no process data: trouble with object 0, until the next
+ * attempt begins; node 0: no trouble. During an attempt it does nothing. */
+void drive_boot_unresponsive(struct drive_boot *boot, uint8_t node);
 
 /* True once after an attempt that reached every drive. */
 bool drive_boot_finished(struct drive_boot *boot);

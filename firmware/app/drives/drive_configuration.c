@@ -76,7 +76,7 @@ struct drive_row {
     uint32_t argument;
 };
 
-/* One PDO of a drive as the controller wants it. */
+/* One PDO of a drive as the controller needs it. */
 #define PDO_ENTRIES 5u
 #define PDO_INVALID UINT32_C(0x80000000) /* bit 31 of the COB-ID */
 #define PDO_NO_RTR  UINT32_C(0x40000000) /* bit 30, of TPDOs */
@@ -87,7 +87,7 @@ struct drive_pdo {
     uint8_t type;                  /* transmission type */
     uint8_t count;                 /* mapped objects; 0: the PDO shall be off */
     uint8_t inhibit_ms;            /* TPDO; 0: the drive's own */
-    bool event_timer;              /* RPDO: the drive watches for it (0x2004 sub 10) */
+    bool event_timer;              /* RPDO: the drive supervises its arrival (0x2004 sub 10) */
     uint32_t entries[PDO_ENTRIES]; /* index << 16 | sub << 8 | bits */
     uint8_t property; /* enum drive_property: known of a drive that has taken all of it */
 };
@@ -99,7 +99,7 @@ struct drive_pdo {
 #define ON_CHANGE     255u
 #define INHIBIT_MS    10u
 
-enum { QUICK_STOP = 3 };     /* 0x6007: what it does then */
+enum { QUICK_STOP = 3 };     /* 0x6007: the reaction to a lost connection */
 enum { QUICK_STOP_OFF = 2 }; /* 0x605A, 0x605E: by 0x6085, then off, then Fault */
 enum { MINUS_THREE = 0xFD }; /* 0x60C2 sub 2: the time is sub 1 * 10^-3 s */
 
@@ -178,7 +178,7 @@ static const struct drive_pdo drive_pdos[] = {
 static const struct drive_row drive_rows[] = {
     /* STOPPED it would not answer; no process data while parameters change */
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
-    /* what is it? */
+    /* identity */
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_DRIVE},
     {WHEN_ALWAYS, ROW_READ, 0x1018, 1, 4, FROM_ROW, DRIVE_VENDOR},
     {WHEN_ALWAYS, ROW_READ, 0x1018, 2, 4, FROM_ROW, DRIVE_PRODUCT},
@@ -191,19 +191,19 @@ static const struct drive_row drive_rows[] = {
     {WHEN_ALWAYS, ROW_NEED_BITS, 0x6502, 0, 4, FROM_ROW, CIA402_SUPPORTS(CIA402_MODE_CSP)},
     {WHEN_ALWAYS, ROW_READ, 0x60FD, 0, 4, FROM_ROW, DRIVE_INPUTS},
     {WHEN_HOMING, ROW_READ, 0x6064, 0, 4, FROM_ROW, DRIVE_POSITION},
-    /* a drive that was left enabled, and whose PDOs are not ours: it stops, and goes off */
+    /* for a drive that is still enabled, with other PDOs: it stops and switches off */
     {WHEN_ALWAYS, ROW_TRY, 0x6040, 0, 2, FROM_ROW, CIA402_QUICK_STOP},
     /* SYNC; its counter may change only while the period is 0 (CiA 301, 0x1019) */
     {WHEN_ALWAYS, ROW_MAY, 0x1005, 0, 4, FROM_ROW, COB_SYNC},
     {WHEN_ALWAYS, ROW_TRY, 0x1006, 0, 4, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x1019, 0, 1, FROM_ROW, SYNC_COUNTER},
     {WHEN_ALWAYS, ROW_MAY, 0x1006, 0, 4, FROM_PERIOD_US, 0},
-    /* heartbeats both ways instead of node guarding; without them: a quick stop */
+    /* heartbeats in both directions instead of node guarding; without them: a quick stop */
     {WHEN_ALWAYS, ROW_MAY, 0x100C, 0, 2, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
-    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
-    /* it stays operational, so that its TPDOs show what it does */
+    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_TIMEOUT_MS},
+    /* it stays operational, so that its TPDOs report its state */
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_ALWAYS, ROW_MAY, 0x6007, 0, 2, FROM_ROW, QUICK_STOP},
     /* process data */
@@ -250,8 +250,8 @@ static const struct drive_row drive_rows[] = {
 
 #define ROWS (sizeof drive_rows / sizeof drive_rows[0])
 
-/* The same of the I/O module, CiA 401. Without heartbeats of the controller it switches its outputs off: 0x1029 leaves it
- * operational, so that its error values hold (0x6206, 0x6207; 0x6443, 0x6444). */
+/* The same of the I/O module, CiA 401. Without heartbeats of the controller it switches its outputs off: 0x1029 leaves
+ * it operational, so that its error values hold (0x6206, 0x6207; 0x6443, 0x6444). */
 static const struct drive_row module_rows[] = {
     {WHEN_ALWAYS, ROW_PRE_OPERATIONAL, 0, 0, 0, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_EXPECT, 0x1000, 0, 2, FROM_ROW, PROFILE_IO},
@@ -264,7 +264,7 @@ static const struct drive_row module_rows[] = {
     {WHEN_ALWAYS, ROW_MAY, 0x100C, 0, 2, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x100D, 0, 1, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x1017, 0, 2, FROM_ROW, DRIVE_HEARTBEAT_MS},
-    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_SILENT_MS},
+    {WHEN_ALWAYS, ROW_MAY, 0x1016, 1, 4, FROM_OWN_NODE, DRIVE_CONTROLLER_TIMEOUT_MS},
     {WHEN_ALWAYS, ROW_MAY, 0x1029, 1, 1, FROM_ROW, NMT_ERROR_NO_CHANGE},
     {WHEN_DIGITAL, ROW_MAY, 0x6206, 1, 1, FROM_ROW, 0xFF},
     {WHEN_DIGITAL, ROW_MAY, 0x6207, 1, 1, FROM_ROW, 0},
@@ -320,7 +320,7 @@ static uint32_t cob_of(const struct drive_pdo *pdo, uint8_t node)
     return flags | (pdo->cob + (uint32_t)node);
 }
 
-/* A PDO that shall be off only has to be invalid; what it would map does not matter. */
+/* To switch a PDO off it only has to be invalid; its mapping does not matter. */
 static bool turn_off(const struct drive_pdo *pdo, uint8_t node, uint8_t item, struct drive_op *op)
 {
     write_number(op, pdo->communication, SUB_COB, 4, PDO_INVALID | cob_of(pdo, node));
@@ -329,7 +329,7 @@ static bool turn_off(const struct drive_pdo *pdo, uint8_t node, uint8_t item, st
     return item == ITEM_DISABLE;
 }
 
-/* Times that a drive lacks leave a PDO that works. */
+/* A PDO also works if the drive does not have these times. */
 static void write_time(struct drive_op *op, const struct drive_pdo *pdo, uint32_t sub,
                        uint32_t value)
 {
@@ -361,9 +361,9 @@ static bool after_entries(const struct drive_pdo *pdo, uint8_t node, uint16_t se
     }
 }
 
-/* The write number `item` (0, 1, ...) that makes a PDO of a drive as it shall be, in the order of CiA 301 (7.5.2.36): disable,
- * transmission type, no mapping, entries, their count, times, enable. False after the last one. setpoint_timeout_ms is for the
- * event timer. */
+/* The write number `item` (0, 1, ...) that makes a PDO of a drive as it shall be, in the order of CiA 301 (7.5.2.36):
+ * disable, transmission type, no mapping, entries, their count, times, enable. False after the last one.
+ * setpoint_timeout_ms is for the event timer. */
 static bool pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_timeout_ms,
                    uint8_t item, struct drive_op *op)
 {
@@ -397,7 +397,7 @@ static bool pdo_op(const struct drive_pdo *pdo, uint8_t node, uint16_t setpoint_
     return after_entries(pdo, node, setpoint_timeout_ms, entry, op);
 }
 
-/* ---- The way through the table ---- */
+/* ---- Execution of the table ---- */
 
 static uint8_t node_of(const struct drive_configuration *configuration)
 {

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_configuration: the operations that configure one drive, or the I/O module, in their order: reads and writes of its
- * object dictionary (CiA 301, CiA 402-2, docs/reference/protocol.md section 2). The table in drive_configuration.c has a
- * row for each object or PDO. drive_boot executes the operations.
+ * drive_configuration: the operations that configure one drive, or the I/O module, in their order: reads and writes of
+ * its object dictionary (CiA 301, CiA 402-2, docs/reference/protocol.md section 2). The table in drive_configuration.c
+ * has a row for each object or PDO. drive_boot executes the operations.
  *
  *     drive_configuration_begin(&configuration, &config, axis, &properties);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
  *
- * What follows depends on the properties that the drive reports meanwhile. Main loop.
+ * Later operations depend on the properties that the drive reports in earlier ones. Changes its struct and the
+ * properties only. Main loop.
  */
 #ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
 #define APP_DRIVES_DRIVE_CONFIGURATION_H
@@ -18,10 +19,10 @@
 #include "app/drives/drive_properties.h"
 #include "app/machine/config.h"
 
-/* The drive's heartbeat, and for how long it may miss the controller's (sent each 100 ms; checking a
- * long program can keep the main loop from it for a second). */
-#define DRIVE_HEARTBEAT_MS         100u
-#define DRIVE_CONTROLLER_SILENT_MS 2000u
+/* The period of the drive's heartbeat, and the time after which it misses the controller's. The controller sends it
+ * each 100 ms, but the check of a long program can delay it by a second. */
+#define DRIVE_HEARTBEAT_MS          100u
+#define DRIVE_CONTROLLER_TIMEOUT_MS 2000u
 
 /* Drives, and the I/O module, where there is one. Pure. */
 static inline uint8_t drive_configuration_nodes(const struct config *config)
@@ -29,7 +30,7 @@ static inline uint8_t drive_configuration_nodes(const struct config *config)
     return (uint8_t)(config->axis_count + (config->outputs.node != 0u ? 1u : 0u));
 }
 
-/* Of drive `i`; of the I/O module, which comes after them. Pure. */
+/* Node of drive `i`, or of the I/O module, which comes after the drives. Pure. */
 static inline uint8_t drive_configuration_node(const struct config *config, uint8_t i)
 {
     return i < config->axis_count ? config->node[i] : config->outputs.node;
@@ -41,7 +42,7 @@ static inline uint8_t drive_configuration_node(const struct config *config, uint
 enum drive_op_kind {
     DRIVE_OP_NMT_PRE_OPERATIONAL, /* process data off while parameters change */
     DRIVE_OP_READ,                /* `masked` bits must be those of `value`; gives `property` */
-    DRIVE_OP_WRITE,               /* refused: fine when it reads back so already */
+    DRIVE_OP_WRITE,               /* a refusal is no error if the object has the value already */
     DRIVE_OP_PREPARE, /* a write that may be refused: a later one shows whether that matters */
 };
 
@@ -50,10 +51,10 @@ struct drive_op {
     uint16_t index;
     uint8_t sub;
     uint8_t size;     /* bytes of a write */
-    bool optional;    /* a drive without the object is fine */
+    bool optional;    /* a drive without the object is accepted */
     uint8_t property; /* enum drive_property: which one a read gives */
     uint32_t value;   /* to write, to expect */
-    uint32_t mask;    /* what counts when it is read */
+    uint32_t mask;    /* the bits that are compared */
 };
 
 struct drive_configuration {
@@ -73,11 +74,11 @@ void drive_configuration_begin(struct drive_configuration *configuration,
 /* The present operation; false at the end. */
 bool drive_configuration_op(struct drive_configuration *configuration, struct drive_op *op);
 
-/* The present operation is done; a read has brought `value`. */
+/* The present operation is done; for a read, `value` is the result. */
 void drive_configuration_advance(struct drive_configuration *configuration);
 
-/* The drive refuses the present operation with the abort code: true when the configuration can do without it, and has
- * gone on. */
+/* The drive refuses the present operation with the abort code. True: the operation was not necessary, and the next one
+ * is the present one. */
 bool drive_configuration_refused(struct drive_configuration *configuration, uint32_t abort_code);
 
 #endif

@@ -31,43 +31,43 @@ static bool is_drive(const struct config *config, uint8_t node)
     return false;
 }
 
-static void begin_others(struct drive_monitor *watch, const struct config *config,
+static void begin_others(struct drive_monitor *monitor, const struct config *config,
                          const uint32_t entries[AXES_MAX])
 {
-    watch->other_count = 0;
+    monitor->other_count = 0;
     for (uint8_t i = 0; i < AXES_MAX; ++i) {
         struct heartbeat_consumer entry;
         heartbeat_consumer_init_entry(&entry, entries[i]);
         if (entry.node != 0u && entry.time_us != 0u && !is_drive(config, entry.node)) {
-            watch->others[watch->other_count++] = entry;
+            monitor->others[monitor->other_count++] = entry;
         }
     }
 }
 
-void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
+void drive_monitor_begin(struct drive_monitor *monitor, const struct config *config,
                          const uint32_t entries[AXES_MAX])
 {
-    watch->count = drive_configuration_nodes(config);
-    for (uint8_t i = 0; i < watch->count; ++i) {
+    monitor->count = drive_configuration_nodes(config);
+    for (uint8_t i = 0; i < monitor->count; ++i) {
         const uint8_t node = drive_configuration_node(config, i);
-        heartbeat_consumer_init(&watch->consumers[i], node, (uint16_t)time_of(node, entries));
+        heartbeat_consumer_init(&monitor->consumers[i], node, (uint16_t)time_of(node, entries));
     }
-    begin_others(watch, config, entries);
+    begin_others(monitor, config, entries);
 }
 
 /* The zero of a drive counts as kept only while there is no gap in which it could have restarted. */
-static void note_silence(struct drive_monitor *watch, struct machine *machine, uint8_t i,
-                         uint32_t elapsed_us)
+static void note_missing_heartbeats(struct drive_monitor *monitor, struct machine *machine,
+                                    uint8_t i, uint32_t elapsed_us)
 {
-    const uint32_t time_us = watch->consumers[i].time_us;
+    const uint32_t time_us = monitor->consumers[i].time_us;
     const uint32_t zero_us = DRIVE_MONITOR_ZERO_MS * 1000u;
     const uint32_t limit_us = time_us < zero_us ? time_us : zero_us;
-    if (watch->silent_us[i] <= limit_us) {
-        watch->silent_us[i] += elapsed_us;
+    if (monitor->without_us[i] <= limit_us) {
+        monitor->without_us[i] += elapsed_us;
     }
-    if (watch->silent_us[i] > limit_us) {
+    if (monitor->without_us[i] > limit_us) {
         port_lock();
-        struct axis *axis = machine_axis(machine, watch->consumers[i].node);
+        struct axis *axis = machine_axis(machine, monitor->consumers[i].node);
         if (axis != NULL) {
             axis->homed = false;
         }
@@ -97,7 +97,7 @@ static void restarted(struct machine *machine, uint8_t node)
     if (axis != NULL) {
         axis_restarted(axis);
     }
-    if (machine->state == MACHINE_BOOT) { /* it has lost what was configured so far */
+    if (machine->state == MACHINE_BOOT) { /* it has lost its configuration */
         machine_enter_boot(machine);
     } else {
         gone(machine, FAULT_REBOOTED, node);
@@ -116,7 +116,7 @@ static void take_event(struct machine *machine, const struct heartbeat_consumer 
     port_unlock();
 }
 
-/* Nobody looks after the machine any more. With drives off there is nothing to bring to rest. */
+/* The host does not supervise the machine any more. With drives off nothing has to be stopped. */
 static void host_lost(struct machine *machine, uint8_t node)
 {
     port_lock();
@@ -126,11 +126,11 @@ static void host_lost(struct machine *machine, uint8_t node)
     port_unlock();
 }
 
-static void take_others(struct drive_monitor *watch, struct machine *machine,
+static void take_others(struct drive_monitor *monitor, struct machine *machine,
                         const struct can_msg *in)
 {
-    for (uint8_t i = 0; i < watch->other_count; ++i) {
-        struct heartbeat_consumer *consumer = &watch->others[i];
+    for (uint8_t i = 0; i < monitor->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &monitor->others[i];
         const bool present = consumer->presence == HEARTBEAT_PRESENT;
         if (heartbeat_consumer_receive(consumer, in) == HEARTBEAT_BOOTED && present) {
             host_lost(machine, consumer->node);
@@ -138,7 +138,7 @@ static void take_others(struct drive_monitor *watch, struct machine *machine,
     }
 }
 
-void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
+void drive_monitor_receive(struct drive_monitor *monitor, struct machine *machine,
                            const struct can_msg *in)
 {
     struct emcy emcy;
@@ -149,26 +149,26 @@ void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
         port_unlock();
         return;
     }
-    for (uint8_t i = 0; i < watch->count; ++i) {
-        struct heartbeat_consumer *consumer = &watch->consumers[i];
+    for (uint8_t i = 0; i < monitor->count; ++i) {
+        struct heartbeat_consumer *consumer = &monitor->consumers[i];
         if (is_heartbeat(consumer, in)) {
-            watch->silent_us[i] = 0;
+            monitor->without_us[i] = 0;
         }
         take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
     }
-    take_others(watch, machine, in);
+    take_others(monitor, machine, in);
 }
 
-void drive_monitor_process(struct drive_monitor *watch, struct machine *machine,
+void drive_monitor_process(struct drive_monitor *monitor, struct machine *machine,
                            uint32_t elapsed_us)
 {
-    for (uint8_t i = 0; i < watch->count; ++i) {
-        struct heartbeat_consumer *consumer = &watch->consumers[i];
-        note_silence(watch, machine, i, elapsed_us);
+    for (uint8_t i = 0; i < monitor->count; ++i) {
+        struct heartbeat_consumer *consumer = &monitor->consumers[i];
+        note_missing_heartbeats(monitor, machine, i, elapsed_us);
         take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
     }
-    for (uint8_t i = 0; i < watch->other_count; ++i) {
-        struct heartbeat_consumer *consumer = &watch->others[i];
+    for (uint8_t i = 0; i < monitor->other_count; ++i) {
+        struct heartbeat_consumer *consumer = &monitor->others[i];
         if (heartbeat_consumer_process(consumer, elapsed_us) == HEARTBEAT_LOST) {
             host_lost(machine, consumer->node);
         }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of the
- * host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
+ * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of
+ * the host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
  *
  * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS may have been switched off and on while its boot-up message was
- * lost. Its axis is then no longer homed, in every state.
+ * lost. Its axis then counts as not homed, in every state.
  *
  * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine.
  */
@@ -25,8 +25,8 @@
 
 struct drive_monitor {
     struct heartbeat_consumer consumers[DRIVE_NODES];
-    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are no drives: a host */
-    uint32_t silent_us[DRIVE_NODES]; /* since the last heartbeat; a new begin does not reset it */
+    struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are not drives: a host */
+    uint32_t without_us[DRIVE_NODES]; /* since the last heartbeat; a new begin does not reset it */
     uint8_t count;
     uint8_t other_count;
 };
@@ -34,15 +34,15 @@ struct drive_monitor {
 /* Begins to supervise the drives of the configuration, each from its first heartbeat on. `entries` as in 0x1016: bits
  * 16 ... 23 node, 0 ... 15 time in ms. Other nodes in it are supervised in the same way: it is a fault with a path stop
  * if one stops sending, or restarts, while drives are on. */
-void drive_monitor_begin(struct drive_monitor *watch, const struct config *config,
+void drive_monitor_begin(struct drive_monitor *monitor, const struct config *config,
                          const uint32_t entries[AXES_MAX]);
 
 /* Takes any frame of the bus. A restart or an error of a drive raises a fault, or starts BOOT. */
-void drive_monitor_receive(struct drive_monitor *watch, struct machine *machine,
+void drive_monitor_receive(struct drive_monitor *monitor, struct machine *machine,
                            const struct can_msg *in);
 
 /* To be called in each round of the main loop. A drive without heartbeats raises a fault, or starts BOOT. */
-void drive_monitor_process(struct drive_monitor *watch, struct machine *machine,
+void drive_monitor_process(struct drive_monitor *monitor, struct machine *machine,
                            uint32_t elapsed_us);
 
 #endif

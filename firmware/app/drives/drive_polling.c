@@ -41,8 +41,8 @@ static bool inputs_polled(const struct drive_properties *properties)
 }
 
 /* The configuration belongs to the main loop, so it is read without the lock. */
-static bool ask_next(struct drive_polling *polling, const struct machine *machine,
-                     const struct drive_properties *properties, struct can_msg *out)
+static bool request_next(struct drive_polling *polling, const struct machine *machine,
+                         const struct drive_properties *properties, struct can_msg *out)
 {
     const uint8_t count = machine->config.axis_count;
     polling->poll_index = (uint8_t)((polling->poll_index + 1u) % (count * OBJECTS));
@@ -75,5 +75,5 @@ bool drive_polling_process(struct drive_polling *polling, struct machine *machin
     }
     polling->client.status = SDO_CLIENT_IDLE;
     polling->pause_us -= elapsed_us < polling->pause_us ? elapsed_us : polling->pause_us;
-    return polling->pause_us == 0u && ask_next(polling, machine, properties, out);
+    return polling->pause_us == 0u && request_next(polling, machine, properties, out);
 }

@@ -31,8 +31,8 @@ void drive_polling_init(struct drive_polling *polling);
 bool drive_polling_receive(struct drive_polling *polling, const struct can_msg *in,
                            struct can_msg *out);
 
-/* To be called in each round of the main loop. `allowed`: no other module uses the SDO channels of the drives. True when
- * *out is to be sent. */
+/* To be called in each round of the main loop. `allowed`: no other module uses the SDO channels of the drives. True
+ * when *out is to be sent. */
 bool drive_polling_process(struct drive_polling *polling, struct machine *machine,
                            const struct drive_properties *properties, bool allowed,
                            uint32_t elapsed_us, struct can_msg *out);

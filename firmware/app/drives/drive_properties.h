@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_properties: values that a drive reported while it was configured: identity, modes, PDO mapping, position. Written by
- * drive_boot, read by homing, drive_polling and the objects 0x2027 ... Main loop. */
+/* drive_properties: values that a drive reported while it was configured: identity, modes, PDO mapping, position.
+ * Written by drive_boot, read by homing, drive_polling and the objects 0x2027 ... Main loop. */
 #ifndef APP_DRIVES_DRIVE_PROPERTIES_H
 #define APP_DRIVES_DRIVE_PROPERTIES_H
 
@@ -15,7 +15,7 @@ enum drive_property {
     DRIVE_REVISION,
     DRIVE_SERIAL,
     DRIVE_MODES,           /* 0x6502 */
-    DRIVE_POSITION,        /* 0x6064 before anything was written; known where homing is requested */
+    DRIVE_POSITION,        /* 0x6064 before the first write; known if homing is configured */
     DRIVE_INPUTS,          /* 0x60FD exists; its value then */
     DRIVE_INPUTS_MAPPED,   /* and TPDO3 reports its changes */
     DRIVE_TORQUE_MAPPED,   /* RPDO1 takes 0x60B2 */
@@ -42,7 +42,7 @@ static inline void drive_properties_read(struct drive_properties *properties, un
     }
 }
 
-/* Whether it is one of the project's simulated drives. Pure. */
+/* Whether it is a simulated drive of this project. Pure. */
 static inline bool drive_is_simulated(const struct drive_properties *properties)
 {
     return properties->known[DRIVE_VENDOR] &&

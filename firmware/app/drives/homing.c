@@ -88,7 +88,7 @@ static uint16_t step_off(struct homing *homing, struct machine *machine, enum ho
     return over(homing, machine, HOMING_SWITCH_US) ? FAULT_HOMING_LATE : 0u;
 }
 
-/* In the phases OFF, ENABLE, MOVE and DISABLE: what the statusword leads to. A fault code, or 0. Under the lock. */
+/* In the phases OFF, ENABLE, MOVE and DISABLE: the next step by the statusword. A fault code, or 0. Under the lock. */
 static uint16_t follow_drive(struct homing *homing, struct machine *machine)
 {
     switch (homing->phase) {
@@ -172,7 +172,7 @@ static void fail(struct homing *homing, struct machine *machine, uint16_t code, 
     port_unlock();
 }
 
-/* What the process data of the drive decide. */
+/* The steps that depend on process data of the drive. */
 static void step_drive(struct homing *homing, struct machine *machine)
 {
     port_lock();

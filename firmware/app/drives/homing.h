@@ -5,12 +5,12 @@
  *
  *     off -> mode 6 -> enable -> controlword bit 4, until the drive has its zero -> disable -> mode 8 -> next axis
  *
- * Method, speeds and offset were written when the drive was configured (CiA 402-2, homing mode). The machine is in state
- * HOMING. A stop, a quick stop or a fault leaves that state and ends homing. The drives are then configured again before
- * they can be enabled, which restores mode 8.
+ * Method, speeds and offset were written when the drive was configured (CiA 402-2, homing mode). The machine is in
+ * state HOMING. A stop, a quick stop or a fault leaves that state and ends homing. The drives are then configured again
+ * before they can be enabled, which restores mode 8.
  *
- * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine. Times are counted in ticks,
- * so they have the same meaning on a host that is too slow.
+ * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine. Times are counted in
+ * ticks, so they have the same meaning on a host that is too slow.
  */
 #ifndef APP_DRIVES_HOMING_H
 #define APP_DRIVES_HOMING_H
@@ -25,16 +25,16 @@
 #include "can/can_frame.h"
 
 #define HOMING_SWITCH_US 2000000u /* to switch a drive on, or off */
-#define HOMING_SPARE_S   10u      /* beside the way there and back */
+#define HOMING_SPARE_S   10u      /* in addition to the time for the whole travel */
 #define HOMING_MAX_S     600u
 
-/* A controlword this long on its way is in the next statusword: sent, latched, answered takes 4, the others are for
- * frames that are lost. Until then "attained" may be that of an earlier homing. */
+/* After so many SYNCs the statusword answers the new controlword: sending, latching and answering take 4, the others
+ * are for lost frames. Until then "attained" may be that of an earlier homing. */
 #define HOMING_SYNCS_BEFORE_ANSWER 10u
 
 enum homing_phase {
     HOMING_IDLE,
-    HOMING_OFF,    /* until the drive is off: it may have got that command just before */
+    HOMING_OFF,    /* until the drive is off: the command may be a few ticks old */
     HOMING_MODE,   /* writes 0x6060 = 6, until 0x6061 is 6 */
     HOMING_ENABLE, /* to Operation enabled */
     HOMING_MOVE,   /* the drive seeks its zero */
@@ -51,21 +51,21 @@ struct homing {
 
 void homing_init(struct homing *homing);
 
-/* Begins homing, or returns why not; `properties` of each axis. */
+/* Begins homing, or returns the reason of the refusal; `properties` of each axis. */
 enum machine_refusal homing_begin(struct homing *homing, struct machine *machine,
                                   const struct drive_properties *properties);
 
-/* True while it uses the SDO channels of the drives. */
+/* True while homing uses the SDO channels of the drives. */
 bool homing_busy(const struct homing *homing);
 
-/* Takes a frame; others than SDO answers are ignored. True when *out is to be sent. */
+/* Takes a frame; ignores all except SDO responses. True when *out is to be sent. */
 bool homing_receive(struct homing *homing, const struct can_msg *in, struct can_msg *out);
 
 /* Lets time pass. True when *out is to be sent: then call again with elapsed_us 0. */
 bool homing_process(struct homing *homing, struct machine *machine, uint32_t elapsed_us,
                     struct can_msg *out);
 
-/* How long the drive may seek its zero, s: the whole travel at both speeds, and some. Pure. */
+/* The longest time that the drive may seek its zero, s: the whole travel at both speeds, and HOMING_SPARE_S. Pure. */
 uint32_t homing_time_s(const struct config *config, uint8_t axis);
 
 #endif

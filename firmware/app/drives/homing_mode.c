@@ -21,7 +21,8 @@ void homing_mode_begin(struct homing_mode *mode)
     mode->client.status = SDO_CLIENT_IDLE;
 }
 
-static bool ask(struct homing_mode *mode, uint8_t node, uint8_t wanted, struct can_msg *out)
+static bool request_next(struct homing_mode *mode, uint8_t node, uint8_t wanted,
+                         struct can_msg *out)
 {
     struct sdo_client *client = &mode->client;
     const int begun =
@@ -76,5 +77,5 @@ bool homing_mode_process(struct homing_mode *mode, uint8_t node, uint8_t wanted,
     if (*result != HOMING_MODE_PENDING || waits(mode, elapsed_us)) {
         return false;
     }
-    return ask(mode, node, wanted, out);
+    return request_next(mode, node, wanted, out);
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * homing_mode: brings a drive into a mode of operation by SDO: writes 0x6060, then reads 0x6061 until it has the mode.
+ * homing_mode: brings a drive into a mode of operation by SDO: writes 0x6060, then reads 0x6061 until the drive has the
+ * mode. Used by app/drives/homing. No I/O; changes its struct only.
  *
  *     homing_mode_begin(&mode);
  *     each poll: if (homing_mode_process(&mode, node, 6, elapsed_us, &out, &result)) -> send out
@@ -37,7 +38,7 @@ struct homing_mode {
 
 void homing_mode_init(struct homing_mode *mode);
 
-/* Another mode, or another drive: a transfer that is under way is forgotten. */
+/* Begins with a mode or drive; drops a transfer that is under way. */
 void homing_mode_begin(struct homing_mode *mode);
 
 /* Lets time pass. Returns true when *out is to be sent. */

@@ -14,7 +14,7 @@ void axis_init(struct axis *axis, uint8_t node)
     memset(axis, 0, sizeof *axis);
     axis->node = node;
     axis->goal = CIA402_GOAL_OFF;
-    axis->rest_syncs = AXIS_REST_SYNCS;
+    axis->unmoved_syncs = AXIS_UNMOVED_SYNCS;
     pdo_begin_setpoint(node, &axis->setpoint);
 }
 
@@ -87,20 +87,20 @@ static bool moves_in(enum cia402_state state)
            state == CIA402_FAULT_REACTION_ACTIVE;
 }
 
-/* Reset in each state: an axis is at rest when its power comes on. */
-static void count_rest(struct axis *axis, uint32_t tolerance_counts)
+/* Restarts with each state: an axis stands when its power comes on. */
+static void count_unmoved(struct axis *axis, uint32_t tolerance_counts)
 {
     if (!moves_in(axis->state)) {
-        axis->rest_syncs = AXIS_REST_SYNCS;
-        axis->rest_counts = axis->position_counts;
-    } else if ((axis->state != axis->rest_state && moves_in(axis->rest_state)) ||
-               distance(axis->rest_counts, axis->position_counts) > tolerance_counts) {
-        axis->rest_syncs = 0;
-        axis->rest_counts = axis->position_counts;
-    } else if (axis->rest_syncs < AXIS_STANDSTILL_SYNCS) {
-        axis->rest_syncs++;
+        axis->unmoved_syncs = AXIS_UNMOVED_SYNCS;
+        axis->unmoved_counts = axis->position_counts;
+    } else if ((axis->state != axis->unmoved_state && moves_in(axis->unmoved_state)) ||
+               distance(axis->unmoved_counts, axis->position_counts) > tolerance_counts) {
+        axis->unmoved_syncs = 0;
+        axis->unmoved_counts = axis->position_counts;
+    } else if (axis->unmoved_syncs < AXIS_STANDSTILL_SYNCS) {
+        axis->unmoved_syncs++;
     }
-    axis->rest_state = axis->state;
+    axis->unmoved_state = axis->state;
 }
 
 void axis_compare(struct axis *axis, uint32_t window_counts, uint32_t syncs_max)
@@ -158,7 +158,7 @@ void axis_setpoint(struct axis *axis, uint32_t tolerance_counts)
     follow_position(axis);
     pdo_put_target(&axis->setpoint, axis->target_counts);
     count_standstill(axis, tolerance_counts);
-    count_rest(axis, tolerance_counts);
+    count_unmoved(axis, tolerance_counts);
 }
 
 bool axis_lost_for_long(const struct axis *axis, uint32_t now_us)
@@ -184,18 +184,18 @@ bool axis_follows(const struct axis *axis)
 
 bool axis_moves(const struct axis *axis)
 {
-    return moves_in(axis->state) && axis->rest_syncs < AXIS_REST_SYNCS;
+    return moves_in(axis->state) && axis->unmoved_syncs < AXIS_UNMOVED_SYNCS;
 }
 
-/* A statusword that means nothing, once, does not make a moving drive a stopped one. */
+/* One invalid statusword does not make a moving drive a stopped one. */
 bool axis_has_stopped(const struct axis *axis)
 {
     if (axis->state == CIA402_NOT_READY && moves_in(cia402_decode(axis->statusword_before))) {
         return axis->tpdo1.lost;
     }
     return axis->tpdo1.lost || !moves_in(axis->state) ||
-           (axis->state == CIA402_QUICK_STOP_ACTIVE && axis->rest_state == axis->state &&
-            axis->rest_syncs >= AXIS_STANDSTILL_SYNCS);
+           (axis->state == CIA402_QUICK_STOP_ACTIVE && axis->unmoved_state == axis->state &&
+            axis->unmoved_syncs >= AXIS_STANDSTILL_SYNCS);
 }
 
 bool axis_reached(const struct axis *axis)
@@ -205,7 +205,7 @@ bool axis_reached(const struct axis *axis)
     return follows && cia402_master_reached(axis->goal, axis->statusword);
 }
 
-bool axis_still(const struct axis *axis)
+bool axis_stands(const struct axis *axis)
 {
     return axis->standstill_syncs >= AXIS_STANDSTILL_SYNCS;
 }

@@ -10,7 +10,7 @@
 #include "core/kernel.h"
 #include "core/qmath.h"
 
-/* Objects of the configuration, beside those in the table of axis fields. */
+/* Objects of the configuration, in addition to those in the table of axis fields. */
 enum {
     PERIOD = 0x1006,
     CONFIGURATION = 0x2004,
@@ -119,7 +119,7 @@ static bool is_by_axis(uint16_t index)
     return index == NODE || index == TRAVEL_MIN || index == TRAVEL_MAX || is_axis_field(index);
 }
 
-/* What axes beyond the last one hold is left over from another machine and means nothing. */
+/* Values of axes beyond the last one may be those of another machine: they are ignored. */
 static bool counts(const struct od_entry *entry, uint8_t axis_count)
 {
     return (entry->access & OD_WRITE) != 0u && config_contains(entry->index) &&
@@ -151,16 +151,17 @@ static uint32_t at_most_u32(uint64_t value)
 static uint32_t window_counts(const struct config *config, uint8_t axis)
 {
     const struct config_axis *own = &config->axis[axis];
-    const bool turns = own->counts_per_unit != 0u;
-    const uint64_t lag_nm = (uint64_t)(turns ? own->velocity_limit_um_s : config->feed_limit_um_s) *
-                            CONFIG_WINDOW_MS; /* um/s * ms */
+    const bool is_rotary = own->counts_per_unit != 0u;
+    const uint64_t lag_nm =
+        (uint64_t)(is_rotary ? own->velocity_limit_um_s : config->feed_limit_um_s) *
+        CONFIG_WINDOW_MS; /* um/s * ms */
     if (lag_nm == 0u || lag_nm > UINT32_MAX) {
         return UINT32_MAX;
     }
     return at_most_u32(qmath_div_u64(lag_nm * config_counts_per_unit(config, axis), 1000000u));
 }
 
-static uint32_t turn_tolerance_counts(const struct config *config, uint8_t axis)
+static uint32_t rotary_tolerance_counts(const struct config *config, uint8_t axis)
 {
     const uint64_t scaled =
         (uint64_t)config->start_tolerance_counts * config->axis[axis].counts_per_unit;
@@ -212,7 +213,7 @@ void config_read(struct config *config, const struct od *od)
         config->travel_max_counts[i] = (int32_t)number(od, TRAVEL_MAX, sub);
         read_axis(&config->axis[i], od, sub);
         read_window(config, i);
-        config->turn_tolerance_counts[i] = turn_tolerance_counts(config, i);
+        config->rotary_tolerance_counts[i] = rotary_tolerance_counts(config, i);
     }
     read_outputs(&config->outputs, od);
     config->crc32 = crc_of(od, config->axis_count);
@@ -269,13 +270,13 @@ bool config_same_zero(const struct config *first, const struct config *second, u
            a->gear_shaft_revolutions == b->gear_shaft_revolutions;
 }
 
-/* magnitude * 2^40 / counts_per_mm; rest < counts_per_mm <= 2^23 keeps the shift inside. */
+/* magnitude * 2^40 / counts_per_mm; remainder < counts_per_mm <= 2^23, so the shift stays inside 64 bits. */
 static uint64_t q40_from_magnitude(uint32_t magnitude, uint32_t counts_per_mm, bool round_up)
 {
     const uint64_t whole = magnitude / counts_per_mm;
-    const uint64_t rest = magnitude % counts_per_mm;
+    const uint64_t remainder = magnitude % counts_per_mm;
     const uint64_t bias = round_up ? counts_per_mm - 1u : 0u;
-    return (whole << 40) + qmath_div_u64((rest << 40) + bias, counts_per_mm);
+    return (whole << 40) + qmath_div_u64((remainder << 40) + bias, counts_per_mm);
 }
 
 static int64_t q40_from_counts(int32_t counts, uint32_t counts_per_mm, bool upwards)

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * config: what the host has configured, as one value: objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2016, 0x2018 ...
+ * config: the configuration by the host as one value: objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2016, 0x2018 ...
  * 0x201A, 0x201D ... 0x2023, 0x2030 ... 0x2035, 0x2051 ... 0x2053.
  *
- * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy (machine.config),
- * which the main loop replaces under the port's lock at standstill.
+ * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy
+ * (machine.config), which the main loop replaces under the port's lock at standstill.
  */
 #ifndef APP_MACHINE_CONFIG_H
 #define APP_MACHINE_CONFIG_H
@@ -15,7 +15,7 @@
 #include "canopen/od.h"
 #include "core/program_rules.h"
 
-/* Those of a program are the first ones, in the order of its path; the others hold their position. */
+/* A program moves the first ones, in the order of its path; the others hold their position. */
 #define AXES_MAX PROGRAM_AXES
 
 /* Above it the conversion of travel limits to q40 mm would leave 64 bits. */
@@ -31,8 +31,7 @@
 /* SYNCs beyond the drive's own time, so that a drive that detects the deviation reports it first. */
 #define CONFIG_DEVIATION_SYNCS 5u
 
-/* What belongs to one axis beside node and travel. Every field has 32 bits, so that tables can name
- * one by its offset. */
+/* The values of one axis except node and travel. Every field has 32 bits, so that tables can name one by its offset. */
 struct config_axis {
     int32_t homing_method;                  /* 0x6098; 0: not homed by the command */
     uint32_t homing_sequence;               /* axes home in this order; of equal numbers by axis */
@@ -56,11 +55,11 @@ struct config_axis {
     uint32_t expected_vendor; /* 0x1018 subs 1 ... 3 of the drive; 0: any */
     uint32_t expected_product;
     uint32_t expected_revision;
-    uint32_t
-        counts_per_unit; /* of an axis that is not measured in mm but in degrees; 0: counts_per_mm */
+    /* of a rotary axis: counts per degree; 0: counts_per_mm */
+    uint32_t counts_per_unit;
 };
 
-/* Bits of struct config_outputs.behaviour: what becomes of the outputs of the path. */
+/* Bits of struct config_outputs.behaviour: the outputs of the path outside of motion. */
 #define CONFIG_OUTPUTS_KEEP_AT_STOP  1u
 #define CONFIG_OUTPUTS_KEEP_AT_FAULT 2u /* and at a quick stop, and with the drives off */
 #define CONFIG_OUTPUTS_OFF_AT_END    4u
@@ -100,10 +99,10 @@ struct config {
     uint8_t feedforward; /* CONFIG_..._FEEDFORWARD */
     struct config_outputs outputs;
     uint32_t crc32; /* of the objects; docs/reference/protocol.md section 3.4 */
-    uint32_t turn_tolerance_counts
-        [AXES_MAX]; /* start tolerance of axes that turn: as many degrees as else mm */
-    /* How far position and setpoint may be apart, by axis, for how many SYNCs in a row more than these: the following
-     * window and its time where they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, of an axis in degrees
+    uint32_t rotary_tolerance_counts
+        [AXES_MAX]; /* start tolerance of rotary axes: as many degrees as else mm */
+    /* Permitted position deviation by axis, and the number of SYNCs in a row for which it may be exceeded: following
+     * error window and time if they are set, else the distance of CONFIG_WINDOW_MS at the feed limit, for a rotary axis
      * at its own velocity limit (without one: UINT32_MAX). */
     uint32_t deviation_counts[AXES_MAX];
     uint32_t deviation_syncs[AXES_MAX];
@@ -112,9 +111,9 @@ struct config {
 /* Copies the present values out of the dictionary. Main loop. */
 void config_read(struct config *config, const struct od *od);
 
-/* Whether a value for the object is one that the dictionary's own ranges would let pass but that
- * makes no sense: a period that is not 1, 2, 4 or 8 ms; too many counts per mm; a kernel that this image does not
- * have. Pure. */
+/* Whether the configuration allows a value of the object. It refuses values that are inside the ranges of the
+ * dictionary: a period that is not 1, 2, 4 or 8 ms; too many counts per mm; a kernel that this image does not have.
+ * Pure. */
 bool config_value_allowed(uint16_t index, uint8_t sub, uint64_t value);
 
 /* Whether a change of the object concerns the drives, so that they must be configured anew. Pure.
@@ -124,7 +123,7 @@ bool config_concerns_drives(uint16_t index, uint8_t sub);
 /* True for all objects above. Pure. */
 bool config_contains(uint16_t index);
 
-/* Counts of a millimetre, or of a degree of an axis that turns. Pure. */
+/* Counts per millimetre, or per degree of a rotary axis. Pure. */
 static inline uint32_t config_counts_per_unit(const struct config *config, uint32_t axis)
 {
     const uint32_t own = config->axis[axis].counts_per_unit;
@@ -134,8 +133,8 @@ static inline uint32_t config_counts_per_unit(const struct config *config, uint3
 /* Start tolerance of an axis. Pure. */
 static inline uint32_t config_tolerance_counts(const struct config *config, uint32_t axis)
 {
-    const bool turns = config->axis[axis].counts_per_unit != 0u;
-    return turns ? config->turn_tolerance_counts[axis] : config->start_tolerance_counts;
+    const bool is_rotary = config->axis[axis].counts_per_unit != 0u;
+    return is_rotary ? config->rotary_tolerance_counts[axis] : config->start_tolerance_counts;
 }
 
 /* Whether positions of an axis mean the same in both: the zero that homing found under one still holds under the

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of machine. */
+/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of
+ * machine. */
 #ifndef APP_MACHINE_FAULT_H
 #define APP_MACHINE_FAULT_H
 
@@ -8,20 +9,19 @@
 
 #include "canopen/emcy.h"
 
-/* Codes that only this controller uses, beside those of canopen/emcy.h. Detail: the statusword, where nothing else is
- * said. */
+/* Codes of this controller in addition to those of canopen/emcy.h. Detail: the statusword, if not stated otherwise. */
 #define FAULT_NOT_ENABLED   (EMCY_MANUFACTURER | 0x01u) /* did not switch on in time */
 #define FAULT_DROPPED_OUT   (EMCY_MANUFACTURER | 0x02u) /* left Operation enabled */
 #define FAULT_REBOOTED      (EMCY_MANUFACTURER | 0x03u) /* a drive restarted by itself; 0 */
-#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 gone: controlword not followed */
-#define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 gone: target not followed */
+#define FAULT_NOT_REMOTE    (EMCY_MANUFACTURER | 0x04u) /* bit 9 lost: controlword not followed */
+#define FAULT_NOT_FOLLOWING (EMCY_MANUFACTURER | 0x05u) /* bit 12 lost: target not followed */
 #define FAULT_NOT_STOPPED   (EMCY_MANUFACTURER | 0x06u) /* no end of the quick stop in time */
 #define FAULT_NOT_SENT (EMCY_MANUFACTURER | 0x07u) /* own frames do not leave; ticks in a row */
-#define FAULT_POSITION_DEVIATION                                                                   \
-    (EMCY_MANUFACTURER | 0x08u)                    /* position and setpoint apart; counts */
+/* position and setpoint apart; counts */
+#define FAULT_POSITION_DEVIATION (EMCY_MANUFACTURER | 0x08u)
 #define FAULT_SYNC_GAP (EMCY_MANUFACTURER | 0x09u) /* no SYNC for too long, real drives; us */
-#define FAULT_STOP_LATE                                                                            \
-    (EMCY_MANUFACTURER | 0x0Au) /* a stop along the path beyond its deadline; setpoint */
+/* a stop along the path beyond its deadline; setpoint */
+#define FAULT_STOP_LATE       (EMCY_MANUFACTURER | 0x0Au)
 #define FAULT_MAIN_LOOP_STALL (EMCY_MANUFACTURER | 0x0Bu) /* the main loop has stalled; us */
 
 /* Homing. */
@@ -38,7 +38,7 @@ struct fault {
 /* One English phrase for a fault code, never NULL. Pure. */
 const char *fault_text(uint16_t code);
 
-/* Whether a drive's own emergency code is more exact than this one, which only has a state seen in its statusword.
+/* Whether this code only describes a state of the statusword, so that the drive's own emergency code is more exact.
  * Pure. */
 bool fault_is_vague(uint16_t code);
 

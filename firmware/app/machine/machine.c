@@ -100,7 +100,7 @@ bool machine_busy(const struct machine *machine)
         return machine->state == MACHINE_ENABLING || machine_moving(machine);
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_still(&machine->axes[i])) {
+        if (!axis_stands(&machine->axes[i])) {
             return true;
         }
     }
@@ -124,7 +124,7 @@ uint32_t machine_answer_wait_us(const struct machine *machine)
     return (real ? MACHINE_REAL_WAIT_MAX_MS : wait_ms) * US_PER_MS;
 }
 
-/* A drive that is lost is not waited for: the others have to be braked in time. */
+/* Ticks do not wait for a lost drive: the others have to be braked in time. */
 static bool all_answered(const struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {

@@ -53,7 +53,7 @@ void machine_raise(struct machine *machine, uint16_t code, uint8_t node, uint32_
     }
 }
 
-/* An output that is short or open, an error of the module itself. With the drives off nothing depends on it. */
+/* An output with a short or open circuit, or an error of the module itself. With the drives off it has no effect. */
 static void note_module_error(struct machine *machine, uint8_t node, uint16_t code)
 {
     const bool on = machine->state != MACHINE_BOOT && machine->state != MACHINE_OFF;
@@ -79,8 +79,8 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
     }
 }
 
-/* A drive that does not answer may still receive, and brake. One that still moves would coast without power. So their
- * power stays on. */
+/* A drive that does not answer may still receive, and brake. A drive that still moves would coast without power. So
+ * their power stays on. */
 void machine_switch_off(struct machine *machine)
 {
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
@@ -91,7 +91,7 @@ void machine_switch_off(struct machine *machine)
     machine->fault_phase = MACHINE_FAULT_OFF;
 }
 
-/* ---- Through its phases, and out of it ---- */
+/* ---- Its phases, and its end ---- */
 
 enum machine_refusal machine_reset(struct machine *machine)
 {
@@ -123,8 +123,8 @@ static bool stays_in_fault(const struct axis *axis)
     return axis_in_fault(axis) && axis->error_code != EMCY_NO_ERROR;
 }
 
-/* A drive that does not answer at all, or not what it was asked, is left to BOOT, which looks for it, configures it anew and
- * reports what is wrong. */
+/* BOOT handles a drive that does not answer or has the wrong state: it searches the drive, configures it anew and
+ * reports the error. */
 static void step_resetting(struct machine *machine)
 {
     const struct axis *late = machine_late_drive(machine);

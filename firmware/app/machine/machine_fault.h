@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* machine_fault: how the machine enters a fault, goes through its phases and leaves it; machine.h declares the rest
- * (machine_raise, machine_note_emergency, machine_switch_off, machine_reset). Under the lock. */
+/* machine_fault: how the machine enters a fault, goes through its phases and leaves it. Used by the files of
+ * app/machine only; the public functions of machine_fault.c are in machine.h (machine_raise, machine_note_emergency,
+ * machine_switch_off, machine_reset). Under the lock. */
 #ifndef APP_MACHINE_MACHINE_FAULT_H
 #define APP_MACHINE_MACHINE_FAULT_H
 
 #include "app/machine/machine.h"
 
-/* FAULT by quick stop, whatever the drives say. Any context. */
+/* FAULT with a quick stop, whatever the state of the drives. Any context. */
 void machine_raise_quick(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail);
 
 /* In FAULT: from braking to the quick stop. Any context. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The requests of app/machine/machine.h: commands of the operator, from app/commands.c (main loop, under the lock). Each
- * changes the state, or returns why not. docs/reference/architecture.md section 4 has the table of requests by state. */
+/* The requests of app/machine/machine.h: commands of the operator, from app/commands.c (main loop, under the lock).
+ * Each changes the state, or returns why not. docs/reference/architecture.md section 4 has the table of requests by
+ * state. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"
@@ -181,7 +182,7 @@ static enum machine_refusal start_refusal(const struct machine *machine,
         }
     }
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
-        if (!axis_still(&machine->axes[i])) {
+        if (!axis_stands(&machine->axes[i])) {
             return MACHINE_MOVING;
         }
     }

@@ -107,7 +107,7 @@ void machine_supervise(struct machine *machine, uint32_t now_us)
     }
 }
 
-/* The drives' clock is the SYNC, so what they should have reached counts from those that left. */
+/* The drives' clock is the SYNC, so their expected positions follow the SYNCs that have left. */
 void machine_note_sync(struct machine *machine, uint32_t now_us, enum machine_sync sync)
 {
     const bool sent = sync == MACHINE_SYNC_SENT;

@@ -27,7 +27,7 @@ static void raise_found(struct machine *machine)
     }
 }
 
-/* While they were being configured nobody waited for their answers. Where none comes the start may have been lost. */
+/* During configuration no answers were expected. If none comes now, the NMT start may have been lost. */
 static void step_boot(struct machine *machine)
 {
     if (!machine->configured) {
@@ -35,9 +35,9 @@ static void step_boot(struct machine *machine)
     }
     if (!machine_drives_answer(machine)) {
         if (machine_time_is_up(machine)) {
-            const uint8_t silent = unresponsive_node(machine);
+            const uint8_t node = unresponsive_node(machine);
             machine_enter_boot(machine);
-            machine->unresponsive_node = silent;
+            machine->unresponsive_node = node;
         }
         return;
     }
@@ -59,7 +59,7 @@ static void step_enabling(struct machine *machine)
     }
 }
 
-/* Without a point there is nothing to brake along. */
+/* Without a point no brake along the path is possible. */
 static void next_targets(struct machine *machine)
 {
     int32_t target_counts[AXES_MAX];
@@ -79,7 +79,7 @@ static void next_targets(struct machine *machine)
     machine->statistics.program_tick = machine->motion.setpoints - 1u;
 }
 
-/* A drive that has stopped by itself without a word is no reason to say that the program has been run. */
+/* A drive may have stopped by itself without a report: then the program has not been completed. */
 static void step_arriving(struct machine *machine)
 {
     const struct axis *away = machine_not_arrived(machine);
@@ -172,7 +172,7 @@ void machine_step(struct machine *machine)
         break;
     case MACHINE_OFF:
     case MACHINE_READY:
-    case MACHINE_HOMING: /* led by the main loop */
+    case MACHINE_HOMING: /* controlled by the main loop */
     default:
         break;
     }

@@ -20,8 +20,8 @@ struct offsets {
 
 void offsets_init(struct offsets *offsets);
 
-/* Offsets of this tick's setpoints, by axis of the machine; 0 where the motion gave no new setpoint. `motion`: after its
- * step; NULL when no motion runs. Call it once a tick. Timer. */
+/* Offsets of this tick's setpoints, by axis of the machine; 0 where the motion gave no new setpoint. `motion`: after
+ * its step; NULL when no motion runs. Call it once a tick. Timer. */
 void offsets_step(struct offsets *offsets, const struct config *config, const struct motion *motion,
                   struct feedforward_offset offset[AXES_MAX]);
 

@@ -28,7 +28,7 @@ static enum outputs_mode mode_of(const struct machine *machine)
 {
     const uint32_t behaviour = machine->config.outputs.behaviour;
     switch (machine->state) {
-    case MACHINE_RUNNING: /* a motion that waits for a chunk is as one in hold */
+    case MACHINE_RUNNING: /* a motion that waits for a chunk counts as held */
         return follow_or((behaviour & CONFIG_OUTPUTS_OFF_IN_HOLD) == 0u ||
                              !motion_misses_chunk(&machine->motion),
                          OUTPUTS_MASKED);
@@ -51,30 +51,30 @@ static enum outputs_mode mode_of(const struct machine *machine)
 static void put(struct outputs *outputs, const struct path_outputs_values *values)
 {
     outputs->newest = (outputs->newest + 1u) % CONFIG_OUTPUTS_DELAY_MAX;
-    outputs->held_back[outputs->newest] = *values;
+    outputs->delayed[outputs->newest] = *values;
 }
 
 /* Makes the outputs of `delay_ticks` SYNCs ago the present ones. */
-static void hold_back(struct outputs *outputs, const struct path_outputs_values *values,
-                      uint32_t delay_ticks)
+static void delay(struct outputs *outputs, const struct path_outputs_values *values,
+                  uint32_t delay_ticks)
 {
     if (delay_ticks == 0u) {
         outputs->present = *values;
         return;
     }
     const uint32_t from = outputs->newest + CONFIG_OUTPUTS_DELAY_MAX + 1u - delay_ticks;
-    outputs->present = outputs->held_back[from % CONFIG_OUTPUTS_DELAY_MAX];
+    outputs->present = outputs->delayed[from % CONFIG_OUTPUTS_DELAY_MAX];
     put(outputs, values);
 }
 
 static void switch_off(struct outputs *outputs)
 {
-    memset(outputs->held_back, 0, sizeof outputs->held_back);
+    memset(outputs->delayed, 0, sizeof outputs->delayed);
     memset(&outputs->present, 0, sizeof outputs->present);
 }
 
-/* Executes the events up to the last setpoint. During a rest before a program that setpoint is not the program's: an
- * event at its start acts with its first setpoint. */
+/* Executes the events up to the last setpoint. During a rest before a program the last setpoint belongs to its
+ * predecessor: an event at the start acts with the first setpoint of the program. */
 static void follow_path(struct motion *motion)
 {
     if (motion->setpoints > 0u && !motion->precedes && path_outputs_active(&motion->outputs) != 0) {
@@ -92,7 +92,7 @@ void outputs_step(struct outputs *outputs, struct machine *machine, bool synced)
     if (mode != OUTPUTS_FOLLOW) {
         switch_off(outputs);
     } else if (synced) {
-        hold_back(outputs, &machine->motion.outputs.values, machine->config.outputs.delay_ticks);
+        delay(outputs, &machine->motion.outputs.values, machine->config.outputs.delay_ticks);
     }
     if (mode == OUTPUTS_CLEARED) {
         path_outputs_clear(&machine->motion.outputs);

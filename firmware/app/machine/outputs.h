@@ -2,10 +2,10 @@
 /*
  * outputs: sends the outputs that a path switches to the I/O module. Called by the tick after the machine's step.
  *
- * The state of the machine can switch outputs off: hold, stop, end of the program, fault, as 0x2035 configures it. Outputs
- * that are on are delayed by a configured number of ticks. Setpoint k is sent after SYNC k, latched at SYNC k+1 and reached
- * at SYNC k+2; the module latches a frame at the next SYNC. So a delay of one tick switches when the axes are at the
- * place. Switching off is not delayed.
+ * The state of the machine can switch outputs off: hold, stop, end of the program, fault, as 0x2035 configures it.
+ * Outputs that are on are delayed by a configured number of ticks. Setpoint k is sent after SYNC k, latched at SYNC k+1
+ * and reached at SYNC k+2; the module latches a frame at the next SYNC. So a delay of one tick switches when the axes
+ * are at the place. Switching off is not delayed.
  */
 #ifndef APP_MACHINE_OUTPUTS_H
 #define APP_MACHINE_OUTPUTS_H
@@ -20,9 +20,9 @@
 #define OUTPUTS_REFRESH_TICKS 64u
 
 struct outputs {
-    struct path_outputs_values held_back[CONFIG_OUTPUTS_DELAY_MAX]; /* ring */
-    uint32_t newest;                                                /* index of its last entry */
-    struct path_outputs_values present; /* the module has them from the next SYNC on */
+    struct path_outputs_values delayed[CONFIG_OUTPUTS_DELAY_MAX]; /* ring */
+    uint32_t newest;                                              /* index of its last entry */
+    struct path_outputs_values present; /* those that the module has from the next SYNC on */
     struct path_outputs_values sent;
     uint32_t refresh_ticks; /* until the frame is sent again; 0: it is due */
 };
@@ -30,8 +30,8 @@ struct outputs {
 /* All outputs off; the frame is due. */
 void outputs_init(struct outputs *outputs);
 
-/* Computes the outputs of this tick, after the machine's step. `synced`: a SYNC has been sent in this tick. Where the state
- * clears the outputs, those of machine->motion are cleared too. Timer. */
+/* Computes the outputs of this tick, after the machine's step. `synced`: a SYNC has been sent in this tick. Where the
+ * state clears the outputs, those of machine->motion are cleared too. Timer. */
 void outputs_step(struct outputs *outputs, struct machine *machine, bool synced);
 
 /* True when *out is to be sent in this tick. Timer. */

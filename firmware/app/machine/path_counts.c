@@ -34,8 +34,8 @@ void path_counts_ends(const struct program *program, const struct config *config
     path_counts_of(&scale, &last, end_counts);
 }
 
-void path_counts_rest(const struct path_counts *scale, const struct interpolator_point *point,
-                      int32_t counts[AXES_MAX])
+void path_counts_others(const struct path_counts *scale, const struct interpolator_point *point,
+                        int32_t counts[AXES_MAX])
 {
     int32_t *own = counts + scale->first_axis;
     for (uint32_t i = PROGRAM_PLANE; i < scale->axis_count; ++i) {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* statistics: counters of the tick: lateness, missed TPDOs, refused frames (object 0x2008). Written by the tick and by
- * machine_supervise.c, read by the main loop under the port's lock. */
+ * machine_supervise.c, read by the main loop; all under the port's lock. */
 #ifndef APP_MACHINE_STATISTICS_H
 #define APP_MACHINE_STATISTICS_H
 

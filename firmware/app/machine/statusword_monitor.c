@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/statusword_monitor.h (see there): bits of a drive's statusword beside those of the state,
- * while it is in Operation enabled. */
+/* Implements app/machine/statusword_monitor.h (see there): bits of a drive's statusword in addition to those of the
+ * state, while it is in Operation enabled. */
 #include "app/machine/statusword_monitor.h"
 
 #include "app/machine/fault.h"
@@ -8,44 +8,44 @@
 
 #define KEEPS_ALWAYS (CIA402_STATUS_VOLTAGE | CIA402_STATUS_REMOTE)
 
-void statusword_monitor_init(struct statusword_monitor *watch)
+void statusword_monitor_init(struct statusword_monitor *monitor)
 {
-    watch->seen = 0;
-    watch->wrong = 0;
-    watch->in_row = 0;
+    monitor->seen = 0;
+    monitor->wrong = 0;
+    monitor->in_row = 0;
 }
 
-void statusword_monitor_take(struct statusword_monitor *watch, uint16_t statusword, bool csp)
+void statusword_monitor_take(struct statusword_monitor *monitor, uint16_t statusword, bool csp)
 {
     const unsigned keeps = csp ? KEEPS_ALWAYS | CIA402_STATUS_FOLLOWS : KEEPS_ALWAYS;
     const unsigned unwanted = csp ? CIA402_STATUS_FOLLOWING_ERROR : 0u;
-    watch->seen = (uint16_t)(watch->seen | statusword);
-    watch->wrong =
-        (uint16_t)((watch->seen & keeps & ~(unsigned)statusword) | (statusword & unwanted));
-    if (watch->wrong == 0u) {
-        watch->in_row = 0;
-    } else if (watch->in_row < UINT8_MAX) {
-        watch->in_row++;
+    monitor->seen = (uint16_t)(monitor->seen | statusword);
+    monitor->wrong =
+        (uint16_t)((monitor->seen & keeps & ~(unsigned)statusword) | (statusword & unwanted));
+    if (monitor->wrong == 0u) {
+        monitor->in_row = 0;
+    } else if (monitor->in_row < UINT8_MAX) {
+        monitor->in_row++;
     }
 }
 
-uint16_t statusword_monitor_trouble(const struct statusword_monitor *watch)
+uint16_t statusword_monitor_trouble(const struct statusword_monitor *monitor)
 {
-    if (watch->in_row <= STATUSWORD_MONITOR_TOLERATED) {
+    if (monitor->in_row <= STATUSWORD_MONITOR_TOLERATED) {
         return EMCY_NO_ERROR;
     }
-    if ((watch->wrong & CIA402_STATUS_VOLTAGE) != 0u) {
+    if ((monitor->wrong & CIA402_STATUS_VOLTAGE) != 0u) {
         return EMCY_DC_UNDERVOLTAGE;
     }
-    if ((watch->wrong & CIA402_STATUS_REMOTE) != 0u) {
+    if ((monitor->wrong & CIA402_STATUS_REMOTE) != 0u) {
         return FAULT_NOT_REMOTE;
     }
-    return (watch->wrong & CIA402_STATUS_FOLLOWING_ERROR) != 0u ? EMCY_FOLLOWING_ERROR
-                                                                : FAULT_NOT_FOLLOWING;
+    return (monitor->wrong & CIA402_STATUS_FOLLOWING_ERROR) != 0u ? EMCY_FOLLOWING_ERROR
+                                                                  : FAULT_NOT_FOLLOWING;
 }
 
-bool statusword_monitor_follows(const struct statusword_monitor *watch)
+bool statusword_monitor_follows(const struct statusword_monitor *monitor)
 {
-    return watch->in_row <= STATUSWORD_MONITOR_TOLERATED ||
-           (watch->wrong & (unsigned)~CIA402_STATUS_FOLLOWING_ERROR) == 0u;
+    return monitor->in_row <= STATUSWORD_MONITOR_TOLERATED ||
+           (monitor->wrong & (unsigned)~CIA402_STATUS_FOLLOWING_ERROR) == 0u;
 }

@@ -27,7 +27,7 @@ void tpdo_monitor_restart(struct tpdo_monitor *monitor)
     monitor->last_us = before.last_us;
 }
 
-/* It is known to be late, or missed. */
+/* The oldest pending frame has come late, or counts as missed. */
 static void drop_oldest_pending(struct tpdo_monitor *monitor)
 {
     monitor->first = (uint8_t)((monitor->first + 1u) % TPDO_MONITOR_PENDING_MAX);

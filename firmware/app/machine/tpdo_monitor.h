@@ -2,12 +2,13 @@
 /*
  * tpdo_monitor: counts the TPDO1 frames that a drive did not send, one monitor for each axis.
  *
- * The drive sends one TPDO1 after each SYNC. The frame does not contain which SYNC it answers. So a TPDO1 that is absent
- * at the next SYNC is pending first. It was late if two TPDO1 come in one later period, at most `wait_us` after the SYNC
- * that it belongs to. Otherwise it is missed. Missed frames are counted, late ones are not. All pending frames of a lost
- * drive are missed. A drive that becomes late by one SYNC and stays so gives one missed frame.
+ * The drive sends one TPDO1 after each SYNC. The frame does not contain which SYNC it answers. So a TPDO1 that is
+ * absent at the next SYNC is pending first. It was late if two TPDO1 come in one later period, at most `wait_us` after
+ * the SYNC that it belongs to. Otherwise it is missed. Missed frames are counted, late ones are not. All pending frames
+ * of a lost drive are missed. A drive that becomes late by one SYNC and stays so gives one missed frame.
  *
- * Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock. Times are port_time_us(), which wraps.
+ * Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock. Times are port_time_us(), which
+ * wraps.
  */
 #ifndef APP_MACHINE_TPDO_MONITOR_H
 #define APP_MACHINE_TPDO_MONITOR_H
@@ -24,11 +25,11 @@ struct tpdo_monitor {
     uint8_t count;          /* TPDO1 since the present SYNC; more than 1: late or doubled frames */
     uint32_t last_us;       /* time of the last TPDO1 */
     uint32_t absent_in_row; /* SYNCs in a row without a TPDO1 */
-    uint32_t
-        absent_us[TPDO_MONITOR_PENDING_MAX]; /* ring: times of the SYNCs whose TPDO1 is pending */
-    uint8_t first;                           /* index of the oldest */
-    uint8_t pending;                         /* number of pending frames */
-    uint32_t missed;                         /* frames missed since tpdo_monitor_init */
+    /* ring: times of the SYNCs whose TPDO1 is pending */
+    uint32_t absent_us[TPDO_MONITOR_PENDING_MAX];
+    uint8_t first;   /* index of the oldest */
+    uint8_t pending; /* number of pending frames */
+    uint32_t missed; /* frames missed since tpdo_monitor_init */
 };
 
 void tpdo_monitor_init(struct tpdo_monitor *monitor);
@@ -39,8 +40,8 @@ void tpdo_monitor_take(struct tpdo_monitor *monitor, uint32_t now_us);
 /* Sets all counters to 0. `present` stays. Main loop or timer, under the lock. */
 void tpdo_monitor_restart(struct tpdo_monitor *monitor);
 
-/* Closes a SYNC that was answered while no frame is pending: true, and nothing is missed. Otherwise false, and nothing is
- * changed: call tpdo_monitor_close_sync. Timer. */
+/* Closes a SYNC that was answered while no frame is pending: true, and nothing is missed. Otherwise false, and nothing
+ * is changed: call tpdo_monitor_close_sync. Timer. */
 static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *monitor)
 {
     if (monitor->count == 0u || monitor->pending != 0u) {
@@ -51,9 +52,9 @@ static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *monitor)
     return true;
 }
 
-/* Closes the SYNC that was sent at sync_us. The drive is lost when more than missed_max SYNCs in a row have no answer and
- * the last answer is more than wait_us ago; it stays lost until its next TPDO1. Returns the number of frames that this
- * call found to be missed. Timer. */
+/* Closes the SYNC that was sent at sync_us. The drive is lost when more than missed_max SYNCs in a row have no answer
+ * and the last answer is more than wait_us ago; it stays lost until its next TPDO1. Returns the number of frames that
+ * this call found to be missed. Timer. */
 uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *monitor, uint32_t now_us, uint32_t sync_us,
                                  uint32_t wait_us, uint8_t missed_max);
 

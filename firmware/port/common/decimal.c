@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements port/common/decimal.h (see there): an integer as text. */
 #include "port/common/decimal.h"
 
 /* Digits from the end. */

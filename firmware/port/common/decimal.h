@@ -7,7 +7,7 @@
 
 #define DECIMAL_SIZE 12u /* sign, ten digits, end */
 
-/* The number as text; it begins somewhere in `text`. Any context. */
+/* The number as text: a pointer into `text`. Any context. */
 const char *decimal(int32_t value, char text[DECIMAL_SIZE]);
 
 #endif

@@ -20,7 +20,7 @@ uint32_t port_store_size(unsigned bank)
     return bank < PORT_STORE_BANKS ? ram_store.bank_bytes : PORT_STORE_PARAMETER_BYTES;
 }
 
-/* Only what makes the rest count has to go; and on a host, pages that were never written cost nothing. */
+/* Clearing the commit record is enough; and on a host, pages that were never written cost nothing. */
 int port_store_erase(unsigned bank)
 {
     if (bank >= PORT_STORE_BANKS_ALL) {

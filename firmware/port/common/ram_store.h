@@ -9,7 +9,8 @@
  *     static uint8_t parameters[RAM_STORE_PARAMETER_BYTES] __attribute__((section(".store"), aligned(8)));
  *     struct ram_store ram_store = {banks[0], sizeof banks[0], parameters};
  *
- * Section .store is the memory STORE of the linker scripts in firmware/targets. It is lost with the power.
+ * Section .store is the memory STORE of the linker scripts in firmware/targets. It is lost with the power. The
+ * application calls the functions of port.h, from the main loop; nothing else reads or writes this memory.
  */
 #ifndef PORT_COMMON_RAM_STORE_H
 #define PORT_COMMON_RAM_STORE_H
@@ -28,7 +29,7 @@ struct ram_store {
     uint8_t *parameters; /* RAM_STORE_PARAMETER_BYTES, aligned to 8 */
 };
 
-/* Complete before the first function port_store_... is called. */
+/* The port fills it before the first function port_store_... is called. */
 extern struct ram_store ram_store;
 
 #endif

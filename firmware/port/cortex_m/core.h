@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What every Cortex-M has at the same addresses: SysTick, interrupt controller, the mask of all interrupts. */
+/* core: what every Cortex-M has at the same addresses: SysTick, interrupt controller, the mask of all interrupts. Used
+ * by the ports of a Cortex-M. Any context. */
 #ifndef PORT_CORTEX_M_CORE_H
 #define PORT_CORTEX_M_CORE_H
 
@@ -18,7 +19,7 @@
 #define CORE_ICSR_PENDSTSET  (1u << 26) /* SysTick is pending */
 #define CORE_SHPR3_SYST(pri) ((pri) << 24)
 
-/* Holds off all interrupts. Returns what core_unmask() wants back; so these two nest. */
+/* Holds off all interrupts. Returns the previous state for core_unmask(), so these two nest. */
 static inline uint32_t core_mask(void)
 {
     uint32_t before = 0;
@@ -37,7 +38,8 @@ static inline void core_sleep(void)
     __asm__ volatile("dsb\n\twfi" ::: "memory");
 }
 
-/* Enables a board's interrupt (0 ... 239) with a priority, 0 the highest; in the upper bits, as many as the core has. */
+/* Enables a board's interrupt (0 ... 239) with a priority, 0 the highest; in the upper bits, as many as the core
+ * has. */
 static inline void core_enable(uint32_t number, uint8_t priority)
 {
     const uint32_t shift = 8u * (number % 4u);
@@ -46,7 +48,7 @@ static inline void core_enable(uint32_t number, uint8_t priority)
     CORE_ISER[number / 32u] = 1u << (number % 32u);
 }
 
-/* As if the board had requested it. */
+/* Makes an interrupt pending, as if the board had requested it. */
 static inline void core_pend(uint32_t number)
 {
     CORE_ISPR[number / 32u] = 1u << (number % 32u);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * systick: SysTick as timer of the tick and as clock, for ports of a Cortex-M without a better timer. The time is 0 before
- * systick_begin().
+ * systick: SysTick as timer of the tick and as clock, for ports of a Cortex-M without a better timer. The time is 0
+ * before systick_begin().
  *
  * SysTick counts down to 0, where its interrupt (startup_systick) becomes pending and the next period begins; so ticks
  * never drift, and none is closer to the next than a period less its own lateness. The core's clock must be a whole
@@ -21,10 +21,10 @@ void systick_end(void);
 void systick_period(uint32_t period_us);
 uint32_t systick_period_us(void);
 
-/* First of all in the interrupt: a period is over. */
+/* The interrupt calls it first: a period is over. */
 void systick_tick(void);
 
-/* Since then, by the core's clock. In that interrupt. */
+/* Time since the interrupt became due, by the core's clock. In that interrupt. */
 uint32_t systick_late_ns(void);
 
 /* Any context, interrupts masked or not (for less than a period). Both wrap. */

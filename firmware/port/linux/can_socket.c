@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a
- * local bus without any CAN of the kernel. */
+/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a local
+ * bus without kernel CAN. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 
@@ -46,8 +46,8 @@ static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct
     return send(socket->fd, &message, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
 }
 
-/* Frames of ours that are tracked pass as well; with no filter all do. */
-static int tell_kernel(const struct can_socket *socket)
+/* Own frames that are tracked pass as well; without a filter all do. */
+static int set_kernel_filters(const struct can_socket *socket)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS + CAN_SOCKET_TRACKED];
     size_t count = socket->filter_count;
@@ -63,7 +63,7 @@ static int tell_kernel(const struct can_socket *socket)
     return setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_FILTER, raw, bytes) == 0 ? 0 : -errno;
 }
 
-/* Here at once, and soon at the hub, which then wakes nobody for other frames. */
+/* Filters here at once, and soon at the hub, which then wakes no process for other frames. */
 int can_socket_filter(struct can_socket *socket, const struct can_match *filters, size_t count)
 {
     if (count > CAN_SOCKET_FILTERS) {
@@ -71,7 +71,8 @@ int can_socket_filter(struct can_socket *socket, const struct can_match *filters
     }
     memcpy(socket->filters, filters, count * sizeof filters[0]);
     socket->filter_count = count;
-    return socket->local ? tell_hub(socket, LOCAL_BUS_FILTER, filters, count) : tell_kernel(socket);
+    return socket->local ? tell_hub(socket, LOCAL_BUS_FILTER, filters, count)
+                         : set_kernel_filters(socket);
 }
 
 int can_socket_defer(struct can_socket *socket, const struct can_match *frames, size_t count)
@@ -96,7 +97,7 @@ static int ask_back(const struct can_socket *socket)
     const int error =
         setsockopt(socket->fd, SOL_CAN_RAW, CAN_RAW_RECV_OWN_MSGS, &on, sizeof on) == 0 ? 0
                                                                                         : -errno;
-    return error == 0 ? tell_kernel(socket) : error;
+    return error == 0 ? set_kernel_filters(socket) : error;
 }
 
 static bool is_among(const uint16_t *ids, size_t count, uint16_t id)
@@ -161,7 +162,7 @@ static struct can_frame raw_frame(const struct can_msg *message)
     return frame;
 }
 
-/* In virtual time the hub takes every frame: it is waited for. */
+/* In virtual time the hub takes every frame: waits for it. */
 static bool await_room(const struct can_socket *socket)
 {
     struct pollfd writable = {.fd = socket->fd, .events = POLLOUT};
@@ -244,7 +245,8 @@ static size_t frames_in_packet(const struct can_socket *socket)
     return socket->local && clock_is_virtual() ? LOCAL_BUS_PACKET : 1u;
 }
 
-/* Of the frames of a packet: those that the caller wants, and ours that have left. Returns how many are in `messages`. */
+/* Sorts the frames of a packet: those that pass the filters go to `messages`, own tracked ones are noted as sent.
+ * Returns how many are in `messages`. */
 static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
                     const struct local_bus_frame *frames, struct can_msg *messages,
                     uint64_t *stamps_ns)
@@ -266,7 +268,7 @@ static int sort_out(struct can_socket *socket, const struct mmsghdr *header,
     return count;
 }
 
-/* An empty message is how a local bus ends; what came before it is still given. */
+/* A local bus ends with an empty message; the frames before it are still returned. */
 static bool at_end(const struct mmsghdr *headers, int got)
 {
     return got > 0 && headers[got - 1].msg_len == 0u;

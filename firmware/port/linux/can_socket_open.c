@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Opening an interface, and the message for the user where that fails. */
+/* can_socket_open() of port/linux/can_socket.h: opens an interface or a local bus, and makes the message for the user
+ * if that fails. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 
@@ -26,7 +27,7 @@ static int fail(char *reason, size_t size, int error, const char *text, const ch
     return -error;
 }
 
-/* For errors of which only the text of the system is known. */
+/* For errors without a text of our own: the text of the system. */
 static int fail_plainly(char *reason, size_t size, int error, const char *interface)
 {
     (void)snprintf(reason, size, "cannot use %s: %s", interface, strerror(error));
@@ -41,7 +42,7 @@ static int interface_request(int fd, const char *interface, unsigned long reques
     return ioctl(fd, request, answer) == 0 ? 0 : errno;
 }
 
-/* Asks in the order in which a user would put things right. */
+/* Checks in the order in which a user would correct the errors. */
 static int check_interface(int fd, const char *interface, char *reason, size_t size)
 {
     struct ifreq answer;
@@ -82,8 +83,8 @@ static int bind_interface(int fd, const char *interface, char *reason, size_t si
     return 0;
 }
 
-/* A simulated bus has no bit times: whoever sleeps for some milliseconds must find everything that
- * was sent. */
+/* A simulated bus has no bit times: the buffer must hold all that is sent while the process sleeps for some
+ * milliseconds. */
 static void enlarge_buffers(int fd)
 {
     const int bytes = RECEIVE_BUFFER_BYTES;

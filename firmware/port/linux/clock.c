@@ -14,18 +14,18 @@
 #include "port/linux/local_bus.h"
 #include "port/linux/local_connection.h"
 
-enum { OTHERS_MAX = 3 }; /* what may wake the process beside its buses */
+enum { OTHERS_MAX = 3 }; /* descriptors that may wake the process, other than buses */
 
 static struct {
     int fd; /* to the hub; meaningful while `joined` */
     bool joined;
     bool sent;
-    bool all; /* deferred frames wake it, too */
+    bool all; /* deferred frames wake it as well */
     uint32_t number;
     uint32_t grant; /* number of the last one */
     bool frames;    /* some came with it */
     uint64_t now_ns;
-    sigset_t signals; /* blocked before we joined: what may come while we wait */
+    sigset_t signals; /* the mask before joining: signals that may come during a wait */
 } self;
 
 static uint64_t monotonic_ns(void)
@@ -145,8 +145,8 @@ static int take_grant(void)
     return 1;
 }
 
-/* A signal, or a descriptor that is no bus, ends the wait at the present time: the hub is requested to grant it at once, which
- * changes nothing when one is on its way. */
+/* A signal, or a descriptor that is no bus, ends the wait at the present time: requests a grant at once from the hub.
+ * This has no effect if one has been sent already. */
 static int await_grant(const struct pollfd *others, size_t count, bool *interrupted)
 {
     struct pollfd wait[1 + OTHERS_MAX];
@@ -165,7 +165,7 @@ static int await_grant(const struct pollfd *others, size_t count, bool *interrup
             granted = take_grant();
         } else if (ready > 0 || errno == EINTR) {
             granted = say_wait(0);
-            watched = 0; /* said once */
+            watched = 0; /* reported once */
             *interrupted = true;
         } else {
             granted = -errno;
@@ -174,7 +174,7 @@ static int await_grant(const struct pollfd *others, size_t count, bool *interrup
     return granted < 0 ? granted : 0;
 }
 
-/* Tells the hub that this process waits. A signal that came before is reported by a second message. */
+/* Reports to the hub that this process waits. A signal that came before is reported by a second message. */
 static int begin_wait(uint64_t timeout_ns)
 {
     const uint64_t left_ns = LOCAL_BUS_NEVER - self.now_ns;
@@ -184,8 +184,8 @@ static int begin_wait(uint64_t timeout_ns)
     return noted && error == 0 ? say_wait(0) : error;
 }
 
-/* A signal that comes between the word that we wait and the wait itself would be missed: so they are blocked from here to
- * ppoll(). */
+/* Signals are blocked from here to ppoll(): one that comes between the message to the hub and the wait itself would be
+ * missed. */
 static int poll_virtually(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns)
 {
     bool interrupted = false;

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * clock: the time of a process of this computer, for the Linux port and the simulated drives. It is the monotonic clock
- * of the system. Where the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time.
+ * clock: the time of a process, for the Linux port and the programs of sim/. It is the monotonic clock of the system.
+ * If the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time.
  *
- * One thread of a process takes part. It sleeps in clock_poll() only: what it does between two calls takes no virtual
- * time. SIGINT and SIGTERM arrive while it sleeps there. A process that lets them arrive at other times reports each
- * with clock_note_signal(). Users define _GNU_SOURCE first.
+ * The state is one for the whole process. In virtual time one thread uses all functions, except clock_note_signal
+ * (signal handlers). It sleeps in clock_poll() only: what it does between two calls takes no virtual time. SIGINT and
+ * SIGTERM arrive while it sleeps there. A process that lets them arrive at other times reports each with
+ * clock_note_signal(). In real time clock_ns and clock_poll may be called from any thread. Users define _GNU_SOURCE
+ * first.
  */
 #ifndef PORT_LINUX_CLOCK_H
 #define PORT_LINUX_CLOCK_H
@@ -19,12 +21,12 @@
 #define CLOCK_NS_PER_S 1000000000u
 #define CLOCK_NEVER    UINT64_MAX
 
-/* Takes part in the time of this bus from now on, where its time is virtual; else changes nothing. Call it before
- * can_socket_open(). `name`: what others know the process by, unless LOCAL_BUS_NAME_VARIABLE of the environment has another name.
- * Returns 0 or a negative errno. */
+/* Joins the virtual time of this bus; does nothing if its time is real. Call it before can_socket_open(). `name`: the
+ * name of the participant, unless the environment has another one in LOCAL_BUS_NAME_VARIABLE. Returns 0 or a negative
+ * errno. */
 int clock_join(const char *bus, const char *name);
 
-/* Ends the part in virtual time: nobody waits for this process any more. Harmless without one. */
+/* Leaves virtual time, so that nobody waits for this process. Does nothing in real time. */
 void clock_leave(void);
 
 bool clock_is_virtual(void);
@@ -32,22 +34,22 @@ bool clock_is_virtual(void);
 /* The number of this process for the members that wake it; 0 without virtual time. */
 uint32_t clock_participant(void);
 
-/* A member of this process has sent something: the hub looks for it when the process waits. */
+/* Reports that a member of this process has sent something: the hub reads it when the process waits. */
 void clock_note_sent(void);
 
 /* Whether frames that are deferred (can_socket_defer) end the waits from now on; at first they do not. */
 void clock_wake_for_all(bool on);
 
-/* A signal has come outside of clock_poll(): the next one ends at once, and the hub reports it to those who watch. For
- * signal handlers. */
+/* Reports a signal outside of clock_poll(): the next clock_poll ends at once, and the hub notifies the participants
+ * that requested notices. For signal handlers. */
 void clock_note_signal(void);
 
 /* Monotonic. */
 uint64_t clock_ns(void);
 
-/* As ppoll(): until one of `fds` is ready, a signal comes or `timeout_ns` (CLOCK_NEVER: no limit) are over. The first `buses` of
- * `fds` are sockets of CAN buses. Returns how many are ready, or a negative errno: -EINTR in real time only, -ENETDOWN when the hub has
- * gone. */
+/* As ppoll(): waits until one of `fds` is ready, a signal comes or `timeout_ns` (CLOCK_NEVER: no limit) are over. The
+ * first `buses` of `fds` are sockets of CAN buses. Returns how many are ready, or a negative errno: -EINTR in real time
+ * only, -ENETDOWN if the hub has ended. */
 int clock_poll(struct pollfd *fds, size_t buses, size_t count, uint64_t timeout_ns);
 
 static inline struct timespec clock_timespec(uint64_t ns)

@@ -12,7 +12,7 @@
 #include "port/linux/interrupts_thread.h"
 #include "port/linux/schedule.h"
 
-#define LONGEST_SLEEP_NS 100000000u /* how late a request to end may be noticed */
+#define LONGEST_SLEEP_NS 100000000u /* the most until a request to end is noticed */
 #define BATCHES_MAX      8u
 
 static struct {
@@ -29,7 +29,7 @@ static struct {
     bool lock_step;
     bool real_time; /* ticks come in time, as far as the machine permits */
     clockid_t main_loop_clock;
-    uint32_t main_loop_turns; /* atomic too */
+    uint32_t main_loop_sleeps; /* atomic too */
 } self;
 
 static __thread bool in_tick;
@@ -101,8 +101,8 @@ static void hand_over(const struct can_msg *messages, int count)
     port_unlock();
 }
 
-/* All that has come is taken before a due tick, so that no answer counts as missing that lies in the socket. But a
- * flood of frames must not keep the tick waiting for ever. */
+/* Takes all received frames before a due tick, so that no answer in the socket counts as missing. But a flood of frames
+ * must not delay the tick for ever. */
 static void receive_waiting(void)
 {
     struct can_msg messages[CAN_SOCKET_BATCH];
@@ -117,8 +117,8 @@ static void receive_waiting(void)
     }
 }
 
-/* In virtual time answers of drives are taken when the next tick may start, at the earliest; those that are missing then end the wait
- * (clock_wake_for_all).
+/* In virtual time answers of drives are taken when the next tick may start, at the earliest; those that are missing
+ * then end the wait (clock_wake_for_all).
  *
  * The clock is a system call where the kernel itself is a process, and there the pace counts: so at
  * lock step the time of the last interrupt is near enough for a guard time. */
@@ -135,7 +135,7 @@ static uint64_t time_to_sleep_ns(void)
 
 void interrupts_main_loop_sleeps(void)
 {
-    (void)__atomic_add_fetch(&self.main_loop_turns, 1u, __ATOMIC_RELAXED);
+    (void)__atomic_add_fetch(&self.main_loop_sleeps, 1u, __ATOMIC_RELAXED);
 }
 
 static uint64_t main_loop_had_ns(void)
@@ -145,16 +145,16 @@ static uint64_t main_loop_had_ns(void)
     return (uint64_t)had.tv_sec * CLOCK_NS_PER_S + (uint64_t)had.tv_nsec;
 }
 
-/* At lock step no thread here is a real-time one, and the scheduler is fair. */
-static bool gives_way(void)
+/* At lock step this thread is not a real-time one, and the scheduler is fair. */
+static bool may_yield(void)
 {
-    const uint32_t turns = __atomic_load_n(&self.main_loop_turns, __ATOMIC_RELAXED);
+    const uint32_t sleeps = __atomic_load_n(&self.main_loop_sleeps, __ATOMIC_RELAXED);
     return !self.lock_step && !clock_is_virtual() &&
-           schedule_overdue(&self.schedule, self.now_ns, turns) &&
+           schedule_overdue(&self.schedule, self.now_ns, sleeps) &&
            schedule_yield(&self.schedule, self.now_ns, main_loop_had_ns());
 }
 
-/* Sleeps until frames come or a tick is due, `longest_ns` at most, and does what they ask for. */
+/* Sleeps until frames come or a tick is due, `longest_ns` at most, and handles them. */
 static void step(uint64_t longest_ns)
 {
     struct pollfd waited = {.fd = self.socket->fd, .events = POLLIN, .revents = 0};
@@ -168,10 +168,10 @@ static void step(uint64_t longest_ns)
         self.now_ns = woken_ns;
     } else if (ready < 0 && ready != -EINTR) {
         __atomic_store_n(&self.error, ready, __ATOMIC_RELEASE);
-        clock_leave(); /* the shutdown needs a clock that goes on */
+        clock_leave(); /* the shutdown needs a clock that advances */
     }
     schedule_wait(&self.schedule, self.now_ns);
-    if (self.now_ns >= self.schedule.due_ns && !gives_way()) {
+    if (self.now_ns >= self.schedule.due_ns && !may_yield()) {
         run_tick();
     }
 }

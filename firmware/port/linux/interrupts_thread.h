@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* interrupts_thread: creates the thread for the interrupts: under SCHED_FIFO for real time, or as a batch thread for the fast
- * pace. Used by port/linux/interrupts. Main loop. */
+/* interrupts_thread: creates the thread for the interrupts: under SCHED_FIFO for real time, or as a batch thread for
+ * the fast pace. Used by port/linux/interrupts. Main loop. */
 #ifndef PORT_LINUX_INTERRUPTS_THREAD_H
 #define PORT_LINUX_INTERRUPTS_THREAD_H
 

@@ -20,7 +20,7 @@ bool local_connection_named(const char *bus)
     return strchr(bus, '/') != NULL;
 }
 
-/* Whoever sleeps for some milliseconds must find everything that was sent. */
+/* The buffer must hold all that is sent while the process sleeps for some milliseconds. */
 static void enlarge_buffer(int fd)
 {
     const int bytes = BUFFER_BYTES;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* local_connection: opens a connection to the hub of a local bus (local_bus.h). Used by can_socket and clock. Main thread. */
+/* local_connection: opens a connection to the hub of a local bus (local_bus.h). Used by can_socket and clock. Any
+ * thread; local_connection_open waits for the welcome of the hub. */
 #ifndef PORT_LINUX_LOCAL_CONNECTION_H
 #define PORT_LINUX_LOCAL_CONNECTION_H
 
@@ -10,9 +11,9 @@
 /* Whether this names a local bus: a path, which has a '/' in it. Network interfaces have none. */
 bool local_connection_named(const char *bus);
 
-/* Connects to the hub at this path, sends `hello` and waits for its welcome. Returns a descriptor that does not block, the
- * caller's to close, or a negative errno: -ENOENT or -ECONNREFUSED where nobody serves the path, -EPROTO where whoever does is no hub of
- * this version. */
+/* Connects to the hub at this path, sends `hello` and waits for its welcome. Returns a descriptor that does not block,
+ * which the caller has to close, or a negative errno: -ENOENT or -ECONNREFUSED if no process serves the path, -EPROTO
+ * if that process is not a hub of this version. */
 int local_connection_open(const char *path, const struct local_bus_control *hello,
                           struct local_bus_control *welcome);
 

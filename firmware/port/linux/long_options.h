@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* long_options: reads the command line of a program, one option after the other, by getopt_long. Anything else than the
- * known options is wrong; one line reports it. A beginning of a name that only one option has stands for it.
+/* long_options: reads the command line of a program, one option after the other, by getopt_long. Everything except the
+ * known options is an error, reported in one line. An option may be shortened as long as it is unique. Used by the
+ * command lines of port/linux and sim/.
  *
  *     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
  *     for (int option = long_options_next(&line); option > 0; option = long_options_next(&line)) ...
@@ -17,7 +18,8 @@
 #define LONG_OPTIONS_END   0
 #define LONG_OPTIONS_WRONG (-1)
 
-/* Read `value`; `quoted`, `no_value` and `unknown` may be set after long_options_begin; the rest is private. */
+/* Read `value`; `quoted`, `no_value` and `unknown` may be set after long_options_begin; all other fields are private.
+ * */
 struct long_options {
     int argc;
     char **argv;

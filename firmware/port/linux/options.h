@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* options: the command line of hodograph-controller. */
+/* options: reads the command line of hodograph-controller. Used by port_linux.c. Main thread, once, at the start;
+ * prints help to stdout and errors to stderr. */
 #ifndef PORT_LINUX_OPTIONS_H
 #define PORT_LINUX_OPTIONS_H
 
@@ -27,6 +28,7 @@ enum options_result {
     OPTIONS_WRONG, /* one line on stderr has the reason */
 };
 
+/* Fills *options: those that are not given have their defaults. */
 enum options_result options_parse(struct options *options, int argc, char **argv);
 
 #endif

@@ -90,7 +90,7 @@ int port_begin(int argc, char **argv)
     return 0;
 }
 
-/* The handler writes to wake_fd, so it goes first: the process ends in any case. */
+/* Removes the signal handler first, because it writes to wake_fd; the process ends in any case. */
 int port_end(void)
 {
     (void)set_signals(SIG_IGN);
@@ -108,7 +108,7 @@ int port_end(void)
     return EXIT_BUS;
 }
 
-/* A bus that is gone ends the controller too: there is nothing left to control. */
+/* The end of the bus also ends the controller. */
 bool port_stop_requested(void)
 {
     return self.stop != 0 || interrupts_error() != 0;
@@ -124,7 +124,7 @@ uint8_t port_node_id(void)
     return self.options.node;
 }
 
-/* What drives answer to a SYNC (TPDO1) is needed by the next tick: in virtual time the process does not wake for each. */
+/* The next tick needs the answers of drives to a SYNC (TPDO1): in virtual time the process does not wake for each. */
 int port_can_accept(const struct can_match *filters, size_t count)
 {
     static const struct can_match answers = {0x180u, 0x780u};
@@ -187,7 +187,7 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us)
     return interrupts_start(handlers, period_us);
 }
 
-/* One thread: nobody can write to wake_fd while it waits, but a signal. */
+/* One thread: only a signal handler can write to wake_fd while it waits. */
 static void wait_virtually(uint32_t timeout_us)
 {
     const uint64_t end_ns = clock_ns() + (uint64_t)timeout_us * 1000u;
@@ -203,7 +203,7 @@ static void wait_really(uint32_t timeout_us)
     if (clock_poll(&waited, 0, 1, (uint64_t)timeout_us * 1000u) > 0) {
         uint64_t count = 0;
         if (read(self.wake_fd, &count, sizeof count) < 0) {
-            return; /* somebody else's wake; the next wait finds it gone */
+            return; /* the wake has been taken already */
         }
     }
 }
@@ -228,7 +228,7 @@ void port_wake(void)
     const uint64_t one = 1;
     self.woken = 1;
     if (!clock_is_virtual() && write(self.wake_fd, &one, sizeof one) < 0) {
-        return; /* the counter is full of wakes already */
+        return; /* the counter is full: it wakes in any case */
     }
 }
 

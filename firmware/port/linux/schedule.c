@@ -28,7 +28,7 @@ void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_
     schedule->lock_step = lock_step;
     schedule->urgent = false;
     memset(&schedule->main_loop, 0, sizeof schedule->main_loop);
-    schedule->main_loop.turn_ns = now_ns;
+    schedule->main_loop.served_ns = now_ns;
     schedule->main_loop.tick_ns = SCHEDULE_YIELD_NS;
     schedule->main_loop.left_ns = SCHEDULE_YIELDS_NS;
 }
@@ -40,12 +40,12 @@ void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry)
     schedule->hurry = hurry && schedule->lock_step;
 }
 
-/* A stall was no work, and the drives must not be left without SYNCs for as long again. */
-static void rest_after_work(struct schedule *schedule, uint64_t now_ns)
+/* The pause after a tick. A stall is not counted as work: the drives must not be without SYNCs for as long again. */
+static void pause_after_work(struct schedule *schedule, uint64_t now_ns)
 {
     const uint64_t half_ns = (now_ns - schedule->started_ns) / 2u;
-    const uint64_t rest_ns = half_ns < SCHEDULE_REST_MAX_NS ? half_ns : SCHEDULE_REST_MAX_NS;
-    schedule->earliest_ns = later(schedule->earliest_ns, now_ns + rest_ns);
+    const uint64_t pause_ns = half_ns < SCHEDULE_PAUSE_MAX_NS ? half_ns : SCHEDULE_PAUSE_MAX_NS;
+    schedule->earliest_ns = later(schedule->earliest_ns, now_ns + pause_ns);
 }
 
 void schedule_ready(struct schedule *schedule, uint64_t now_ns)
@@ -54,7 +54,7 @@ void schedule_ready(struct schedule *schedule, uint64_t now_ns)
         return;
     }
     if (!schedule->hurry) {
-        rest_after_work(schedule, now_ns);
+        pause_after_work(schedule, now_ns);
     }
     schedule->awaiting = false;
     schedule->due_ns = schedule->earliest_ns;
@@ -87,16 +87,16 @@ uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns)
     return schedule->lock_step ? 0u : lateness_ns(schedule, now_ns);
 }
 
-bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns)
+bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t sleeps)
 {
     struct schedule_main_loop *main_loop = &schedule->main_loop;
-    if (turns != main_loop->turns) {
-        main_loop->turns = turns;
-        main_loop->turn_ns = now_ns;
+    if (sleeps != main_loop->sleeps) {
+        main_loop->sleeps = sleeps;
+        main_loop->served_ns = now_ns;
         main_loop->judged_ns = 0;
         main_loop->left_ns = SCHEDULE_YIELDS_NS;
     }
-    return !schedule->urgent && now_ns - main_loop->turn_ns > SCHEDULE_TURN_NS;
+    return !schedule->urgent && now_ns - main_loop->served_ns > SCHEDULE_SLEEPLESS_NS;
 }
 
 static bool has_its_share(struct schedule_main_loop *main_loop, uint64_t now_ns, uint64_t had_ns)
@@ -143,7 +143,7 @@ static void next_by_clock(struct schedule *schedule, uint64_t now_ns)
     }
     schedule->nominal_ns += period_ns;
     schedule->earliest_ns = later(schedule->nominal_ns, started_ns + period_ns - period_ns / 4u);
-    rest_after_work(schedule, now_ns);
+    pause_after_work(schedule, now_ns);
 }
 
 void schedule_finish(struct schedule *schedule, uint64_t now_ns)

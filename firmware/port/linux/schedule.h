@@ -1,27 +1,27 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * schedule: when the next tick is due. Pure arithmetic on monotonic nanoseconds.
+ * schedule: when the next tick is due. Used by port/linux/interrupts and sim/gateway/pacing. Pure arithmetic on
+ * monotonic nanoseconds; the caller's lock guards the struct.
  *
- * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped and the following ones
- * are not bunched: two starts are at least three quarters of a period apart, so that a small lateness is made up over
- * some ticks. After a delay of more than a period the clock of the ticks is set again.
+ * Real time: ticks are due a period apart on the clock. A tick that started late is not skipped. Two starts are at
+ * least three quarters of a period apart, so that a small lateness is made up over some ticks. After a delay of more
+ * than a period the clock of the ticks is set again.
  *
- * A tick may request that the next one waits until everybody is ready (schedule_await), for a guard time at most: it is
- * then late rather than on time. At lock step it may also request it as soon as that. The guard time is counted in
- * slices: the thread wakes at least every SCHEDULE_SLICE_NS while it waits and says so (schedule_wait); a slice that
- * took longer than SCHEDULE_SLICE_MAX_NS counts as that. So a stall of the whole machine, in which nobody could have
- * become ready, counts little.
+ * A tick may request that the next one waits until all drives are ready (schedule_await), for a guard time at most. The
+ * next tick is then late. At lock step a tick may also request the next one as soon as all are ready. The guard time is
+ * counted in slices: while it waits, the thread wakes at least every SCHEDULE_SLICE_NS and calls schedule_wait. A slice
+ * of more than SCHEDULE_SLICE_MAX_NS counts as SCHEDULE_SLICE_MAX_NS. So a stall of the whole computer, in which no
+ * drive can become ready, counts little.
  *
- * Real-time threads take all they ask for. So that the main loop still gets its turn on a machine too slow for the
- * period, what a tick took, up to the moment when everybody was ready, is followed by a rest of half of that (10 ms at
- * most). Where a tick takes less than two thirds of a period this changes nothing.
+ * Real-time threads take as much of the processor as they need. On a computer that is too slow for the period, the main
+ * loop still has to run. So after each tick there is a pause: half of the time that the tick took until all were ready,
+ * 10 ms at most. If a tick takes less than two thirds of a period this changes nothing.
  *
- * That rest is no promise: whoever else runs at real-time priority (the simulated drives, behind with their SYNCs while
- * nobody waits for their answers) may take all of it. So the main loop is watched: when it has not gone to sleep for
- * SCHEDULE_TURN_NS, and has had less than an eighth of the processor since, ticks are put off, each by
- * SCHEDULE_YIELD_NS at most, until it has had its turn. A main loop that computes for long does not delay ticks, as it
- * has the processor; one that is stuck somewhere does so for SCHEDULE_YIELDS_NS, no longer. Where drives are real
- * (`urgent`) none is put off.
+ * Other real-time processes may use all of that pause (simulated drives that process old SYNCs). So the main loop is
+ * supervised. If it has not slept for SCHEDULE_SLEEPLESS_NS and has had less than an eighth of the processor since,
+ * ticks are delayed, each by SCHEDULE_YIELD_NS at most, until it has got that share. A main loop that computes for long
+ * delays no ticks, because it has the processor. One that waits for something else delays ticks for SCHEDULE_YIELDS_NS
+ * in all. With real drives (`urgent`) no tick is delayed.
  */
 #ifndef PORT_LINUX_SCHEDULE_H
 #define PORT_LINUX_SCHEDULE_H
@@ -31,59 +31,59 @@
 
 #define SCHEDULE_SLICE_NS     10000000u
 #define SCHEDULE_SLICE_MAX_NS 20000000u
-#define SCHEDULE_REST_MAX_NS  10000000u
+#define SCHEDULE_PAUSE_MAX_NS 10000000u
 
-#define SCHEDULE_TURN_NS         20000000u
+#define SCHEDULE_SLEEPLESS_NS    20000000u
 #define SCHEDULE_YIELD_NS        10000000u
 #define SCHEDULE_YIELDS_NS       200000000u
 #define SCHEDULE_YIELD_SLICE_NS  1000000u
 #define SCHEDULE_MAIN_LOOP_SHARE 8u
 
-/* How the main loop fares. */
+/* Processor time of the main loop. */
 struct schedule_main_loop {
-    uint64_t turn_ns;   /* when it was last seen to have had its turn */
-    uint64_t judged_ns; /* since when its share is judged; 0: not judged */
-    uint64_t had_ns;    /* what it had had of the processor then */
-    uint64_t slept_ns;  /* when this thread last gave way */
-    uint64_t tick_ns;   /* how long the present tick may still be put off */
-    uint64_t left_ns;   /* and ticks all in all, until it has had its turn */
-    uint32_t turns;
+    uint64_t served_ns; /* when it last slept, or had its share */
+    uint64_t judged_ns; /* start of the time in which its share is measured; 0: it is not */
+    uint64_t had_ns;    /* its processor time at that start */
+    uint64_t slept_ns;  /* when this thread last yielded to it */
+    uint64_t tick_ns;   /* by which the present tick may still be delayed */
+    uint64_t left_ns;   /* by which ticks may still be delayed in all */
+    uint32_t sleeps;    /* how often it has gone to sleep */
 };
 
 struct schedule {
     uint64_t period_ns;
     uint64_t started_ns;  /* the present tick */
     uint64_t nominal_ns;  /* of the next tick, on the clock of the ticks */
-    uint64_t earliest_ns; /* when it may start: later than nominal_ns where ticks would bunch */
-    uint64_t due_ns;      /* when it has to start: later than that while somebody is waited for */
-    uint64_t guard_ns;    /* the remainder of the requested waiting */
-    uint64_t counted_ns;  /* up to when it was counted */
-    bool awaiting;        /* somebody is waited for, since the present tick */
-    bool hurry;           /* its other request */
-    bool lock_step;       /* whether ticks may be faster than the clock */
-    bool urgent;          /* none is put off for the main loop: drives are real */
+    uint64_t earliest_ns; /* when it may start: later than nominal_ns if ticks would be too close */
+    uint64_t due_ns;     /* when it has to start: later than earliest_ns while drives are awaited */
+    uint64_t guard_ns;   /* the remainder of the guard time */
+    uint64_t counted_ns; /* the instant up to which it was counted */
+    bool awaiting;       /* drives are awaited since the present tick */
+    bool hurry;          /* the next tick is requested as soon as they are ready */
+    bool lock_step;      /* whether ticks may be faster than the clock */
+    bool urgent;         /* no tick is delayed for the main loop: drives are real */
     struct schedule_main_loop main_loop;
 };
 
 void schedule_begin(struct schedule *schedule, uint64_t now_ns, uint64_t period_ns, bool lock_step);
 
-/* Requests of the application, from inside a tick; and from the receive handler, without effect where nobody is waited
- * for (any more). */
+/* Requests of the application: to wait, from inside a tick; and that all are ready, from the receive handler, which has
+ * no effect if nothing is awaited. */
 void schedule_await(struct schedule *schedule, uint64_t guard_ns, bool hurry);
 void schedule_ready(struct schedule *schedule, uint64_t now_ns);
 
-/* The thread has woken: counts the guard time, moves due_ns along. */
+/* The thread has woken: counts the guard time and sets due_ns again. */
 void schedule_wait(struct schedule *schedule, uint64_t now_ns);
 
 /* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the requests of
  * the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
 
-/* Before a due tick; `turns` counts how often the main loop has gone to sleep. True when it is overdue: then ask
- * schedule_yield, too. */
-bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t turns);
+/* Before a due tick; `sleeps` counts how often the main loop has gone to sleep. True if the main loop has not slept for
+ * too long: then call schedule_yield. */
+bool schedule_overdue(struct schedule *schedule, uint64_t now_ns, uint32_t sleeps);
 
-/* `had_ns`: processor time of the main loop, all in all. True: the tick is put off, due_ns moved. */
+/* `had_ns`: total processor time of the main loop. True: the tick is delayed, and due_ns is later. */
 bool schedule_yield(struct schedule *schedule, uint64_t now_ns, uint64_t had_ns);
 
 /* The tick is over: sets due_ns of the next one. */

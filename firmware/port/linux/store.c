@@ -28,7 +28,7 @@ static int failed(const char *file, const char *why)
     return PORT_ERR_SYSTEM;
 }
 
-/* A new file is a hole, which costs no room on the disk until it is written. */
+/* A new file is sparse: it uses no space on the disk until it is written. */
 static const char *prepare(int fd)
 {
     struct stat found;
@@ -80,7 +80,7 @@ int store_open(const char *file)
     return 0;
 }
 
-/* Pages that are never written cost nothing. The cache is large, since the main loop may come late on a computer. */
+/* Pages that are never written cost nothing. The cache is large, because the main loop may be late on a computer. */
 #define CACHE_BYTES (4u * 1024u * 1024u)
 static uint8_t ring[STORE_RING_MAX] __attribute__((aligned(8)));
 static uint8_t cache[CACHE_BYTES] __attribute__((aligned(8)));

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/command_line.h (see there): the words that the emulator hands on as options of the board. */
+/* Implements port/mps2/command_line.h (see there): the words that the emulator passes on as options of the board. */
 #include "port/mps2/command_line.h"
 
 #include <string.h>

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * command_line: the words that the emulator hands on, in place of a board's straps and switches.
+ * command_line: reads the words that the emulator passes on, in place of a board's straps and switches. Used by
+ * port_mps2.c, once, at the start. Pure.
  *
  *   node=N            node number of the controller, 1 to 127; default 1
- *   link=fifo|slcan   how CAN frames come and go; default slcan
+ *   link=fifo|slcan   how CAN frames are exchanged; default slcan
  *   out=PATH in=PATH  the two FIFOs of link=fifo, on the host; default "out" and "in"
- *   pace=real-time|fast   fast: a hurried tick does not wait for the clock; link=fifo only
- *   verbose           notes, too
+ *   pace=real-time|fast   fast: a tick that was requested at once does not wait for the clock; link=fifo only
+ *   verbose           notes as well
  */
 #ifndef PORT_MPS2_COMMAND_LINE_H
 #define PORT_MPS2_COMMAND_LINE_H
@@ -23,7 +24,7 @@ struct command_line {
     bool verbose;
 };
 
-/* Cuts `text` into words. False when one of them is none of the above: it is *wrong then. */
+/* Cuts `text` into words. False if one of them is not in the list above: *wrong is this word. */
 bool command_line_parse(struct command_line *line, char *text, const char **wrong);
 
 #endif

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * exchange: what the emulated board and the bridge (sim/gateway) say to each other on the two FIFOs, in turns: a request of
- * the board, a reply of the bridge. Little-endian, as both are; a message is one write of at most 4096 bytes, which a pipe takes as a whole.
+ * exchange: the messages between the emulated board and the gateway (sim/gateway) on the two FIFOs: a request of the
+ * board, then a reply of the gateway, and so on. Little-endian, as both are; a message is one write of at most 4096
+ * bytes, which a pipe takes as a whole. docs/guides/target.md has their order.
  *
- * docs/guides/target.md has the order of things.
+ * Data, and pure functions for any context. Used by port/mps2/link_fifo and sim/gateway.
  */
 #ifndef PORT_MPS2_EXCHANGE_H
 #define PORT_MPS2_EXCHANGE_H
@@ -19,25 +20,26 @@
 struct exchange_frame {
     uint32_t id;
     uint8_t len;
-    uint8_t of_tick; /* request: 1, the next tick asks whether it has been sent on the bus */
+    uint8_t
+        of_tick; /* request: 1: the next tick needs to know whether this frame has been sent on the bus */
     uint8_t reserved[2];
     uint8_t data[CAN_DATA_MAX];
 };
 
 enum exchange_request_flag {
     EXCHANGE_TICK = 1, /* the first request after a tick; it has the tick's frames */
-    EXCHANGE_AWAIT =
-        2, /* answers are awaited: the reply may come before the next tick is due, with frames */
-    EXCHANGE_HURRY =
-        4, /* with TICK: the next tick may come before its time, once nothing is awaited */
-    EXCHANGE_READY = 8,   /* nothing is awaited any more */
+    /* answers are awaited: the reply may come before the next tick is due, with frames */
+    EXCHANGE_AWAIT = 2,
+    /* with TICK: the next tick may come before its time, as soon as nothing is awaited */
+    EXCHANGE_HURRY = 4,
+    EXCHANGE_READY = 8,   /* all awaited answers have come */
     EXCHANGE_FILTER = 16, /* the records are filters: id, and the mask in data[0] and data[1] */
     EXCHANGE_END = 32,    /* the last request */
 };
 
 enum exchange_reply_flag {
     EXCHANGE_DUE = 1,     /* the next tick is due */
-    EXCHANGE_STOP = 2,    /* the controller shall end */
+    EXCHANGE_STOP = 2,    /* the controller has to end */
     EXCHANGE_WAITING = 4, /* frames of ticks still wait for the bus */
 };
 
@@ -46,8 +48,8 @@ struct exchange_header {
     uint16_t count;     /* frames that follow */
     uint16_t flags;     /* exchange_request_flag or exchange_reply_flag */
     uint32_t period_us; /* request: up to the next tick */
-    uint32_t
-        guard_us; /* request, with TICK and AWAIT: the next tick is due after this time at the latest */
+    /* request, with TICK and AWAIT: the next tick is due after this time at the latest */
+    uint32_t guard_us;
     uint32_t late_ns; /* reply, with DUE: how late it is */
 };
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/interrupts.h (see there): the tick, and what both links do with a frame that came. */
+/* Implements port/mps2/interrupts.h (see there): the tick, and the receive handler. */
 #include "port/mps2/interrupts.h"
 
 #include <string.h>
@@ -14,7 +14,7 @@ static struct {
     struct port_handlers handlers;
     struct link_request request;
     uint32_t late_ns;        /* of the next tick */
-    volatile uint32_t ticks; /* so far; wraps */
+    volatile uint32_t ticks; /* number of ticks; wraps */
     volatile bool woken;
     bool in_tick; /* nothing else runs meanwhile */
 } self;
@@ -78,7 +78,7 @@ void interrupts_receive(const struct can_msg *message)
     core_unmask(before);
 }
 
-/* Apart from the link, so that its instructions can be counted by themselves. */
+/* A function of its own, so that its instructions can be counted without the link. */
 __attribute__((noinline)) static void run_tick(void)
 {
     self.handlers.tick(self.handlers.self, systick_us(), self.late_ns + systick_late_ns());
@@ -95,7 +95,7 @@ void startup_systick(void)
     self.late_ns = self.link->after_tick(&self.request);
 }
 
-/* The mask does not nest with itself here: port.h has it so. */
+/* Not nested, as port.h requires. */
 void port_lock(void)
 {
     (void)core_mask();
@@ -106,7 +106,7 @@ void port_unlock(void)
     core_unmask(0);
 }
 
-/* An interrupt that comes between the look and the sleep is pending then, and ends the sleep. */
+/* An interrupt between the test and the sleep is pending then, and ends the sleep. */
 static void sleep_once(void)
 {
     const uint32_t before = core_mask();

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * interrupts: the tick, and what both links do with a frame that came.
+ * interrupts: the tick, and the receive handler that both links call. Used by port_mps2.c and the links.
  *
  * Priorities: SysTick 0, the UART below it. So a tick interrupts the taking of characters, never the receive handler,
  * which runs with all interrupts masked. The FPU keeps its state lazily, as after reset: an interrupt reserves room on
@@ -17,7 +17,7 @@
 
 #define INTERRUPTS_UART_PRIORITY 0x80u
 
-/* Which link there is; once, before the others. */
+/* Sets the link; once, before the other functions. Main loop. */
 void interrupts_begin(const struct link *link);
 
 void interrupts_end(void);

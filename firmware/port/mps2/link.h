@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * link: how CAN frames leave the emulated board and come to it. One of two, chosen by the command line
- * (docs/guides/target.md):
+ * link: how CAN frames leave and reach the emulated board. The command line selects one of two links
+ * (docs/guides/target.md). Used by port_mps2.c and interrupts.c of this port:
  *
  *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
  *   link_slcan  text on a UART, received by interrupt in real time
@@ -24,8 +24,8 @@ struct link_request {
 };
 
 struct link {
-    /* Whether the main loop sleeps (WFI) while it has nothing to do. Where the guest's clock counts instructions that
-     * only costs the emulator changes of its threads, so it spins there. */
+    /* Whether the main loop sleeps (WFI) while it has nothing to do. If the guest's clock counts instructions, sleeping
+     * only makes the emulator change its threads; then the main loop spins. */
     bool sleeps;
 
     /* Main loop, in this order. 0 or PORT_ERR_SYSTEM. */
@@ -38,15 +38,15 @@ struct link {
     /* port_can_delivered(): in a tick. */
     bool (*delivered)(void);
 
-    /* In the tick's interrupt, after the tick. `request` changes when a frame that was received ends the waiting. Returns
-     * how late the next tick will be, in ns. */
+    /* In the tick's interrupt, after the tick. `request` changes if a received frame ends the waiting. Returns the
+     * lateness of the next tick, in ns. */
     uint32_t (*after_tick)(const struct link_request *request);
 
-    /* What was sent last leaves. Main loop, with the tick ended. */
+    /* Sends what still waits. Main loop, with the tick ended. */
     void (*end)(void);
 
     bool (*stop_requested)(void); /* when it becomes true the link wakes the main loop */
-    bool (*failed)(void);         /* the other end is gone */
+    bool (*failed)(void);         /* the other end has ended */
 };
 
 extern const struct link link_fifo;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* link_fifo: at each tick what was sent goes out and what came is received, as if by an interrupt right after the tick. */
+/* link_fifo of port/mps2/link.h: in each tick it sends all frames and receives those that came, as if by an interrupt
+ * right after the tick. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"
@@ -17,7 +18,7 @@ static struct {
     volatile bool failed;
 } self;
 
-/* The bridge opens them in the same order; each waits for the other there. */
+/* The gateway opens them in the same order; each open waits for the other end. */
 static int begin(const struct command_line *line)
 {
     self.fast = line->fast;
@@ -53,7 +54,7 @@ static void receive_frames(void)
     }
 }
 
-/* One request and its reply, whose frames are received. With a bridge that is gone the board is alone for ever. */
+/* One request and its reply, whose frames are received. Without a gateway nothing is exchanged. */
 static void exchange(uint16_t flags, uint32_t guard_us)
 {
     self.out.header.flags = flags;
@@ -110,7 +111,7 @@ static uint16_t tick_flags(const struct link_request *request)
     return (uint16_t)(EXCHANGE_TICK | await | hurry);
 }
 
-/* Until the next tick is due; at lock step that is when all have answered, which need not be said, and no tick is late. */
+/* Exchanges until the next tick is due. At lock step that is when all have answered, and no tick is late. */
 static uint32_t after_tick(const struct link_request *request)
 {
     const uint16_t flags = tick_flags(request);

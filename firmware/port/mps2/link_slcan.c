@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* link_slcan: SLCAN on the UART, in real time. The board behaves as a host does towards an adapter: it opens the bus. */
+/* link_slcan of port/mps2/link.h: SLCAN on the UART, in real time. The board acts as a host of an adapter: it opens the
+ * bus. */
 #include "can/slcan.h"
 #include "port/cortex_m/core.h"
 #include "port/mps2/interrupts.h"
@@ -27,7 +28,7 @@ static void take(char character)
     }
 }
 
-/* An adapter may have been left open. */
+/* An adapter may still be open from an earlier run. */
 static int begin(const struct command_line *line)
 {
     static const char open[] = "C\rS8\rO\r";
@@ -58,7 +59,7 @@ static int send(const struct can_msg *message)
     return sent ? 0 : PORT_ERR_FULL;
 }
 
-/* Up to the adapter: what waits there is not known. */
+/* Delivered to the adapter: whether frames wait there is not known. */
 static bool delivered(void)
 {
     return uart_passed(self.mark);
@@ -84,7 +85,7 @@ static bool stop_requested(void)
     return self.stop;
 }
 
-/* A line does not show whether anybody is at its other end. */
+/* A UART cannot detect whether the other end has failed. */
 static bool failed(void)
 {
     return false;

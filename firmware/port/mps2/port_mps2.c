@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* QEMU's mps2 boards: command line, console and end by semihosting. */
+/* Implements port/port.h for QEMU's mps2 boards: command line, console and end by semihosting. */
 #include "port/port.h"
 
 #include <string.h>
@@ -31,7 +31,7 @@ static void say(const char *what, const char *more)
     semihost_print("\n");
 }
 
-/* Without a command line all has its default. */
+/* Without a command line all options have their defaults. */
 static int read_line(void)
 {
     const char *wrong = "";

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The store is the board's PSRAM: 16 MiB. The ring of streamed jobs is RAM, as much as a microcontroller would have to spare. */
+/* The store and the memory of streamed jobs of port/port.h. The store is the board's PSRAM, 16 MiB. The ring of
+ * streamed jobs has as much RAM as a microcontroller could provide. */
 #include "port/common/ram_store.h"
 #include "port/port.h"
 

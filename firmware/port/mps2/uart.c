@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both ways by interrupt. */
+/* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both directions by interrupt. */
 #include "port/mps2/uart.h"
 
 #include "port/cortex_m/core.h"
@@ -69,7 +69,7 @@ bool uart_idle(void)
     return self.head == self.tail;
 }
 
-/* Acknowledges first: a character that comes while the last is taken asks again. */
+/* Acknowledges first: a character that comes while the last one is taken makes the interrupt pending again. */
 static void take_in(void)
 {
     registers()->interrupts = INTERRUPT_IN;
@@ -78,7 +78,7 @@ static void take_in(void)
     }
 }
 
-/* Likewise: the place of a character that leaves meanwhile asks for the next. */
+/* Likewise: a character that leaves meanwhile makes the interrupt pending again. */
 static void give_out(void)
 {
     registers()->interrupts = INTERRUPT_OUT;
@@ -88,6 +88,6 @@ static void give_out(void)
     }
 }
 
-/* The boards have UART 0 at one of two places; what is not enabled does not come. */
+/* The boards have UART 0 at one of two numbers; an interrupt that is not enabled does not come. */
 __attribute__((section(".vectors.board"), used)) static const startup_vector vectors[34] = {
     [0] = take_in, [1] = give_out, [32] = take_in, [33] = give_out};

@@ -16,7 +16,7 @@ extern uint32_t startup_bss_begin[], startup_bss_end[];
 
 int main(int argc, char **argv);
 
-/* Stack, global pointer, traps; then what can be said in C. */
+/* Stack, global pointer, traps; then the part in C. */
 __asm__(".section .text.startup_reset, \"ax\"\n"
         ".global startup_reset\n"
         ".type startup_reset, @function\n"

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a RISC-V hart does between reset and main(): stack, global pointer, traps, memory. For QEMU's virt machine and
- * the images of tests/target, which have no interrupts: machine mode, one hart, exit by semihosting.
+ * startup: what a RISC-V hart does between reset and main(): stack, global pointer, traps, memory. For QEMU's virt
+ * machine and the images of tests/target, which have no interrupts: machine mode, one hart, exit by semihosting.
  *
- * A trap of any kind ends the emulator with status 3.
+ * The hardware calls these functions; no other code does. A trap of any kind ends the emulator with status 3.
  */
 #ifndef PORT_RV32_STARTUP_H
 #define PORT_RV32_STARTUP_H
@@ -11,7 +11,7 @@
 /* The entry; assembler, since there is no stack yet. */
 void startup_reset(void);
 
-/* The rest of it, in C; calls main(). Does not return. */
+/* The part in C: sets up the memory and calls main(). Does not return. */
 void startup_memory(void);
 
 /* Every trap; does not return, so nothing is saved. */

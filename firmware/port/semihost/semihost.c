@@ -42,7 +42,7 @@ int semihost_open(const char *path, enum semihost_mode mode)
     return (int)call(SYS_OPEN, block);
 }
 
-/* Read and write answer how many bytes are left; a pipe may give or take less than was asked. */
+/* Read and write return the number of remaining bytes; a pipe may transfer less than requested. */
 static int transfer(uint32_t operation, int handle, uintptr_t data, size_t size)
 {
     while (size > 0u) {

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Semihosting: the emulator (or a debugger) does a file operation for the program and the clock of the guest stands
- * still meanwhile. Arm IHI 0100 (Semihosting for AArch32 and AArch64); RISC-V uses the same numbers.
+ * semihost: file operations, console and exit by semihosting: the emulator (or a debugger) executes them for the
+ * program while the clock of the guest is stopped. Arm IHI 0100 (Semihosting for AArch32 and AArch64); RISC-V uses the
+ * same numbers. Used by port/mps2 and by the images of tests/target.
  *
  * On hardware without a debugger the first call is a fault. Any context; each call waits.
  */
@@ -19,18 +20,18 @@ enum semihost_mode { /* fopen's, always binary */
 /* Returns a handle, or a negative number when the host cannot open it. */
 int semihost_open(const char *path, enum semihost_mode mode);
 
-/* All of it, however many operations that takes. 0, or -1 when the file ends or fails first. */
+/* Reads or writes all bytes, in as many operations as necessary. 0, or -1 if the file ends or fails first. */
 int semihost_read(int handle, void *data, size_t size);
 int semihost_write(int handle, const void *data, size_t size);
 
-/* What is there, at least one byte: it waits for that. Returns how many bytes, or -1 when the file has ended or failed. */
+/* Waits for at least one byte and reads what is available. Returns the number of bytes, or -1 if the file has ended or
+ * failed. */
 int semihost_read_some(int handle, void *data, size_t size);
 
-/* Closes it. 0, or -1 when the host could not write what was left. */
+/* Closes the file. 0, or -1 if the host could not write all of it. */
 int semihost_close(int handle);
 
-/* The words that the emulator was given to hand on, joined by blanks. 0, or -1 when there are none or they do not
- * fit. */
+/* The command line that the emulator passes on, joined by blanks. 0, or -1 if there is none or it does not fit. */
 int semihost_command_line(char *line, size_t size);
 
 /* Text for the host's console. */

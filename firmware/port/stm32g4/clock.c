@@ -7,17 +7,17 @@
 #include "port/stm32g4/reg_clock.h"
 #include "port/stm32g4/reg_flash.h"
 
-/* A crystal takes milliseconds; at 16 MHz this many looks take some tenths of a second. */
-#define LOOKS 1000000u
+/* A crystal takes milliseconds to start; at 16 MHz this many polls take some tenths of a second. */
+#define POLLS 1000000u
 
 #define WAIT_STATES 4u
 
-/* RM0440 wants a microsecond at half the clock before the last step above 80 MHz. */
-#define HALF_CLOCK_LOOKS 100u
+/* RM0440 requires a microsecond at half the clock before the last step above 80 MHz. */
+#define HALF_CLOCK_POLLS 100u
 
 static bool wait_for(uint32_t address, uint32_t field, uint32_t value)
 {
-    for (uint32_t i = 0; i < LOOKS; ++i) {
+    for (uint32_t i = 0; i < POLLS; ++i) {
         if (reg_get(reg_read(address), field) == value) {
             return true;
         }
@@ -60,7 +60,7 @@ static bool switch_over(void)
     if (!wait_for(RCC_BASE + RCC_CFGR, RCC_CFGR_SWS, RCC_CFGR_SW_PLL)) {
         return false;
     }
-    for (uint32_t i = 0; i < HALF_CLOCK_LOOKS; ++i) {
+    for (uint32_t i = 0; i < HALF_CLOCK_POLLS; ++i) {
         (void)reg_read(RCC_BASE + RCC_CFGR);
     }
     reg_put(RCC_BASE + RCC_CFGR, RCC_CFGR_HPRE, RCC_CFGR_HPRE_DIV1);

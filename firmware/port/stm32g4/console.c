@@ -10,7 +10,7 @@
 #define DIVISOR 35556u
 
 /* Longer than a character takes at any clock; a console that hangs must not stop the controller. */
-#define LOOKS 100000u
+#define POLLS 100000u
 
 #define DIGITS_MAX 10u
 
@@ -26,7 +26,7 @@ void console_begin(void)
 
 static void put(char character)
 {
-    for (uint32_t i = 0; i < LOOKS; ++i) {
+    for (uint32_t i = 0; i < POLLS; ++i) {
         if ((reg_read(LPUART1_BASE + LPUART_ISR) & LPUART_ISR_TXE) != 0u) {
             reg_write(LPUART1_BASE + LPUART_TDR, (uint8_t)character);
             return;

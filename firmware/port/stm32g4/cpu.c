@@ -41,7 +41,7 @@ bool cpu_in_handler(void)
     return number != 0u;
 }
 
-/* The return from an interrupt sets the event that wfe waits for: none is missed between a look and the sleep. */
+/* The return from an interrupt sets the event that wfe waits for: none is missed between a test and the sleep. */
 void cpu_sleep(void)
 {
     __asm__ volatile("dsb\n\twfe" ::: "memory");

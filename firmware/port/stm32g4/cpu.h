@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * cpu: what the core itself does for the port (ARMv7-M Architecture Reference Manual B1, B3). On any other machine the
- * tests define these functions.
+ * cpu: interrupts, sleep and reset of the core (ARMv7-M Architecture Reference Manual B1, B3). Used by the files of
+ * this port, from any context. On any other machine the tests define these functions.
  *
- * Priorities: 0 is the highest, the chip knows 16. NMI and hard fault are above all of them.
+ * Priorities: 0 is the highest of 16. NMI and hard fault are above all of them.
  */
 #ifndef PORT_STM32G4_CPU_H
 #define PORT_STM32G4_CPU_H
@@ -14,7 +14,8 @@
 #define CPU_PRIORITY_TICK    1u
 #define CPU_PRIORITY_RECEIVE 2u
 
-/* Holds off interrupts of this priority and lower ones; 0: none. Returns what to hand to cpu_hold afterwards. */
+/* Holds off interrupts of this priority and lower ones; 0: none. Returns the previous value, for cpu_hold afterwards.
+ * */
 uint8_t cpu_hold(uint8_t priority);
 
 /* True in an interrupt handler. */

@@ -27,8 +27,8 @@ uint32_t faults_from_now_on(void)
     return self.spoiled_words;
 }
 
-/* Before the start the store is looked through for a whole program: a word that lost its power half written is found
- * then, and its CRC shows it. Later nobody reads what was not checked: the memory itself has failed. */
+/* Before the start the store is searched for a complete program. A word whose write was interrupted by a loss of power
+ * is found then, and a CRC refuses its content. Later only checked content is read, so the memory itself has failed. */
 void startup_nmi(void)
 {
     if (flash_take_ecc_error() && !self.running) {

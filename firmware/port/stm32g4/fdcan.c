@@ -22,7 +22,7 @@
 #define SPARE_BITS    25u
 #define COUNTS_PER_S  10000000u
 #define GUARD_MAX     2500u
-#define ANSWER_LOOKS  10000u /* at a bit that takes some cycles of the slower clock */
+#define ANSWER_POLLS  10000u /* of a bit that takes some cycles of the slower clock */
 #define INTERRUPTS_ON (FDCAN_IE_RF0NE | FDCAN_IE_RF0LE | FDCAN_IE_TCE | FDCAN_IE_EPE | FDCAN_IE_BOE)
 
 static uint32_t get(uint32_t offset)
@@ -51,11 +51,11 @@ static uint32_t bit_timing(uint32_t bits_s)
     return 0;
 }
 
-/* INIT crosses from one clock to another: it counts when it reads back. */
+/* INIT crosses from one clock to another: it is valid when it reads back. */
 static bool set_control(uint32_t value)
 {
     put(FDCAN_CCCR, value);
-    for (uint32_t i = 0; i < ANSWER_LOOKS; ++i) {
+    for (uint32_t i = 0; i < ANSWER_POLLS; ++i) {
         if ((get(FDCAN_CCCR) & (FDCAN_CCCR_INIT | FDCAN_CCCR_CCE)) == value) {
             return true;
         }
@@ -85,7 +85,8 @@ static void reject_unless(size_t filters)
                          reg_field(FDCAN_RXGFC_LSS, (uint32_t)filters));
 }
 
-/* A quarter of the shortest period at most: on a slow bus SYNC has to wait rather than the main loop for ever. */
+/* At most a quarter of the shortest period: on a slow bus SYNC may have to wait, else the main loop would wait for
+ * ever. */
 static uint32_t guard(uint32_t bits_s)
 {
     const uint32_t frame = (FRAME_BITS + SPARE_BITS) * (COUNTS_PER_S / bits_s);
@@ -187,8 +188,8 @@ static void transmit(uint32_t status, const struct can_msg *message)
     put(FDCAN_TXBAR, 1u << index);
 }
 
-/* The queue whose turn it is, with `room` free elements in the chip. What stays back before a tick has its turn when
- * the tick's own frames have gone. */
+/* The queue that may send next, with `room` free elements in the chip. Frames that are held back before a tick are sent
+ * after those of the tick. */
 static struct fdcan_queue *next_queue(struct fdcan *can, uint32_t room)
 {
     if (queue_front(&can->urgent) != NULL) {
@@ -199,7 +200,7 @@ static struct fdcan_queue *next_queue(struct fdcan *can, uint32_t room)
     return waits && fits ? &can->ordinary : NULL;
 }
 
-/* Gives the chip what its FIFO has room for, from the queue whose turn it is. With the tick held off. */
+/* Gives the chip as many frames as its FIFO has room for, from the queue that may send next. With the tick held off. */
 static void feed(struct fdcan *can)
 {
     for (;;) {
@@ -227,8 +228,8 @@ bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sen
     return taken;
 }
 
-/* The chip sends in the order of the requests, and takes a frame of the main loop only when it is empty: where that is
- * the youngest there, those of the interrupts have gone. */
+/* The chip sends in the order of the requests, and gets a frame of the main loop only when it is empty. So if the
+ * newest frame in the chip is one of the main loop, those of the interrupts have been sent. */
 bool fdcan_delivered(const struct fdcan *can)
 {
     const uint8_t before = cpu_hold(CPU_PRIORITY_TICK);
@@ -283,7 +284,7 @@ bool fdcan_fetch(struct can_msg *message)
 
 /* ---- Bus-off and errors ---- */
 
-/* While the configuration is open the chip forgets its requests, too. Held. */
+/* Opening the configuration also drops the requests in the chip. With the tick held off. */
 static void leave_and_come_back(struct fdcan *can)
 {
     can->off = true;

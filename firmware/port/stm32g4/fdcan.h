@@ -3,17 +3,17 @@
  * fdcan: FDCAN1 for classic frames with 11-bit identifiers.
  *
  * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the main loop (SDO, heartbeats), each in
- * order. The chip's own FIFO of three takes all that the interrupts send; from the main loop it gets one frame at a
- * time, when it is empty and the next tick is further off than the longest frame takes. So SYNC does not queue behind
- * what the main loop has to say: it waits, as on any bus, for the one frame that is on the wire.
+ * order. The chip's own FIFO of three takes all frames of the interrupts. It takes one frame of the main loop at a
+ * time, when it is empty and the time to the next tick is longer than the longest frame. So SYNC does not wait for
+ * queued frames of the main loop. It waits, as on any bus, for the one frame that is on the wire.
  *
  * Receiving. The chip's FIFO of three, 141 us of the shortest frames at 1 Mbit/s: the receive interrupt must not be
  * held off longer. What matches no filter is rejected by the chip, as are remote and extended frames.
  *
- * Bus-off. The chip leaves the bus by itself. All frames that wait are dropped, as they are old when the bus is back,
- * sending is refused, and the chip gets the command to come back, which it does after 129 times 11 recessive bits (1.4
- * ms at 1 Mbit/s): without limit and without help, as CiA 301 leaves it to the node. The application sees a port that
- * refuses its frames.
+ * Bus-off. The chip leaves the bus by itself. All waiting frames are dropped, because they would be old when the bus is
+ * back, and sending is refused. The chip gets the command to return, which it does after 129 times 11 recessive bits
+ * (1.4 ms at 1 Mbit/s). This repeats without limit; CiA 301 leaves it to the node. The application gets PORT_ERR_FULL
+ * for its frames.
  *
  * Bit rates. FDCAN1 is clocked by the board's 24 MHz crystal (HSE) itself, not by the PLL. A sample point at 87.5 % =
  * 7/8 is exact where the time quanta of a bit are a multiple of 8:
@@ -26,8 +26,8 @@
  * PLL. At 1 Mbit/s the bits of two nodes may differ by 0.48 % (3 quanta after the sample, jump width 3); a crystal is
  * good for 0.01 %, the chip's own RC oscillator (1 %) is not good enough.
  *
- * Pins, clock and interrupt lines are the caller's business. "Any context": interrupts of priority CPU_PRIORITY_TICK
- * and lower, and the main loop; the functions hold these off where they must.
+ * The caller (port_stm32g4.c, irq) sets up pins, clock and interrupt lines. "Any context": interrupts of priority
+ * CPU_PRIORITY_TICK and lower, and the main loop; the functions hold these off where necessary.
  */
 #ifndef PORT_STM32G4_FDCAN_H
 #define PORT_STM32G4_FDCAN_H
@@ -39,8 +39,8 @@
 #include "can/can_frame.h"
 #include "can/can_match.h"
 
-/* A tick has at most 13 frames (SYNC, position and velocity of six axes). Not many more, so that a bus that comes back
- * is not given old setpoints for long. */
+/* A tick has at most 13 frames (SYNC, position and velocity of six axes). Not many more, so that few old setpoints are
+ * sent after an interruption of the bus. */
 #define FDCAN_QUEUE_SIZE 16u
 
 /* Frames of one context that wait for the transmitter, in order. */
@@ -50,20 +50,21 @@ struct fdcan_queue {
     struct can_msg frames[FDCAN_QUEUE_SIZE];
 };
 
-/* Since they were last taken. */
+/* Counts since the last fdcan_take_events. */
 struct fdcan_events {
     uint32_t bus_offs;
     uint32_t error_passives; /* entered or left */
-    uint32_t lost;           /* at least so many times a frame came and the FIFO was full */
+    uint32_t lost;           /* received frames lost because the FIFO was full, at least */
 };
 
 struct fdcan {
     struct fdcan_queue urgent;   /* of the interrupts */
     struct fdcan_queue ordinary; /* of the main loop */
     struct fdcan_events events;
-    bool main_loop_last;  /* the youngest frame in the chip is the main loop's */
-    uint32_t guard_100ns; /* before a tick, in which the main loop's frames stay back */
-    bool off;             /* not on the bus: not started, or bus-off */
+    bool main_loop_last; /* the newest frame in the chip is the main loop's */
+    uint32_t
+        guard_100ns; /* before a tick, in which no frame of the main loop is given to the chip */
+    bool off;        /* not on the bus: not started, or bus-off */
 };
 
 enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
@@ -85,7 +86,8 @@ bool fdcan_send(struct fdcan *can, const struct can_msg *message, enum fdcan_sen
 /* Whether no frame of the interrupts waits for the bus: each has been sent, or was dropped in bus-off. Any context. */
 bool fdcan_delivered(const struct fdcan *can);
 
-/* Receive interrupt: first acknowledge, then fetch until there is none, then attend to what was acknowledged. */
+/* Receive interrupt, in this order: acknowledges the flags, fetches frames until there is none, handles the
+ * acknowledged flags. */
 uint32_t fdcan_acknowledge(void);
 bool fdcan_fetch(struct can_msg *message);
 void fdcan_attend(struct fdcan *can, uint32_t acknowledged);

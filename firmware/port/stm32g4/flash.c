@@ -12,8 +12,8 @@
      FLASH_SR_PGSERR | FLASH_SR_MISERR | FLASH_SR_FASTERR)
 #define ERASED 0xFFu
 
-/* The chip gives up after 25 ms at the latest; this many looks take longer. */
-#define LOOKS 2000000u
+/* The chip aborts after 25 ms at the latest; this many polls take longer. */
+#define POLLS 2000000u
 
 static uint32_t get(uint32_t offset)
 {
@@ -32,7 +32,7 @@ bool flash_is_dual(void)
 
 static bool is_idle(void)
 {
-    for (uint32_t i = 0; i < LOOKS; ++i) {
+    for (uint32_t i = 0; i < POLLS; ++i) {
         if ((get(FLASH_SR) & FLASH_SR_BSY) == 0u) {
             return true;
         }
@@ -40,7 +40,7 @@ static bool is_idle(void)
     return false;
 }
 
-/* Errors of before, too, would keep the chip from beginning. */
+/* Flags of earlier errors would prevent the chip from beginning. */
 static bool begin(void)
 {
     if (!is_idle()) {

@@ -2,11 +2,12 @@
 /*
  * flash: erasing and programming pages of the second flash bank, while the program runs from the first.
  *
- * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts go on: they run
- * from bank 1, which can be read meanwhile; whoever reads bank 2 meanwhile is stopped until it is over. Main loop.
+ * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts continue: they
+ * run from bank 1, which can be read at the same time. A read of bank 2 stalls the core until the operation has ended.
+ * Used by flash_store; flash_take_ecc_error also by faults, in the NMI. Main loop.
  *
- * The data cache is off meanwhile and empty afterwards: of other dual-bank chips of the family it is known that it may
- * keep wrong data of a read while a write is under way, and after an erase it would keep the old contents.
+ * The data cache is off during an operation and empty afterwards. On other dual-bank chips of the family it may keep
+ * wrong data of a read during a write, and after an erase it would keep the old contents.
  */
 #ifndef PORT_STM32G4_FLASH_H
 #define PORT_STM32G4_FLASH_H
@@ -25,7 +26,7 @@ bool flash_erase_page(uint32_t page);
 /* One double word, at a multiple of 8 from the beginning of the bank, that has been erased. False: as above. */
 bool flash_program(uint32_t offset, const uint8_t data[8]);
 
-/* What the NMI asks: was it a word of bank 2 whose error correction failed? Clears the flag. */
+/* For the NMI: true if the error correction of a word of bank 2 failed. Clears the flag. */
 bool flash_take_ecc_error(void);
 
 #endif

@@ -46,14 +46,14 @@ bool flash_store_erase(unsigned bank)
     return self.open;
 }
 
-/* The last page has been erased first of all. */
+/* The last page has been erased already. */
 static bool prepare_page(uint32_t offset)
 {
     return offset % FLASH_PAGE_BYTES != 0u || offset == last_page_at(self.bank) ||
            flash_erase_page((start_of(self.bank) + offset) / FLASH_PAGE_BYTES);
 }
 
-/* What waits, filled up with what erased memory holds. */
+/* Programs the waiting bytes, filled up with the value of erased memory. */
 static bool program_waiting(void)
 {
     const uint32_t count =

@@ -3,15 +3,14 @@
  * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KB each for two programs, then a page
  * (2 KB) each for two sets of parameters.
  *
- * All are there because the firmware runs from the first bank: to erase a page of the bank in use stops the core for
- * 22 ms, which is 22 ticks.
+ * The first bank holds the firmware. Erasing a page of it would stop the core for 22 ms, which is 22 ticks.
  *
  * Erasing a bank erases its last page only, which has the commit record (app/bank_record.h); every other page is erased
  * when the first write reaches it. So no call takes longer than the erase of one page and the writing itself. A bank
  * whose erasing or writing was interrupted needs no repair: the next erase begins again.
  *
- * Writes collect eight bytes, which is what the flash programs and protects by its error correction at once; each
- * double word is programmed once. Main loop.
+ * Writes collect eight bytes, the unit that the flash programs and protects by its error correction. Each double word
+ * is programmed once. Used by port_store.c. Main loop.
  */
 #ifndef PORT_STM32G4_FLASH_STORE_H
 #define PORT_STM32G4_FLASH_STORE_H

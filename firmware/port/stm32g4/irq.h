@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * irq: the two of them that the controller lives on, and how they keep out of each other's way.
+ * irq: the two interrupts of the controller, and how they exclude each other. Used by port_stm32g4.c and vectors.c.
  *
  *     TIM2        priority 1: the tick
  *     FDCAN1 IT0  priority 2: frames that came, the next ones to send, bus-off
  *
- * The tick may begin while frames are fetched, but not while the application has one: `receive` is called with the tick
- * held off, a frame at a time. The main loop's critical section holds off both. So the application sees what
- * port.h promises, and a tick waits for one call of `receive` at most, a few microseconds.
+ * The tick may begin while frames are fetched, but not while the application handles one: `receive` is called with the
+ * tick held off, for one frame at a time. The main loop's critical section holds off both. So the contexts are those of
+ * port.h, and a tick waits for at most one call of `receive`, a few microseconds.
  */
 #ifndef PORT_STM32G4_IRQ_H
 #define PORT_STM32G4_IRQ_H
@@ -24,7 +24,7 @@ void irq_stop(void);
 /* From the next tick on. Main loop, or the tick. */
 void irq_period(uint32_t period_us);
 
-/* Ticks so far. Main loop. */
+/* Number of ticks since irq_start. Main loop. */
 uint32_t irq_ticks(void);
 
 /* The handlers themselves, for the vectors. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The port for NUCLEO-G474RE: what port.h asks for, from the modules of this folder; the store is in port_store.c. */
+/* Implements port/port.h for NUCLEO-G474RE by the modules of this folder; the store is in port_store.c. */
 #include "port/port.h"
 
 #include "port/stm32g4/clock.h"
@@ -57,7 +57,7 @@ int port_begin(int argc, char **argv)
     pins_begin();
     const bool clocked = clock_begin();
     console_begin();
-    if (watchdog_has_bitten()) {
+    if (watchdog_has_reset()) {
         port_log(PORT_WARNING, "restarted by the watchdog", 0);
     }
     if (!clocked) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The store of port.h: the banks of flash_store, with the watchdog fed between; and the ring of streamed jobs in
+/* The store of port.h: the banks of flash_store, with the watchdog fed in between; and the ring of streamed jobs in
  * RAM. */
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
@@ -12,7 +12,7 @@ uint32_t port_store_size(unsigned bank)
     return flash_store_size(bank);
 }
 
-/* The main loop may be in the store for a second or two without a wait between. */
+/* The main loop may be in the store for a second or two without a wait in between. */
 int port_store_erase(unsigned bank)
 {
     port_progress();

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * reg: how this port reaches the registers and memories of the chip; nothing else does.
+ * reg: access to the registers and memories of the chip, for the files of this port only. Any context: reg_read,
+ * reg_write and reg_memory are single accesses; the functions that read, change and write a register need the lock of
+ * their caller.
  *
- * On the chip each access is one load or store. On any other machine the tests stand in for the chip: they define
- * reg_read, reg_write and reg_memory as a model of the peripherals (tests/unit/stm32g4_*.c). The reg_*.h headers hold what
- * this port uses of reference manual RM0440, named PERIPHERAL_REGISTER_FIELD; tools/check_registers.py compares them with
- * an independent table.
+ * On the chip each access is one load or store. On any other machine the tests replace the chip: they define
+ * reg_read, reg_write and reg_memory as a model of the peripherals (tests/unit/stm32g4_*.c). The reg_*.h headers hold
+ * what this port uses of reference manual RM0440, named PERIPHERAL_REGISTER_FIELD; tools/check_registers.py compares
+ * them with an independent table.
  */
 #ifndef PORT_STM32G4_REG_H
 #define PORT_STM32G4_REG_H
@@ -28,7 +30,7 @@ static inline void reg_write(uint32_t address, uint32_t value)
     *(volatile uint32_t *)(uintptr_t)address = value;
 }
 
-/* Memory that is read like any other; as it is now, whatever was read of it before the registers changed it. */
+/* Memory of the chip as it is now: the compiler may not reuse values read before registers changed it. */
 static inline const uint8_t *reg_memory(uint32_t address)
 {
     __asm__ volatile("" ::: "memory");

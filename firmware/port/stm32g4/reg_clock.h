@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Clocks, resets, supply, watchdog (RM0440 chapters 6, 7 and 42). */
+/* reg_clock: registers of clocks, resets, supply and watchdog (RM0440 chapters 6, 7 and 42). Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_CLOCK_H
 #define PORT_STM32G4_REG_CLOCK_H
 
@@ -41,7 +41,7 @@
 #define RCC_CSR_RMVF           BIT(23)
 #define RCC_CSR_IWDGRSTF       BIT(29)
 
-/* Values, as the reference manual calls them: REGISTER_FIELD_MEANING. */
+/* Values by the names of the reference manual: REGISTER_FIELD_MEANING. */
 #define RCC_CFGR_SW_PLL          3u
 #define RCC_CFGR_HPRE_DIV1       0u
 #define RCC_CFGR_HPRE_DIV2       8u

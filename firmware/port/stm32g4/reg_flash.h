@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Flash memory, category 3 device in dual-bank mode: 2 banks of 128 pages of 2 KB (RM0440 chapter 3). */
+/* reg_flash: registers of the flash memory, category 3 device in dual-bank mode: 2 banks of 128 pages of 2 KB (RM0440
+ * chapter 3). Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_FLASH_H
 #define PORT_STM32G4_REG_FLASH_H
 

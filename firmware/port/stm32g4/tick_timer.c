@@ -54,7 +54,7 @@ static uint32_t since(uint32_t later, uint32_t earlier)
     return counts <= UINT32_MAX / 2u ? counts : 0u;
 }
 
-/* The compare is for equality: a time that is over already needs a push. */
+/* The compare is for equality: for a time that is over the interrupt is made by software. */
 static void wake_at(uint32_t time)
 {
     reg_write(TIM2_BASE + TIM_CCR1, time);

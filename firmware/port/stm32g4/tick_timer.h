@@ -5,9 +5,9 @@
  * TIM2 counts 100 ns with 32 bits; its compare interrupt is the tick. TIM5 counts microseconds with 32 bits. Both run
  * on for ever, so 100 times TIM2 wraps where nanoseconds in 32 bits do: no interrupt is needed to extend them.
  *
- * Ticks are due a period apart. One that began late is followed by the next at its own due time, but never less than
- * three quarters of a period after the late one; after one that was late by a whole period the clock of the ticks is
- * set anew.
+ * Ticks are due a period apart. After a late tick the next one comes at its own due time, but at least three quarters
+ * of a period after the late one. After a tick that was late by a whole period the clock of the ticks is set anew. Used
+ * by irq, fdcan and port_stm32g4.c.
  */
 #ifndef PORT_STM32G4_TICK_TIMER_H
 #define PORT_STM32G4_TICK_TIMER_H
@@ -29,7 +29,7 @@ void tick_timer_begin(uint32_t input_mhz);
 uint32_t tick_timer_ns(void);
 uint32_t tick_timer_us(void);
 
-/* Until the next tick is due, in counts of TIM2; UINT32_MAX: there are no ticks. 0: it is due. Any context. */
+/* Time until the next tick is due, in counts of TIM2; UINT32_MAX: there are no ticks. 0: it is due. Any context. */
 uint32_t tick_timer_left(void);
 
 /* The first tick comes one period later. Main loop. */
@@ -39,10 +39,10 @@ void tick_timer_stop(void);
 /* From the next tick on. Main loop with the tick held off, or the tick. */
 void tick_timer_period(struct tick_timer *timer, uint32_t period_us);
 
-/* The interrupt, first of all: acknowledges it. Returns how late the tick is, in ns (UINT32_MAX at most). */
+/* First call in the interrupt: acknowledges it. Returns how late the tick is, in ns (UINT32_MAX at most). */
 uint32_t tick_timer_enter(struct tick_timer *timer);
 
-/* Last of all: sets the next due time. */
+/* Last call in the interrupt: sets the next due time. */
 void tick_timer_leave(struct tick_timer *timer);
 
 #endif

@@ -9,7 +9,7 @@
 #define RELOAD       2000u
 
 /* The registers take some cycles of the slow clock. */
-#define LOOKS 1000000u
+#define POLLS 1000000u
 
 static uint32_t fed_ticks;
 
@@ -19,7 +19,7 @@ void watchdog_start(void)
     reg_write(IWDG_BASE + IWDG_KR, IWDG_KEY_UNLOCK);
     reg_write(IWDG_BASE + IWDG_PR, reg_field(IWDG_PR_PR, DIVIDE_BY_64));
     reg_write(IWDG_BASE + IWDG_RLR, reg_field(IWDG_RLR_RL, RELOAD - 1u));
-    for (uint32_t i = 0; i < LOOKS; ++i) {
+    for (uint32_t i = 0; i < POLLS; ++i) {
         if ((reg_read(IWDG_BASE + IWDG_SR) & (IWDG_SR_PVU | IWDG_SR_RVU)) == 0u) {
             break;
         }
@@ -35,9 +35,9 @@ void watchdog_feed(uint32_t ticks)
     }
 }
 
-bool watchdog_has_bitten(void)
+bool watchdog_has_reset(void)
 {
-    const bool bitten = (reg_read(RCC_BASE + RCC_CSR) & RCC_CSR_IWDGRSTF) != 0u;
+    const bool restarted = (reg_read(RCC_BASE + RCC_CSR) & RCC_CSR_IWDGRSTF) != 0u;
     reg_set(RCC_BASE + RCC_CSR, RCC_CSR_RMVF);
-    return bitten;
+    return restarted;
 }

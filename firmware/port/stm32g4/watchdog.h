@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * watchdog: the independent one, on its own oscillator: restarts the chip 4 s (3.8 to 4.3 s) after it was fed last.
- * Cannot be stopped.
+ * watchdog: the independent watchdog, on its own oscillator: restarts the chip 4 s (3.8 to 4.3 s) after it was last
+ * fed. It cannot be stopped. Used by port_stm32g4.c. Main loop.
  *
- * It is fed from the main loop, in each round and at each step of longer work (port_progress), and only when ticks have
- * gone on since the last time: so it bites when either of them stands still. The drives detect missing frames of the controller much
- * sooner, by missing SYNCs and heartbeats; this is for the way back.
+ * The main loop feeds it in each round and at each step of longer work (port_progress), but only if ticks have come
+ * since the last time. So it restarts the chip if main loop or ticks stop. The drives detect missing SYNCs and
+ * heartbeats much sooner; the watchdog is for the recovery of the controller.
  */
 #ifndef PORT_STM32G4_WATCHDOG_H
 #define PORT_STM32G4_WATCHDOG_H
@@ -19,7 +19,7 @@ void watchdog_start(void);
 /* Main loop; ticks: how many there have been. */
 void watchdog_feed(uint32_t ticks);
 
-/* Whether it was the watchdog that restarted the chip; forgets it. */
-bool watchdog_has_bitten(void);
+/* Whether the watchdog has restarted the chip; clears the flag. */
+bool watchdog_has_reset(void);
 
 #endif

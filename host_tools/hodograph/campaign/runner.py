@@ -126,6 +126,12 @@ def _dask() -> Any:
         ) from None
 
 
+_ANY_LOCAL_PORT = "127.0.0.1:0"
+"""Of the scheduler's web server. Without an address Dask takes port 8787 of all interfaces, and warns if it is in
+use.
+"""
+
+
 @contextmanager
 def _local(workers: int) -> Iterator[Any]:
     dask = _dask()
@@ -133,7 +139,7 @@ def _local(workers: int) -> Iterator[Any]:
         cluster = dask.LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            dashboard_address=None,
+            dashboard_address=_ANY_LOCAL_PORT,
             silence_logs=logging.CRITICAL,
         )
     with cluster, dask.Client(cluster) as client:

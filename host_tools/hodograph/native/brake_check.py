@@ -22,9 +22,9 @@ class BrakeCheck:
         lib.brake_check_begin(self._check, program.pointer, self._limits)
 
     @property
-    def looks(self) -> int:
+    def evaluations(self) -> int:
         """Number of stretches of brakes that the last proof evaluated: its cost."""
-        return int(self._check.looks)
+        return int(self._check.evaluations)
 
     def proves(self, piece: int, kind: int, codes: Sequence[int]) -> bool:
         """Whether stops of a kind (HOLD or FAULT of hodograph.program.stops) that begin in a feed piece keep the limits

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What Python sees of the C side (cffi API mode: the C compiler checks it against the real headers and fills in
- * what stands as "..."). Meanings and units: the headers named here. */
+/* declarations: the part of the C side that Python uses (cffi API mode: the C compiler checks it against the real
+ * headers and fills in each "..."). Read by build_native.py only. Meanings, units and contexts: the headers named here.
+ * */
 
 /* core/program.h, core/program_rules.h, core/program_check.h */
 struct program_header {
@@ -53,7 +54,7 @@ struct program_stop {
     ...;
 };
 struct brake_check {
-    uint32_t looks;
+    uint32_t evaluations;
     ...;
 };
 void brake_check_begin(struct brake_check *check, const struct program *p,
@@ -252,14 +253,14 @@ struct stop_path {
     struct stop_bend *bends;
     struct stop_stretch *groups;
 };
-struct stop_cap {
+struct stop_feed_zone {
     double from_mm, to_mm, feed_mm_s;
 };
 struct stop_limits {
     double feed, acceleration, jerk, centripetal;
     double axis_velocity[6], axis_acceleration[6], axis_jerk[6], reach[6], time_constant[6];
-    const struct stop_cap *caps;
-    uint32_t cap_count, reach_at_pace, rise_is_cut;
+    const struct stop_feed_zone *zones;
+    uint32_t zone_count, reach_at_rate_1, rise_is_cut;
     uint32_t quick;
 };
 struct stop_found {

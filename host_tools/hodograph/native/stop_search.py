@@ -24,9 +24,9 @@ class StopLimits:
 
     feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
     reach                      of |velocity + time_constant * acceleration| of the axis
-    caps                       (from_mm, to_mm, feed_mm_s) each
-    reach_at_pace              `reach` applies at an override of 1 only
-    rise_is_cut                a brake begins when a rising override adds at most a quarter of its deceleration
+    zones                      (from_mm, to_mm, feed_mm_s) each
+    reach_at_rate_1            `reach` applies at the rate 1 only
+    rise_is_cut                a brake begins when a rising rate adds at most a quarter of its deceleration
     quick                      few numbers are tried: for long programs
     """
 
@@ -39,8 +39,8 @@ class StopLimits:
     axis_jerk: tuple[float, ...] = FREE
     reach: tuple[float, ...] = FREE
     time_constant: tuple[float, ...] = (0.0, 0.0)
-    caps: tuple[tuple[float, float, float], ...] = ()
-    reach_at_pace: bool = False
+    zones: tuple[tuple[float, float, float], ...] = ()
+    reach_at_rate_1: bool = False
     rise_is_cut: bool = False
     quick: bool = False
 
@@ -161,15 +161,15 @@ class StopSearch:
 def limits_struct(limits: StopLimits) -> tuple[Any, Any]:
     """The struct stop_limits and what it points to, which must be kept as long."""
     ffi, _ = library()
-    caps = ffi.new("struct stop_cap[]", [tuple(cap) for cap in limits.caps])
+    zones = ffi.new("struct stop_feed_zone[]", [tuple(cap) for cap in limits.zones])
     own = ffi.new("struct stop_limits *")
     for one in fields(limits):
         value = getattr(limits, one.name)
-        if one.name == "caps":
+        if one.name == "zones":
             continue
         if isinstance(value, tuple):
             free = 0.0 if one.name == "time_constant" else inf
             value = (*value, *[free] * (AXES - len(value)))
         setattr(own, one.name, value)
-    own.caps, own.cap_count = caps, len(limits.caps)
-    return own, caps
+    own.zones, own.zone_count = zones, len(limits.zones)
+    return own, zones

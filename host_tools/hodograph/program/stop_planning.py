@@ -469,10 +469,10 @@ def hold_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
         axis_velocity=_both(own.axis.velocity_mm_s, machine.axis_velocity),
         axis_acceleration=_both(own.axis.acceleration_mm_s2, machine.axis_acceleration),
         axis_jerk=_both(own.axis.jerk_mm_s3, machine.axis_jerk),
-        caps=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.zones),
+        zones=tuple((cap.from_mm, cap.to_mm, cap.feed_mm_s) for cap in own.zones),
         reach=_reach(terms.plants, axes),
         time_constant=_time_constants(terms.plants, axes),
-        reach_at_pace=False,
+        reach_at_rate_1=False,
         rise_is_cut=True,
     )
 
@@ -490,7 +490,7 @@ def fault_limits(plan: FeedPlan, terms: StopTerms) -> StopLimits:
         axis_jerk=_both(terms.axis.jerk_mm_s3, free),
         reach=_reach(terms.drives, axes),
         time_constant=_time_constants(terms.drives, axes),
-        reach_at_pace=True,
+        reach_at_rate_1=True,
     )
 
 

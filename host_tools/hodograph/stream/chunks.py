@@ -78,6 +78,9 @@ _MOVING_FAULTS = frozenset(
 )
 """Faults that a lower feed at a piece avoids."""
 
+_MOST_EXCEEDED = 8
+"""Most pieces found at once whose motion the controller would refuse: each one needs a check of those after it."""
+
 _REFUSED_TAILS = _MOVING_FAULTS | {ProgramError.SEGMENT_SHORT, ProgramError.PIECE_SHORT}
 """Faults that another tail avoids."""
 
@@ -524,19 +527,25 @@ class SectionChunks:
         return NativeProgram(encode(program)).check(self._limits)
 
     def _exceeded(self, stretch: Stretch) -> NDArray[np.bool_]:
-        """Pieces (M,) of a stretch that the controller would refuse for their motion. If there are several, the first
-        ones.
+        """The pieces (M,) of a stretch that the controller would refuse for their motion: all of them; if there are
+        many, the first _MOST_EXCEEDED.
         """
         pieces = stretch.pieces
         codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
         bad = np.asarray((codes == 0).any(axis=1))
-        if not bad.any():
-            program = self._program(stretch, no_codes(len(pieces)))
+        if bad.any():
+            return bad
+        first = 0
+        while first < len(pieces) and np.count_nonzero(bad) < _MOST_EXCEEDED:
+            later = Stretch(pieces.part(slice(first, None)), stretch.end_q40)
+            program = self._program(later, no_codes(len(later.pieces)))
             fault = self._fault(program)
-            if fault is not None and fault.code in _MOVING_FAULTS:
-                bad[fault.index] = True
-            elif fault is not None and fault.code == ProgramError.SEGMENT_SHORT:
-                bad = _on_short_segments(program)
+            if fault is not None and fault.code == ProgramError.SEGMENT_SHORT:
+                bad[first:] |= _on_short_segments(program)
+            if fault is None or fault.code not in _MOVING_FAULTS:
+                break
+            first += fault.index + 1
+            bad[first - 1] = True
         return bad
 
 

@@ -92,7 +92,7 @@ class Tails:
                 return self._stretch(start, found)
 
             yield made(one)
-            yield feed.lowered(one, made, _whole, _LOWERED)[0]
+            yield feed.lowered(one, made, _whole, lambda _, own: own, _LOWERED)[0]
         yield Stretch(window.stretch.pieces.part(slice(joint, None)), window.stretch.end_q40)
 
     def _solved(self, start: _Start, high_mm: float) -> Solution | None:

@@ -73,6 +73,11 @@ TAIL_EFFORT = replace(_EFFORT, spacing=3.0, fewest=6)
 _LOWERED = (1.01, 1.01, 1.02, 1.04, 1.08)
 """Factors by which the limits of an interval that the controller would refuse are lowered, one after the other."""
 
+_FEWER_CODES = (1, 2, 4, 8, 16)
+"""Numbers of codes by which the override bounds of pieces that the controller would still refuse are reduced, one after
+the other: 8 are a factor of 2.
+"""
+
 _DRIFT_Q40 = 1024
 _SAME_MM = 1e-9
 
@@ -269,6 +274,7 @@ class SectionFeed:
             found,
             lambda one: self._window(one, limits, given, high, stop_s),
             lambda window: (window.stretch, window.count),
+            _with_stretch,
         )
         if self._moving is not None and bad[: made.count].any():
             return self._to_rest(limits, given)
@@ -279,11 +285,12 @@ class SectionFeed:
         found: Solution,
         made: Callable[[Solution], _Made],
         stretch_of: Callable[[_Made], tuple[Stretch, int]],
+        with_stretch: Callable[[_Made, Stretch], _Made],
         steps: Sequence[float] = _LOWERED,
     ) -> tuple[_Made, NDArray[np.bool_]]:
-        """What `made` makes of a solution whose limits are lowered on intervals that the controller would refuse, and
-        the pieces (M,) that it would still refuse. `stretch_of` gives the pieces of that, and how many of them are
-        kept.
+        """What `made` makes of a solution: first with lower limits on intervals that the controller would refuse, then
+        with lower override bounds of these pieces; and the pieces (M,) that it would still refuse. `stretch_of` gives
+        the pieces of that, and how many of them are kept; `with_stretch` the same with other pieces.
         """
         tight, out = np.ones(found.grid.size), made(found)
         for step in steps:
@@ -297,6 +304,12 @@ class SectionFeed:
                 break
             found = lower
             out = made(found)
+        for fewer in _FEWER_CODES:
+            stretch, count = stretch_of(out)
+            bad = self._exceeded(stretch)
+            if not bad[:count].any():
+                return out, bad
+            out = with_stretch(out, _with_fewer_codes(stretch, bad, fewer))
         return out, self._exceeded(stretch_of(out)[0])
 
     def _window(
@@ -481,6 +494,24 @@ class SectionFeed:
         paths = [replace(one, limits=replace(one.limits, zones=zones)) for one in plan.paths]
         own = with_override(raw, plan.controller, limits, paths)
         return Stretch(replace(own, start_q40=own.start_q40 + base), int(starts[-1]) + base)
+
+
+def _with_stretch(window: Window, stretch: Stretch) -> Window:
+    return replace(window, stretch=stretch)
+
+
+def _with_fewer_codes(stretch: Stretch, bad: NDArray[np.bool_], fewer: int) -> Stretch:
+    """Some pieces (M,) with lower override bounds; what they leave of the axis limits is found from samples, and the
+    controller's proof may find less between them.
+    """
+    pieces = stretch.pieces
+    by = np.where(bad, fewer, 0)[:, None]
+    rate, second = (
+        np.where(codes > by, codes - by, np.minimum(codes, 1)).astype(np.uint8)
+        for codes in (pieces.override_rate_codes, pieces.override_second_codes)
+    )
+    lower = replace(pieces, override_rate_codes=rate, override_second_codes=second)
+    return replace(stretch, pieces=lower)
 
 
 def last_s(pieces: FeedPieces, count: int) -> float:

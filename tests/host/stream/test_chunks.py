@@ -341,6 +341,24 @@ def test_what_does_not_follow_is_found(short: list[Chunk]) -> None:
         assert shared_fault(replace(two, header=changed), one) is not None
 
 
+@pytest.mark.parametrize("share", [0.9975, 0.995])
+def test_pieces_that_the_proof_refuses_are_slower_and_allow_less_override(
+    tmp_path: Path, machine: Machine, share: float
+) -> None:
+    """The proof of the axis limits may find more between two samples than the planner. Here it finds it everywhere."""
+    file = tmp_path / "walk.ngc"
+    file.write_text(_walk(0, 8, 2.0, 0.5))
+    (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
+    made = SectionChunks(machine, "walk", section.blocks, 1, MOST)
+    limits = made._limits
+    jerk = tuple(round(share * most) for most in limits.axis_jerk_mm_s3)
+    made._limits = replace(limits, axis_jerk_mm_s3=jerk)
+    chunks = [one.chunk for one in made.chunks()]
+    assert len(chunks) > 1
+    for chunk in chunks:
+        assert NativeProgram(chunk.image).check(made._limits) is None
+
+
 def test_a_part_of_a_section_begins_where_it_is_asked_for(tmp_path: Path, machine: Machine) -> None:
     file = tmp_path / "walk.ngc"
     file.write_text(_walk(3, 25, 2.0, 0.1))

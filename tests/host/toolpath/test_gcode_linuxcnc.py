@@ -122,7 +122,7 @@ class _Writer:
     def __init__(self, seed: int) -> None:
         self._random = random.Random(seed)
         self._label = 0
-        # docs/reference/gcode.md, section "Otherwise than LinuxCNC": one R and one retract mode for all cycles.
+        # docs/reference/gcode.md, section "Different from LinuxCNC": one R and one retract mode for all cycles.
         self._r = self._random.randint(0, 5)
         self._retract = self._random.choice(["G98 ", "G99 "])
 

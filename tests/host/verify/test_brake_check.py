@@ -139,4 +139,4 @@ def test_without_limits_of_axes_there_is_nothing_to_prove() -> None:
     program = programs()[0]
     check = BrakeCheck(NativeProgram(encode(program)), NativeLimits())
     assert check.proves(0, FAULT, (255, 255, 255))
-    assert check.looks == 0
+    assert check.evaluations == 0

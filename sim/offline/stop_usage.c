@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-#include "offline/stop_strain.h"
+/* Implements offline/stop_usage.h (see there): the limit usage of a motion along a path. */
+#include "offline/stop_usage.h"
 
 #include <math.h>
 
 #define UNLIMITED_MM_S 1e12
-#define SPARE_SHARE                                                                                \
-    1e-4 /* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes */
-#define FEED_ROUNDING 1e-9 /* share of a feed that the plan may be above it */
+/* of a limit, in bounds of a whole brake: more than rounding to whole ticks takes */
+#define SPARE_SHARE   1e-4
+#define FEED_ROUNDING 1e-9 /* share of a feed by which the plan may exceed it */
 
 static double over(double limit)
 {
@@ -45,11 +46,12 @@ static void planar_axes_of(const struct stop_row *low, double share, const struc
     out->jerk[1] = jerk_along * ty + jerk_across * tx;
 }
 
-static void spatial_axes_of(const struct stop_road *road, const struct stop_row *low, double share,
-                            const struct stop_state *at, double j, struct stop_axes *out)
+static void spatial_axes_of(const struct stop_lookup *lookup, const struct stop_row *low,
+                            double share, const struct stop_state *at, double j,
+                            struct stop_axes *out)
 {
-    const struct stop_bend *bend = &road->bends[low - road->rows];
-    for (uint32_t k = 0; k < road->axis_count; k++) {
+    const struct stop_bend *bend = &lookup->bends[low - lookup->rows];
+    for (uint32_t k = 0; k < lookup->axis_count; k++) {
         double first = stop_between(bend[0].by_mm[0][k], bend[1].by_mm[0][k], share);
         double second = stop_between(bend[0].by_mm[1][k], bend[1].by_mm[1][k], share);
         double third = stop_between(bend[0].by_mm[2][k], bend[1].by_mm[2][k], share);
@@ -59,13 +61,13 @@ static void spatial_axes_of(const struct stop_road *road, const struct stop_row 
     }
 }
 
-void stop_axes_of(const struct stop_road *road, const struct stop_row *low, double share,
+void stop_axes_of(const struct stop_lookup *lookup, const struct stop_row *low, double share,
                   const struct stop_state *at, double j, struct stop_axes *out)
 {
-    if (road->axis_count == PROGRAM_PLANE) {
+    if (lookup->axis_count == PROGRAM_PLANE) {
         planar_axes_of(low, share, at, j, out);
     } else {
-        spatial_axes_of(road, low, share, at, j, out);
+        spatial_axes_of(lookup, low, share, at, j, out);
     }
 }
 
@@ -76,15 +78,15 @@ double stop_share_of(const struct stop_row *low, double s)
     return share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
 }
 
-double stop_strain(const struct stop_road *road, const struct stop_inverse *inverse,
-                   const struct stop_row *low, const struct stop_state *at, double j)
+double stop_usage(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
+                  const struct stop_row *low, const struct stop_state *at, double j)
 {
     struct stop_axes axes;
     double share = stop_share_of(low, at->s);
-    stop_axes_of(road, low, share, at, j, &axes);
+    stop_axes_of(lookup, low, share, at, j, &axes);
     double most = at->v * inverse->feed / stop_between(low->feed_mm_s, low[1].feed_mm_s, share);
     most = low->feed_mm_s < UNLIMITED_MM_S && low[1].feed_mm_s < UNLIMITED_MM_S ? most : 0.0;
-    for (uint32_t k = 0; k < road->axis_count; k++) {
+    for (uint32_t k = 0; k < lookup->axis_count; k++) {
         most = stop_greater(most, fabs(axes.velocity[k]) * inverse->velocity[k]);
         most = stop_greater(most, fabs(axes.acceleration[k]) * inverse->axis_acceleration[k]);
         most = stop_greater(most, fabs(axes.jerk[k]) * inverse->axis_jerk[k]);
@@ -111,7 +113,7 @@ static double length_of(double along, double across)
     return sqrt(along * along + across * across);
 }
 
-/* Greatest component along an axis, for an axis that the tangent has at most this component of. */
+/* Greatest component along an axis, if the component of the tangent along it is at most this one. */
 static double component(double along, double across, double tangent)
 {
     return stop_lesser(length_of(along, across), along * tangent + across);
@@ -149,7 +151,7 @@ static double planar_share(const struct stop_inverse *inverse, const struct stop
     return most;
 }
 
-static double spatial_share(const struct stop_road *road, const struct stop_inverse *inverse,
+static double spatial_share(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                             const struct stop_extent *extent)
 {
     const struct parts parts = parts_of(extent);
@@ -157,7 +159,7 @@ static double spatial_share(const struct stop_road *road, const struct stop_inve
     const double jerk = length_of(parts.jerk_along, parts.jerk_across);
     const double v = extent->speed;
     double most = 0.0;
-    for (uint32_t k = 0; k < road->axis_count; k++) {
+    for (uint32_t k = 0; k < lookup->axis_count; k++) {
         const double first = extent->path.bend.by_mm[0][k];
         const double second = extent->path.bend.by_mm[1][k];
         const double third = extent->path.bend.by_mm[2][k];
@@ -173,23 +175,24 @@ static double spatial_share(const struct stop_road *road, const struct stop_inve
     return most;
 }
 
-int stop_extent_keeps(const struct stop_road *road, const struct stop_inverse *inverse,
+int stop_extent_keeps(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                       const struct stop_extent *extent)
 {
     const double along = extent->speed * inverse->feed / extent->path.feed_mm_s;
-    const double axes = road->axis_count == PROGRAM_PLANE ? planar_share(inverse, extent)
-                                                          : spatial_share(road, inverse, extent);
+    const double axes = lookup->axis_count == PROGRAM_PLANE
+                            ? planar_share(inverse, extent)
+                            : spatial_share(lookup, inverse, extent);
     return stop_greater(along, axes) * (1.0 + SPARE_SHARE) <= 1.0;
 }
 
-int stop_keeps_up_to(const struct stop_road *road, const struct stop_inverse *inverse,
+int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm)
 {
-    /* Where limits bind, the first row alone shows it as a rule. */
-    stop_stretch_of_row(road, row, &extent->path);
-    if (!stop_extent_keeps(road, inverse, extent)) {
+    /* If a limit is exceeded, the first row alone usually shows it. */
+    stop_stretch_of_row(lookup, row, &extent->path);
+    if (!stop_extent_keeps(lookup, inverse, extent)) {
         return 0;
     }
-    stop_stretch_from(road, row, to_mm, &extent->path);
-    return stop_extent_keeps(road, inverse, extent);
+    stop_stretch_from(lookup, row, to_mm, &extent->path);
+    return stop_extent_keeps(lookup, inverse, extent);
 }
