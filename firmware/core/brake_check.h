@@ -6,7 +6,7 @@
  * host_tools/hodograph/native; a controller does not call it.
  *
  * All brakes that may begin in a part of a piece are followed at once. At each time there are lower and upper bounds of
- * arc length, speed, acceleration and jerk. They follow from the law of core/path_brake (docs/theory/numerics.md
+ * arc length, speed, acceleration and jerk. They follow from the law of core/path_brake (docs/theory/feed.md
  * section 7). core/path_bounds gives bounds of the motion of the axes on that stretch of the path. If these bounds do
  * not decide, the part is halved: in time, override or override rate. A fault stop that begins during the brake of a
  * feed hold is not checked.

@@ -126,7 +126,7 @@ static void read_levels(struct levels *levels, const struct program_override *ow
 
 /* At the overrides that the piece allows: |lambda| <= f, |lambda'| <= R, |lambda''| <= S make of velocity, acceleration
  * and jerk f v, f^2 a + R v and f^3 j + 3 f R a + S v at most: the greatest of all levels. Magnitudes out.
- * docs/theory/numerics.md section 7. */
+ * docs/theory/feed.md section 7. */
 static void at_all_overrides(const struct levels *levels, struct real of[QUANTITIES])
 {
     const struct real v = real_abs(of[VELOCITY]);

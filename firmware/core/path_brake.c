@@ -254,7 +254,7 @@ static void move(struct path_state *at, int64_t sixth_q56)
     at->acceleration_q56 = a + 6 * sixth_q56;
 }
 
-/* A sixth, rounded towards 0: less by 2^-31 of it and a unit at most. */
+/* A sixth, rounded towards 0: less by 2^-30 of it and a unit at most. */
 static int64_t sixth_of(int64_t a)
 {
     return a < 0 ? -qmath_mul_unsigned(-a, SIXTH_Q32) : qmath_mul_unsigned(a, SIXTH_Q32);

@@ -220,7 +220,7 @@ static struct real parameter(const struct path *path, struct real s_mm)
 }
 
 /* With tangent T = w^2 / sigma and curvature kappa: velocity F' T, acceleration (F'' + i kappa F'^2) T, jerk
- * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/theory/numerics.md 16. */
+ * (F''' - kappa^2 F'^3 + i (3 kappa F' F'' + kappa_s F'^3)) T. docs/theory/proofs.md 16. */
 static void motion_in_plane(const struct path *path, struct real xi,
                             const struct real f[QUANTITIES], struct motion *out)
 {

@@ -2,7 +2,7 @@
 /*
  * path_motion: the motion of the path axes on one segment: velocity, acceleration and jerk of each axis at an instant,
  * and a bound of their second derivatives over a stretch. Used by the proofs of axis limits (core/limit_check.h,
- * core/brake_check.h); docs/theory/numerics.md section 16 has the formulas.
+ * core/brake_check.h); docs/theory/proofs.md section 16 has the formulas.
  *
  * A feed polynomial gives arc length in powers of x, which stands for time from -1 to 1 in some unit; `per_s` is dx/dt.
  * With s = middle + half x and per_s = 1 / half the motion is that at 1 mm/s: velocity, acceleration and jerk then are

@@ -2,7 +2,7 @@
 /*
  * stop_check: checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it
  * cover the longest stop? The bounds are computed anew from the feed pieces, the override bounds and the stop
- * parameters (docs/theory/numerics.md section 7, "Stops"). A part of program_check; the host tools compute the table
+ * parameters (docs/theory/feed.md section 7, "Stops"). A part of program_check; the host tools compute the table
  * with it.
  *
  * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.

@@ -6,7 +6,7 @@
  * parameter. The foot of the perpendicular is found by Newton steps from the commanded arc length, across segment ends
  * and, on a closed path, across its start; beyond the ends of an open path the end point is the nearest. Only feet
  * within four times the point's distance from the commanded place count. So at a self-crossing the branch that is
- * executed is used. Method and accuracy: docs/theory/numerics.md section 14.
+ * executed is used. Method and accuracy: docs/theory/drives.md section 14.
  *
  * The error of one point does not depend on earlier points. Double arithmetic and sqrt, the same bits on every IEEE 754
  * target. No heap: the caller lends the array of segments. One thread for each struct contour.

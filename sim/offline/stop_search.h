@@ -5,7 +5,7 @@
  * standstill. Called by Python through host_tools/hodograph/native.
  *
  * Each brake is followed in double arithmetic from a grid of instants of the piece. Limits are reduced by STOP_MARGIN
- * for the motion between the instants. Derivation: docs/theory/numerics.md section 7. No heap: the caller lends all
+ * for the motion between the instants. Derivation: docs/theory/feed.md section 7. No heap: the caller lends all
  * arrays. Any thread; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_SEARCH_H

@@ -13,7 +13,7 @@
 #define MOST_BETWEEN  60u
 #define MOST_TICKS    200000u
 #define HISTORY       3u
-#define NOISE_MM_S3 20.0 /* of a kernel in third differences at 1 kHz; docs/theory/numerics.md 16 */
+#define NOISE_MM_S3   20.0 /* of a kernel in third differences at 1 kHz; docs/theory/proofs.md 16 */
 
 #define ARC PROGRAM_AXES /* after the axes of a setpoint: its arc length */
 

@@ -22,7 +22,7 @@ struct drive_pdff {
     double k_vf;
 };
 
-/* How the drive goes from one setpoint to the next (docs/theory/numerics.md section 13): in a straight line, along a
+/* How the drive goes from one setpoint to the next (docs/theory/drives.md section 13): in a straight line, along a
  * cubic, or not at all: the setpoint is the command from the beginning of its period. */
 enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1, DRIVE_NO_INTERPOLATION = 2 };
 

@@ -7,7 +7,7 @@
  *
  * Over one step of h seconds with constant volts the solution is linear in the state and in the
  * volts; motor_init computes its coefficients once, by power series (no libm, so they have the same
- * bits everywhere). Derivation: docs/theory/numerics.md section 13. All functions are pure; call them from
+ * bits everywhere). Derivation: docs/theory/drives.md section 13. All functions are pure; call them from
  * any context.
  */
 #ifndef HODOGRAPH_PLANT_MOTOR_H

@@ -7,7 +7,7 @@
  *     volts     = torque_to_volts * torque, within +-volts_limit
  *
  * The integral contains the present sample (backward Euler), or contains it only from the next sample on (forward
- * Euler). It does not change while the output is saturated. Error of the sampling: docs/theory/numerics.md section 13.
+ * Euler). It does not change while the output is saturated. Error of the sampling: docs/theory/drives.md section 13.
  */
 #ifndef HODOGRAPH_PLANT_PDFF_H
 #define HODOGRAPH_PLANT_PDFF_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The release phase of a brake (docs/theory/numerics.md section 15.6): as long as the jerks are not negative the speed does not rise
+ * The release phase of a brake (docs/theory/proofs.md section 15.6): as long as the jerks are not negative the speed does not rise
  * in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
  *
  * prover: cbmc

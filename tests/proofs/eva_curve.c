@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The bound of one brake, from any start and with any codes: nothing overflows, also no unsigned number, so that no bound
- * is shortened by a wrap; no division by 0. What intervals do not follow: docs/theory/numerics.md section 15.2.
+ * is shortened by a wrap; no division by 0. What intervals do not follow: docs/theory/proofs.md section 15.2.
  *
  * prover: eva
  * options: -eva-slevel 100 -warn-unsigned-overflow

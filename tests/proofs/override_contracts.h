@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the interpolator; for eva_override.c
- * (docs/theory/numerics.md sections 15.5 and 15.6).
+ * (docs/theory/proofs.md sections 15.5 and 15.6).
  */
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What other proofs take for granted of qmath. Which proof or test shows each: docs/theory/numerics.md section 15.5.
+ * What other proofs take for granted of qmath. Which proof or test shows each: docs/theory/proofs.md section 15.5.
  */
 #ifndef HODOGRAPH_QMATH_CONTRACTS_H
 #define HODOGRAPH_QMATH_CONTRACTS_H

@@ -109,7 +109,7 @@ static uint8_t stored(double value, double scale)
     return code;
 }
 
-/* docs/theory/numerics.md section 7; no program limits but those of the controller. */
+/* docs/theory/feed.md section 7; no program limits but those of the controller. */
 static void set_bounds(const struct override_limits *limit, struct override_piece *piece,
                        uint8_t *at)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Programs for the override's property test: random feed over a straight line, or a golden image, with override bounds
- * and a stop table made in C from chosen limits by docs/theory/numerics.md section 7.
+ * and a stop table made in C from chosen limits by docs/theory/feed.md section 7.
  */
 #ifndef HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
 #define HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H

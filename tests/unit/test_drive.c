@@ -100,7 +100,7 @@ static double sampling_error_um(uint32_t loop_rate_hz)
     return worst * 1e3;
 }
 
-/* First order in the servo sample, as a zero-order hold must be; the figures stand in numerics.md
+/* First order in the servo sample, as a zero-order hold must be; the figures stand in drives.md
  * section 13. */
 static void test_sampling_converges_to_the_continuous_loop(void)
 {

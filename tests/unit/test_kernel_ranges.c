@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The fixed kernel at the corners of what the validator accepts (docs/theory/numerics.md section 15.3), under the
+ * The fixed kernel at the corners of what the validator accepts (docs/theory/proofs.md section 15.3), under the
  * sanitizers: nothing overflows. Corners are segments at the ratio of 2, straight ones, both along an axis and turned,
  * as large as their power of four allows and just larger, from 32 mm down to where arc length is replaced. There too
  * its own functions are held to what the provers take for granted of them (tests/proofs/kernel_bounds.h), which is why

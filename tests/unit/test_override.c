@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Property test of the feed override: random programs, instants and sequences of hold, resume, override, stop and fault
- * stop. Each tick is checked against what docs/reference/protocol.md 1.3 and 1.4 and docs/theory/numerics.md sections 7
+ * stop. Each tick is checked against what docs/reference/protocol.md 1.3 and 1.4 and docs/theory/feed.md sections 7
  * and 12 promise: bounds of every piece touched, feed, acceleration and jerk on the path (from the rate and F, and by
  * differences of the setpoints), setpoints on the curve, brakes inside their numbers, stops inside their bounds,
  * states, end.

@@ -86,7 +86,7 @@ static void test_divisions(void)
     }
 }
 
-/* docs/theory/numerics.md section 15.2: never above floor(a / n), less than 2.1 below a / n. Multiples, their
+/* docs/theory/proofs.md section 15.2: never above floor(a / n), less than 2.1 below a / n. Multiples, their
  * neighbours, powers of two, and the ends of the range, where 2^-64 |a| is largest. */
 static void test_thirds_and_fifths_at_the_corners(void)
 {

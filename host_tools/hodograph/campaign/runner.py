@@ -127,9 +127,7 @@ def _dask() -> Any:
 
 
 _ANY_LOCAL_PORT = "127.0.0.1:0"
-"""Of the scheduler's web server. Without an address Dask takes port 8787 of all interfaces, and warns if it is in
-use.
-"""
+"""Of the scheduler's web server. Without it Dask takes port 8787 of all interfaces, and warns if it is in use."""
 
 
 @contextmanager

@@ -53,7 +53,7 @@ class Drive:
     loop_rate_hz: int
     interpolation: str = "linear"
     """Interpolation between setpoints: "linear", "cubic", or "none": the setpoint takes effect at once
-    (docs/theory/numerics.md section 13)."""
+    (docs/theory/drives.md section 13)."""
     speed: str = "exact"
     """Source of the loop's speed: "exact", or "differences" of the encoder between two servo samples."""
     delay_samples: int = 0

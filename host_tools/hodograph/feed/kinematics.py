@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it.
 
-`spline.frames` has the derivatives of a curve by arc length, `axis_motion` the chain rule; docs/theory/numerics.md 5.6.
+`spline.frames` has the derivatives of a curve by arc length, `axis_motion` the chain rule; docs/theory/feed.md 5.6.
 Arrays of all A axes have the axis as first index. `sample` applies them to feed pieces, in cells (one piece on one
-segment of the path). Second differences estimate the rise of a quantity between samples; docs/theory/numerics.md
+segment of the path). Second differences estimate the rise of a quantity between samples; docs/theory/feed.md
 section 7.
 """
 

@@ -2,7 +2,7 @@
 """Limits of a motion: one `Limit`, the tables of limits that files give, and the `Peak` beside a limit.
 
 Limits come from a path file ([limits], [feed]), a machine file (its axes and its controller) and drive files (volts).
-docs/theory/numerics.md 5.5.
+docs/theory/feed.md 5.5.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ class Peak:
 
 @dataclass(frozen=True)
 class Plant:
-    """The voltage limit of an axis: volts * gain = velocity + time constant * acceleration; docs/theory/numerics.md 13.
+    """The voltage limit of an axis: volts * gain = velocity + time constant * acceleration; docs/theory/drives.md 13.
 
     gain_mm_s_v     steady speed for one volt
     volts           greatest voltage that may be used, including `friction_volts` for friction
@@ -275,12 +275,12 @@ class Limits:
 
     feed_mm_s, acceleration_mm_s2, jerk_mm_s3   of the motion along the path (F', F'', F''')
     centripetal_mm_s2   feed^2 times curvature
-    volts               of each axis, by the plant of its drive file (docs/theory/numerics.md 13); the drive's
+    volts               of each axis, by the plant of its drive file (docs/theory/drives.md 13); the drive's
                         volts_limit if that is less
     axis                of the motion of the axes
     zones               feed zones; where several meet, the least feed
     reserve             share of the axes' accelerations, jerks and volts that plans leave free for hold, resume and
-                        override (docs/theory/numerics.md section 7)
+                        override (docs/theory/feed.md section 7)
 
     machine             of the motion of the axes, from the machine file; they always apply
     names, units        of the axes that follow the path, in its order; a unit is "mm" or "deg", () stands for mm
@@ -430,7 +430,7 @@ class ControllerLimits:
     """Limits of the controller (machine file); they always apply.
 
     A plan keeps the share `reserve` of each free for hold and override, and at least LEAST_RESERVE, which the pieces
-    need; docs/theory/numerics.md 5.5 and section 7. Raises InputError.
+    need; docs/theory/feed.md 5.5 and section 7. Raises InputError.
     """
 
     feed_mm_s: float

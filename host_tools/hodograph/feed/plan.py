@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A feed plan: the feed along a whole path, with what was requested. Frozen data; docs/theory/numerics.md 5 and 6."""
+"""A feed plan: the feed along a whole path, with what was requested. Frozen data; docs/theory/feed.md 5 and 6."""
 
 from __future__ import annotations
 

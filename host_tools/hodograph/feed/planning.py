@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Planning a feed with ramps inside limits: for a path's length, and for the path itself; docs/theory/numerics.md 5.4
+"""Planning a feed with ramps inside limits: for a path's length, and for the path itself; docs/theory/feed.md 5.4
 and 5.5. Profile "optimal" has a planner of its own (feed.optimal)."""
 
 from __future__ import annotations

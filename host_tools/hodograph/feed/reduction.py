@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed reduction: the highest constant feed that the path, the limits and the format allow; docs/theory/numerics.md
+"""Feed reduction: the highest constant feed that the path, the limits and the format allow; docs/theory/feed.md
 5.5."""
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The profile with two ramps and a constant feed between them: exact arc length over time, and its integer feed pieces;
-docs/theory/numerics.md 5.1 and section 6."""
+docs/theory/feed.md 5.1 and section 6."""
 
 from __future__ import annotations
 

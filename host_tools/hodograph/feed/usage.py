@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Limit usage: the peaks of feed pieces, and the limits along a path that a plan has to keep;
-docs/theory/numerics.md 5.5."""
+docs/theory/feed.md 5.5."""
 
 from __future__ import annotations
 

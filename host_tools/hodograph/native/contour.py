@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Distance from the exact curve of a program (sim/offline/contour.h, docs/theory/numerics.md section 14)."""
+"""Distance from the exact curve of a program (sim/offline/contour.h, docs/theory/drives.md section 14)."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One simulated axis (sim/plant/drive.h, docs/theory/numerics.md section 13)."""
+"""One simulated axis (sim/plant/drive.h, docs/theory/drives.md section 13)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rules of docs/reference/protocol.md 1.4: the longest time of a stop, and its bound in the table;
-docs/theory/numerics.md section 7.
+docs/theory/feed.md section 7.
 
 Computed in floating point, without the rounding up of the controller's integers (firmware/core/stop_check.c). A bound
 that the controller accepts is never below the one computed here, and at most about 20 us above it.

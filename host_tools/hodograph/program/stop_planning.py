@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Plans the stops of a program: stop parameters and stop time bounds; docs/theory/numerics.md section 7. Used by
+"""Plans the stops of a program: stop parameters and stop time bounds; docs/theory/feed.md section 7. Used by
 compiler.py and stream/. In this module "numbers" are stop parameters.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/numerics.md 5.6. Used by
+"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/feed.md 5.6. Used by
 feed/ and verify/.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which pieces of a chunk get stop parameters, searched on the path that its window knows; docs/theory/numerics.md
+"""Which pieces of a chunk get stop parameters, searched on the path that its window knows; docs/theory/feed.md
 section 7. Used by chunks.py.
 
 Stop codes of M pieces have the shape (M, 2, 3), as in ../program/stops.py.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Design of servo loops: PDFF gains and feedforward from the plant model, margins, and the effect of model errors.
 
-The method is docs/theory/numerics.md section 17, the use docs/guides/tuning.md.
+The method is docs/theory/drives.md section 17, the use docs/guides/tuning.md.
 """
 
 from .design import VELOCITIES

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Gains and feedforward from the requested properties, by placing the poles of the known plant (numerics.md section
+"""Gains and feedforward from the requested properties, by placing the poles of the known plant (drives.md section
 17)."""
 
 from __future__ import annotations

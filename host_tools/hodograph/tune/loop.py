@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The servo loop of one axis as a linear sampled system, and its margins; docs/theory/numerics.md section 17.
+"""The servo loop of one axis as a linear sampled system, and its margins; docs/theory/drives.md section 17.
 
 Exact for the simulated drive (sim/plant), except for its nonlinear parts: encoder increments, voltage limit, friction.
 """

@@ -2,7 +2,7 @@
 """Certain bounds of the second derivatives in time of the motion's quantities within a cell.
 
 Between two samples at a distance h, a function with |q''| <= M is at most M h^2 / 8 above the greater of the two. So
-such bounds turn samples into statements about every instant; docs/theory/numerics.md 16. They come from Taylor series
+such bounds turn samples into statements about every instant; docs/theory/proofs.md 16. They come from Taylor series
 with majorants: coefficients that bound those of the true series at every instant of the cell. Sums and products of
 majorants are majorants, and so is 1 / sigma with the recursion of the quotient taken in absolute values.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Greatest magnitudes of all quantities, by samples close enough for a certain bound; docs/theory/numerics.md 16."""
+"""Greatest magnitudes of all quantities, by samples close enough for a certain bound; docs/theory/proofs.md 16."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def _of_axis(field: str, axis: int) -> Callable[[Motion], Real]:
 
 
 def _volts(drive: Drive, axis: int) -> Callable[[Motion], Real]:
-    """The volts of the motion by the plant alone: (v + T a) / (K g), docs/theory/numerics.md 13."""
+    """The volts of the motion by the plant alone: (v + T a) / (K g), docs/theory/drives.md 13."""
     per_speed = 1.0 / (drive.gain_rad_s_v * drive.screw_mm_rad)
     per_acceleration = drive.time_constant_s * per_speed
     return lambda m: (

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Checks a program against the limits of its path file: peaks, and each place beyond a limit;
-docs/theory/numerics.md 16."""
+docs/theory/proofs.md 16."""
 
 from __future__ import annotations
 

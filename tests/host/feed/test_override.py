@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The override bounds: docs/theory/numerics.md section 7, its inequality at random instants."""
+"""The override bounds: docs/theory/feed.md section 7, its inequality at random instants."""
 
 import numpy as np
 from hypothesis import given, settings

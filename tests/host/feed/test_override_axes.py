@@ -101,7 +101,7 @@ def random_case(seed: int) -> Case:
 
 def worst_ratio(case: Case, t_s, rate, slope, second) -> dict[str, float]:
     """Greatest value over limit of each quantity with program time at t_s moving at `rate`;
-    docs/theory/numerics.md 7."""
+    docs/theory/feed.md 7."""
     cells = cut(case.program)
     cell = np.clip(np.searchsorted(cells.start_s, t_s, side="right") - 1, 0, None)
     u = np.clip((t_s - cells.start_s[cell]) / cells.duration_s[cell], 0.0, 1.0)

@@ -116,7 +116,7 @@ def test_a_jump_of_the_acceleration_is_found(alpha: Program) -> None:
 
 
 def test_the_volts_move_the_plant_along_the_path(alpha: Program) -> None:
-    """The plant of docs/theory/numerics.md 13, driven by the volts at every instant, stays on the path."""
+    """The plant of docs/theory/drives.md 13, driven by the volts at every instant, stays on the path."""
     cells = cut(alpha)
     volts = [row for row in quantities(cells, Limits(), DRIVES) if row.limit.key == "volts"]
     h = 1e-5

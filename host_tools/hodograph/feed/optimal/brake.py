@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A brake to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/numerics.md
+"""A brake to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/feed.md
 5.6.
 
 With u = t / T the feed is (1 - u)^2 (v (1 + 2 u) + a T u): it begins with the feed v and the acceleration a, and both

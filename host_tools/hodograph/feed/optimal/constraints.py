@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/numerics.md 5.6.
+"""The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/feed.md 5.6.
 
 With the position r of an axis in mm as a function of the grid's parameter x (grid.py), its derivatives R1, R2, R3, and
 p = (dx/dt)^2:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds infeasible limits: which ones, where, and the values that would suffice; docs/theory/numerics.md 5.6.
+"""Finds infeasible limits: which ones, where, and the values that would suffice; docs/theory/feed.md 5.6.
 
 Each path without corners can be run inside any limits, if slowly enough. A program needs at least LEAST_FEED_MM_S at
 each place, and has a longest time. The feed that a limit allows is computed for constant feed; for acceleration and

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The first estimate of the feed, and the knots that follow from it; docs/theory/numerics.md 5.6."""
+"""The first estimate of the feed, and the knots that follow from it; docs/theory/feed.md 5.6."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""All limits of a feed along a path as one object, with reserves subtracted; docs/theory/numerics.md 5.6. `gather`
+"""All limits of a feed along a path as one object, with reserves subtracted; docs/theory/feed.md 5.6. `gather`
 makes it from path file, machine and drives; the planner reads it.
 """
 
@@ -28,7 +28,7 @@ PerAxis = tuple[Limit, ...]
 _MOST_BY_ACCELERATION, _MOST_BY_JERK = 2.0**13, 24.0
 """Greatest feed over the reserve of an acceleration, and of a jerk. They follow from the least override rate and
 override acceleration of the format, 2^-16 / s and 2^-8 / s^2; a factor above 1 and the other bound use half of the
-headroom each. docs/theory/numerics.md section 7.
+headroom each. docs/theory/feed.md section 7.
 """
 
 _PERIODS_TO_FULL_ACCELERATION = 8

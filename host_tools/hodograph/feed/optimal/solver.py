@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scales a quadratic program of the planner and solves it in C; docs/theory/numerics.md 5.6."""
+"""Scales a quadratic program of the planner and solves it in C; docs/theory/feed.md 5.6."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The fastest feed over one window of a path, from a given state to rest; docs/theory/numerics.md 5.6."""
+"""The fastest feed over one window of a path, from a given state to rest; docs/theory/feed.md 5.6."""
 
 from __future__ import annotations
 
