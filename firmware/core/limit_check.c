@@ -32,7 +32,8 @@ struct cell {
 
 /* The override bounds of one level, and what follows from them. */
 struct level {
-    struct real f2, f3; /* powers of f, the greatest override */
+    struct real f2; /* powers of f, the greatest override */
+    struct real f3;
     struct real rate;   /* R, 1/s */
     struct real mixed;  /* 3 f R */
     struct real second; /* S, 1/s^2 */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the parts of a brake promise each other (docs/theory/numerics.md section 12, "Path stop"; docs/theory/proofs.md 15.5 and 15.6); for
- * eva_brake.c, eva_depth.c and cbmc_brake.c.
+ * What the parts of a brake promise each other (docs/theory/numerics.md section 12, "Path stop"; docs/theory/proofs.md
+ * 15.5 and 15.6); for eva_brake.c, eva_depth.c and cbmc_brake.c.
  */
 #ifndef HODOGRAPH_BRAKE_CONTRACTS_H
 #define HODOGRAPH_BRAKE_CONTRACTS_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the parts of the feed override promise each other: docs/theory/numerics.md section 12, "Feed override", and docs/theory/proofs.md 15.4. Each contract stands
- * here once, for the proof that shows it and for those that take it for granted (section 15.5).
+ * What the parts of the feed override promise each other: docs/theory/numerics.md section 12, "Feed override", and
+ * docs/theory/proofs.md 15.4. Each contract stands here once, for the proof that shows it and for those that assume it
+ * (section 15.5).
  */
 #ifndef HODOGRAPH_RAMP_CONTRACTS_H
 #define HODOGRAPH_RAMP_CONTRACTS_H
