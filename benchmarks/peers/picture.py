@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The figure of `make compare`: a corner of the zigzag as each planner drives it, with speed and jerk over time."""
+"""The figure of `make compare`: a corner of the toolpath zigzag as each planner passes it, and speed and jerk over time.
+"""
 
 from __future__ import annotations
 
