@@ -37,8 +37,8 @@ FOLDERS = (
 
 @dataclass(frozen=True)
 class Row:
-    """A file at a feed, and its cycle times in s by LinuxCNC with and without a jerk limit. `goal`: greatest ratio to the
-    time with one.
+    """A file at a feed, and its cycle times in s by LinuxCNC with and without a jerk limit. `goal`: greatest ratio to
+    the time with one.
     """
 
     file: str

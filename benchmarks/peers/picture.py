@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The figure of `make compare`: a corner of the toolpath zigzag as each planner passes it, and speed and jerk over time.
-"""
+"""The figure of `make compare`: a corner of the toolpath zigzag by each planner, and its speed and jerk over time."""
 
 from __future__ import annotations
 

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AxisInputs:
-    """What the drive receives, (n,) each, one value for each bus period: setpoints in counts, 0x60B1 in counts/s, 0x60B2
-    in per mille. The axis stands at `start_counts` at first.
+    """What the drive receives in each of n bus periods, (n,) each: setpoints in counts, 0x60B1 in counts/s, 0x60B2 in
+    per mille. The axis stands at `start_counts` at first.
     """
 
     start_counts: int
