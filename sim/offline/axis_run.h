@@ -21,8 +21,8 @@ struct axis_run {
     const int16_t *torque_permille; /* 0x60B2 */
 };
 
-/* Runs all `count` periods. Writes position and volts (of the last servo sample) at the end of each period. Returns 0 or
- * a negative enum drive_error. */
+/* Runs all `count` periods. Writes position and volts (of the last servo sample) at the end of each period. Returns 0
+ * or a negative enum drive_error. */
 int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
              double *volts);
 
