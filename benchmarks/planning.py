@@ -5,7 +5,7 @@
 
 Paths are random walks of control points, legs of 7.5 to 22.5 mm, turns of 40 degrees rms; 2000 mm/s^2 and 50 000
 mm/s^3 for each axis, controller 500 mm/s, 5000 mm/s^2, 200 000 mm/s^3 less 10 %. Each is planned in a process of its
-own, by one thread. Wall time has other work on the computer in it; processor time has less of that.
+own, by one thread. Other work on the computer changes the wall time, and less the processor time.
 """
 
 from __future__ import annotations

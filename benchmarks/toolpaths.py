@@ -5,8 +5,8 @@
 
 The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs, including the time
 that plans lose so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with
-its S-curve planner and 50000 mm/s^3. Files that are in none of the folders are left out, with a line that says so. Then
-generated programs of N lines, and the processor time that they take.
+its S-curve planner and 50000 mm/s^3. For a file that is in none of the folders a line is printed instead. At the end
+the processor time for generated programs of N lines is measured.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ FOLDERS = (
 
 @dataclass(frozen=True)
 class Row:
-    """A file at a feed, and the cycle times of others in s; goals are ratios to the S-curve planner."""
+    """A file at a feed, and its cycle times in s by LinuxCNC with and without a jerk limit. `goal`: greatest ratio to
+    the time with one.
+    """
 
     file: str
     feed_mm_s: float

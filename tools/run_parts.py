@@ -23,7 +23,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 _COUNT = re.compile(r"(\d+) passed, (\d+) failed(?:, (\d+) skipped)?")
-_LAST = 50  # lines that may follow a count: what make says of an error
+_LAST = 50  # lines that may follow a count: make's messages about an error
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The figure of `make compare`: a corner of the zigzag as each planner drives it, with speed and jerk over time."""
+"""The figure of `make compare`: a corner of the toolpath zigzag by each planner, and its speed and jerk over time."""
 
 from __future__ import annotations
 

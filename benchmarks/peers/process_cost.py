@@ -3,10 +3,10 @@
 
     process_cost.py OUT COMMAND ...
 
-As a script it runs a command and writes its processor time in seconds to OUT, and the peak resident size of its largest
-process in KiB. `run_measured` starts it so: what Linux reports of a child begins at the size of the process that
-started it, and this one is small. Processor time, unlike wall time, depends little on what else the
-computer does. Standard library only.
+As a script it runs a command. It writes to OUT the command's processor time in seconds and the peak resident size of
+its largest process in KiB. `run_measured` starts this script as a process of its own, because the peak that Linux
+reports of a child is at least the size of its parent, and this one is small. Other work on the computer changes
+processor time less than wall time. Standard library only.
 """
 
 from __future__ import annotations

@@ -15,14 +15,14 @@ struct axis_run {
     double friction_volts;  /* Coulomb, 0 or more */
     int32_t start_counts;   /* standstill here */
     uint32_t count;
-    /* By bus period, `count` each. */
+    /* `count` values each, one for each bus period. */
     const int32_t *target_counts;
     const int32_t *speed_counts_s;  /* 0x60B1 */
     const int16_t *torque_permille; /* 0x60B2 */
 };
 
-/* The whole run; position and volts (of the last servo sample) at the end of each period. Returns 0 or a
- * negative enum drive_error. */
+/* Runs all `count` periods. Writes position and volts (of the last servo sample) at the end of each period. Returns 0
+ * or a negative enum drive_error. */
 int axis_run(const struct drive_config *config, const struct axis_run *run, double *position_mm,
              double *volts);
 

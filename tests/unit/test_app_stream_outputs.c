@@ -11,7 +11,7 @@
 #define X_MM        10
 #define Y_MM        (-5)
 #define JOB         7u
-#define UNIT        1000000 /* counts a mm */
+#define UNIT        1000000 /* counts for each mm */
 #define Q40         INT64_C(1099511627776)
 #define MODULE      16u
 #define OFF_IN_HOLD 8u
@@ -23,7 +23,7 @@
 static struct app_bench bench;
 static uint8_t bytes[CHUNK_IMAGE_SIZE_MAX];
 
-/* The second one begins with the first segment, so that it can be taken over before anything has moved. */
+/* The second chunk begins with the first segment, so that it can be taken over before anything has moved. */
 static const struct chunk_plan parts[] = {
     {.to = 33, .flags = CHUNK_FLAG_FIRST, .job = JOB},
     {.joint = 33, .to = 57, .job = JOB, .sequence = 1},

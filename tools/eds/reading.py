@@ -19,7 +19,7 @@ LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
 ACCESS = ("ro", "wo", "rw", "rwr", "rww", "const")
 _VAR, _DOMAIN, _ARRAY, _RECORD = 0x7, 0x2, 0x8, 0x9
 _SECTION = re.compile(r"([0-9A-Fa-f]{4})(?:[Ss]ub([0-9A-Fa-f]{1,2}))?")
-_NODE = 0  # what canopen adds for $NODEID: defaults stay without the node id
+_NODE = 0  # canopen adds it for $NODEID; so defaults do not contain the node id
 
 
 class EdsError(Exception):

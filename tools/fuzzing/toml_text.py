@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""TOML documents: changes of their values and keys, and many ways to write the same document."""
+"""Mutates the values and keys of TOML documents, and writes the same document in many forms. Used by targets.py."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Place = tuple[Any, str | int]
 
 UNKNOWN = "zz_unknown"
 _ORDERED = ("random", "vary")
-"""Tables from whose names something is drawn, one after the other: their order counts."""
+"""Tables whose order counts, because random values are drawn for their names in this order."""
 _NUMBERS: tuple[Any, ...] = (
     *(0, 1, -1, 2, 3, 127, 128, 255, 2**31, 2**32, 2**63, 2**64, 10**400, -(2**31)),
     *(0.0, -0.0, 1e-300, 1e-12, 1e-6, 1e6, 1e12, 1e300, 0.1, 0.5, 1.5),

@@ -19,7 +19,7 @@ from ..stream.geometry import Curve
 from .decoder import Floats
 
 _ON_PATH_UM = 1.0
-"""Greatest distance of setpoints from the path, which are rounded to counts; beyond it they belong to another
+"""Greatest distance from the path of its setpoints, which are rounded to counts. Setpoints beyond it belong to another
 motion.
 """
 _STEP_MM, _MOST_SAMPLES = 0.1, 20_000

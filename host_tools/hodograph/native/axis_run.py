@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AxisInputs:
-    """By bus period, (n,) each: setpoints in counts, 0x60B1 in counts/s, 0x60B2 in per mille; at rest before."""
+    """What the drive receives in each of n bus periods, (n,) each: setpoints in counts, 0x60B1 in counts/s, 0x60B2 in
+    per mille. The axis stands at `start_counts` at first.
+    """
 
     start_counts: int
     targets: NDArray[np.int32]
@@ -32,7 +34,7 @@ class AxisInputs:
 def run_axis(
     drive: Drive, inputs: AxisInputs, counts_per_mm: int, period_us: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions in mm and volts, (n,) each, at the end of each period. Raises InputError: figures out of range."""
+    """Positions in mm and volts, (n,) each, at the end of each period. Raises InputError for figures out of range."""
     ffi, lib = library()
     count = len(inputs.targets)
     columns = (

@@ -34,7 +34,7 @@ class Wide:
         return _carried(self.high - other.high, self.low - other.low)
 
     def __le__(self, other: Wide) -> Bool:
-        """The sum by element."""
+        """The comparison by element."""
         same = (self.high == other.high) & (self.low <= other.low)
         return np.asarray((self.high < other.high) | same)
 

@@ -32,7 +32,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 }
 Document = dict[str, Any]
 Way = tuple[str | int, ...]
-"""Of keys and indices, from the root of a document."""
+"""Keys and indices from the root of a document to a value."""
 
 AXIS: Document = {
     "name": "x",

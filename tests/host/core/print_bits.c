@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Prints the CRC-32 of all points of a program, tick by tick with a hold near the end: FILE KERNEL. */
+/* print_bits FILE KERNEL: prints the CRC-32 of all points of a program, with a hold near its end. Built and run by
+ * test_same_bits.py. */
 #include <stdio.h>
 #include <stdlib.h>
 
