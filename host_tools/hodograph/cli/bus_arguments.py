@@ -253,13 +253,11 @@ def _scan(command: Command) -> None:
 
 
 def _check(command: Command) -> None:
-    check = command(
-        "check", "compare the objects of the drives with what a machine needs"
-    )
+    check = command("check", "compare the objects of the drives with what a machine needs")
     check.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
     options.bus_name(check)
     options.answer_wait(check)
-    check.add_argument("--all", action="store_true", help="also print the objects that are as needed")
+    check.add_argument("--all", action="store_true", help="also print objects that fit")
     options.json(check)
 
 
@@ -313,7 +311,7 @@ def _configure(command: Command) -> None:
 
 def _quick_stop(command: Command) -> None:
     for name, text in (
-        ("quick-stop", "all drives brake by their own ramps, possibly off the path, and switch off"),
+        ("quick-stop", "drives brake by their own ramps, possibly off the path, and switch off"),
         ("reset", "reset a fault; the drives are then configured again, and are off"),
     ):
         parser_ = command(name, text)
