@@ -66,7 +66,7 @@ def _stream(command: Command) -> None:
         "--continue",
         dest="resume",
         action="store_true",
-        help="continue the job of the journal from where the machine rests",
+        help="continue the job of the journal from where the axes stand",
     )
     stream.add_argument(
         "--journal",
@@ -208,7 +208,7 @@ def _stop(command: Command) -> None:
 
 def _hold(command: Command) -> None:
     for name, text in (
-        ("hold", "hold the feed: come to rest on the path until resumed"),
+        ("hold", "hold the feed: come to standstill on the path until resumed"),
         ("resume", "continue after a hold"),
     ):
         parser_ = command(name, text)
@@ -253,13 +253,11 @@ def _scan(command: Command) -> None:
 
 
 def _check(command: Command) -> None:
-    check = command(
-        "check", "ask drives, object by object, whether they can do what a machine needs"
-    )
+    check = command("check", "compare the objects of the drives with what a machine needs")
     check.add_argument("file", metavar="MACHINE", type=Path, help="machine file (TOML)")
     options.bus_name(check)
     options.answer_wait(check)
-    check.add_argument("--all", action="store_true", help="also print objects that are as needed")
+    check.add_argument("--all", action="store_true", help="also print objects that fit")
     options.json(check)
 
 
@@ -313,8 +311,8 @@ def _configure(command: Command) -> None:
 
 def _quick_stop(command: Command) -> None:
     for name, text in (
-        ("quick-stop", "all drives brake by their own ramps at once, off the path, and switch off"),
-        ("reset", "reset a fault; the drives are then configured anew and off"),
+        ("quick-stop", "drives brake by their own ramps, possibly off the path, and switch off"),
+        ("reset", "reset a fault; the drives are then configured again, and are off"),
     ):
         parser_ = command(name, text)
         options.bus(parser_)
@@ -451,7 +449,7 @@ def _latency(command: Command) -> None:
 
 
 def _faults(command: Command) -> None:
-    faults = command("faults", "inject faults into simulated machines and judge their reaction")
+    faults = command("faults", "inject faults into simulated machines and check the reaction")
     faults.add_argument(
         "scenarios",
         metavar="SCENARIO",

@@ -79,7 +79,7 @@ def _compile(command: Command) -> None:
 
 
 def _inspect(command: Command) -> None:
-    inspect = command("inspect", "print what a program image holds")
+    inspect = command("inspect", "print what a program image contains")
     inspect.add_argument("file", metavar="FILE", type=Path, help="program image, or a path file")
     options.machine(inspect)
     options.json(inspect)
@@ -178,7 +178,7 @@ def _campaign(command: Command) -> None:
 
 
 def _paper(command: Command) -> None:
-    paper = command("paper", "print the paper's numbers beside ours")
+    paper = command("paper", "print the paper's numbers next to ours")
     options.json(paper)
 
 

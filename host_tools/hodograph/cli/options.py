@@ -194,7 +194,7 @@ def unhomed(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unhomed",
         action="store_true",
-        help="move although axes with a homing method are not homed since their drive's power-on",
+        help="move although axes with a homing method are not homed",
     )
 
 
