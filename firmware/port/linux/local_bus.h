@@ -50,8 +50,8 @@ enum local_bus_kind {
     LOCAL_BUS_FILTER = 3,            /* of a member: frames that it receives (local_bus_filters) */
     /* of a member: frames that do not wake its participant, unless it waits for ALL */
     LOCAL_BUS_DEFER = 4,
-    /* of a member: frames of its own that come back to it when their last bit is sent, in virtual * time; they do not
-     * wake its participant */
+    /* of a member: frames of its own that come back to it when their last bit is sent, in virtual time; they do
+     * not wake its participant */
     LOCAL_BUS_TRACK = 8,
     LOCAL_BUS_WAIT = 5,     /* number: of the last grant; flags: SENT, ALL; time_ns: when to wake
                                   * it, or before it with a frame */

@@ -29,6 +29,7 @@ from .stop_search import Codes, StopSearch, no_codes
 from .tails import Tails
 from .windows import (
     JOINTS,
+    Exceeded,
     SectionFeed,
     Spacing,
     Stretch,
@@ -77,6 +78,11 @@ _MOVING_FAULTS = frozenset(
     )
 )
 """Faults that a lower feed at a piece avoids."""
+
+_OVERRIDE_FAULTS = frozenset(
+    (ProgramError.OVERRIDE, ProgramError.AXIS_ACCELERATION, ProgramError.AXIS_JERK)
+)
+"""Those of them that depend on the override bounds of a piece."""
 
 _MOST_EXCEEDED = 8
 """Most pieces found at once whose motion the controller would refuse: each one needs a check of those after it."""
@@ -526,15 +532,17 @@ class SectionChunks:
     def _fault(self, program: Program) -> NativeFault | None:
         return NativeProgram(encode(program)).check(self._limits)
 
-    def _exceeded(self, stretch: Stretch) -> NDArray[np.bool_]:
-        """The pieces (M,) of a stretch that the controller would refuse for their motion: all of them; if there are
-        many, the first _MOST_EXCEEDED.
+    def _exceeded(self, stretch: Stretch) -> Exceeded:
+        """The pieces of a stretch that the controller would refuse for their motion; if there are many, the first
+        _MOST_EXCEEDED. The check ends at its first fault, so it is repeated from the next piece on. It checks the axis
+        limits last: where pieces break another rule too, those before them may be left out.
         """
         pieces = stretch.pieces
         codes = np.hstack((pieces.override_rate_codes, pieces.override_second_codes))
         bad = np.asarray((codes == 0).any(axis=1))
+        by_override = np.zeros_like(bad)
         if bad.any():
-            return bad
+            return Exceeded(bad, by_override)
         first = 0
         while first < len(pieces) and np.count_nonzero(bad) < _MOST_EXCEEDED:
             later = Stretch(pieces.part(slice(first, None)), stretch.end_q40)
@@ -546,7 +554,8 @@ class SectionChunks:
                 break
             first += fault.index + 1
             bad[first - 1] = True
-        return bad
+            by_override[first - 1] = fault.code in _OVERRIDE_FAULTS
+        return Exceeded(bad, by_override)
 
 
 def _on_short_segments(program: Program) -> NDArray[np.bool_]:

@@ -31,7 +31,7 @@ from ..bus.sdo.stream_channel import (
 )
 from ..bus.signals import interrupts_ignored
 from ..config import Machine
-from ..errors import HodographError, RunError
+from ..errors import HodographError, PlanError, RunError
 from ..fixed_point import nearest_q40
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native.program import NativeLimits, NativeProgram
@@ -219,7 +219,9 @@ class Sender:
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to the start of a section, unless they stand there."""
         program = NativeProgram(chunk.image)
-        program.check(NativeLimits(chunk=1))
+        fault = program.check(NativeLimits(chunk=1))
+        if fault is not None:
+            raise PlanError(f"the first chunk is not a program: {fault.text} (code {fault.code})")
         start = program_start_counts(program, self.machine, self.kernel, section.standing_mm)
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:

@@ -143,6 +143,16 @@ class _Estimate:
     stop_s: float
 
 
+@dataclass(frozen=True, eq=False)
+class Exceeded:
+    """The pieces (M,) of a stretch that the controller would refuse for their motion, as far as its check names them;
+    and those of them for which lower override bounds may help.
+    """
+
+    pieces: NDArray[np.bool_]
+    by_override: NDArray[np.bool_]
+
+
 class SectionFeed:
     """Plans the windows of a section. It reads the path from blocks as far as a window needs it."""
 
@@ -151,13 +161,13 @@ class SectionFeed:
         machine: Machine,
         blocks: Iterator[Block],
         joint: Spacing,
-        exceeded: Callable[[Stretch], NDArray[np.bool_]],
+        exceeded: Callable[[Stretch], Exceeded],
         begin_q40: int = 0,
         begin_point_q40: NDArray[np.int64] | None = None,
     ) -> None:
         """blocks the path of the section
         joint            greatest distance of joints
-        exceeded         which pieces (M,) of a stretch the controller would refuse for their motion
+        exceeded         the pieces of a stretch that the controller would refuse for their motion
         begin_q40        arc length of the section where the blocks begin
         begin_point_q40  exact point there; None: that of the first block
         """
@@ -293,24 +303,27 @@ class SectionFeed:
         the pieces of that, and how many of them are kept; `with_stretch` the same with other pieces.
         """
         tight, out = np.ones(found.grid.size), made(found)
+        stretch, count = stretch_of(out)
+        over = self._exceeded(stretch)
         for step in steps:
-            stretch, count = stretch_of(out)
-            bad = self._exceeded(stretch)
-            if not bad[:count].any():
-                return out, bad
+            if not over.pieces[:count].any():
+                return out, over.pieces
+            bad = over.pieces
             tight[bad | np.append(bad[1:], False) | np.append(False, bad[:-1])] *= step
             lower = tightened(found, tight)
             if lower is None:
                 break
             found = lower
             out = made(found)
-        for fewer in _FEWER_CODES:
             stretch, count = stretch_of(out)
-            bad = self._exceeded(stretch)
-            if not bad[:count].any():
-                return out, bad
-            out = with_stretch(out, _with_fewer_codes(stretch, bad, fewer))
-        return out, self._exceeded(stretch_of(out)[0])
+            over = self._exceeded(stretch)
+        for fewer in _FEWER_CODES:
+            if not (over.pieces[:count].any() and over.by_override.any()):
+                break
+            out = with_stretch(out, _with_fewer_codes(stretch, over.by_override, fewer))
+            stretch, count = stretch_of(out)
+            over = self._exceeded(stretch)
+        return out, over.pieces
 
     def _window(
         self,

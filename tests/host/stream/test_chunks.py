@@ -354,7 +354,7 @@ def test_pieces_that_the_proof_refuses_are_slower_and_allow_less_override(
     jerk = tuple(round(share * most) for most in limits.axis_jerk_mm_s3)
     made._limits = replace(limits, axis_jerk_mm_s3=jerk)
     chunks = [one.chunk for one in made.chunks()]
-    assert len(chunks) > 1
+    assert sum(chunk.header.rest is None for chunk in chunks) > 1, "goes on in motion"
     for chunk in chunks:
         assert NativeProgram(chunk.image).check(made._limits) is None
 
