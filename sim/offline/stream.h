@@ -8,7 +8,7 @@
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
  * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes
- * of each chunk, which have to stay as long as the stream. One thread for each stream.
+ * of each chunk, which have to stay until a later chunk is executed (`active`). One thread for each stream.
  */
 #ifndef HODOGRAPH_OFFLINE_STREAM_H
 #define HODOGRAPH_OFFLINE_STREAM_H
