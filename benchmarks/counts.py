@@ -3,10 +3,14 @@
 
     python benchmarks/counts.py [--json OUT] [--build BUILD]
 
-Needs `make counter`. The main figures of docs/validation/counts.md: for each core and kernel the median over the
-examples and the most over all programs, plain and with the override in use, of the motion part and of the whole
-interrupt; the same of the usual NURBS interpolator, with the ripple of the feed of both; the cost of the check of a
-program; and the cost of the proof of its stops.
+Needs `make counter`. Prints the main figures of docs/validation/counts.md:
+
+- motion part of a tick and whole interrupt: for each core and kernel the median over the examples and the most over all
+  programs, plain and with the override in use;
+- constant feed: median and most of a tick of the PH kernel and of the usual NURBS interpolator, and the ripple of the
+  feed of both;
+- the cost of the check of a program;
+- the cost of the proof of its stops.
 """
 
 from __future__ import annotations
@@ -26,7 +30,7 @@ from analysis.campaign import FLOOR, Campaign  # noqa: E402
 
 
 def main_figures(counted: dict[str, Any]) -> dict[str, Any]:
-    """Of everything that was counted."""
+    """The main figures, from all counts."""
     out: dict[str, Any] = {"floor": FLOOR}
     for section in ("motion", "isr"):
         for pair, scenarios in counted[section].items():

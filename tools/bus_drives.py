@@ -23,7 +23,7 @@ _NAMES = {
     0x27: "operation enabled",
     0x07: "quick stop active",
 }
-"""Statusword bits 0 to 3, 5 and 6 of the states of a machine without faults."""
+"""Statusword bits 0 to 3, 5 and 6 of the states without a fault."""
 _FROM_TO = {
     (0x40, 0x21),
     (0x21, 0x40),

@@ -2,8 +2,8 @@
 """Klipper's planner, from a clone of the user's: a batch run of its host program (its docs/Debugging.md).
 
 No registry has Klipper. The clone is copied first, so that nothing is written into it. Its host program gets the
-micro-controller's dictionary from its own build for Linux, the program as input, and one extra, which writes down each
-move that goes into the queue from which steps are computed. Moves are trapezoids of velocity along straight chords.
+micro-controller's dictionary from its own build for Linux, the program as input, and an extra module that logs each
+planned move. Moves are trapezoids of velocity along straight chords.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Real = NDArray[np.float64]
 _FOLDER = Path(__file__).parent / "batch_klipper"
 _SLOWEST_S = 900
 _ARC_CHORD_MM = 0.6
-"""Off by 9 um from the arcs of 5 mm in our programs; the default is 1 mm."""
+"""The chord deviates 9 um from an arc of 5 mm radius. Klipper's default is 1 mm."""
 _STEPPER = """
 [stepper_{axis}]
 step_pin: gpiochip0/gpio{step}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Program images made by hand for measurements: extreme but legal segments and feeds."""
+"""Program images with extreme but legal segments and feeds. Used by benchmarks/kernels.py."""
 
 from __future__ import annotations
 

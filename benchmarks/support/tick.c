@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The motion part of the controller's tick, over and over: FILE KERNEL RUNS [LOW HIGH]. Prints how many ticks that were.
- * As in the controller, the program has coefficient records, which are not part of what is compared: those of all RUNS are
- * made once. The override changes between LOW and HIGH per cent every 40 ticks, when they differ.
+ * Repeats the motion part of the tick, so that benchmarks/kernels.py can count its instructions.
+ * Usage: tick FILE KERNEL RUNS [LOW HIGH]; KERNEL is a number. Prints the number of ticks.
+ *
+ * The coefficient records are made once, before the first run. If LOW and HIGH differ, the override changes between
+ * them, in per cent, every 40 ticks.
  */
 #include <stdio.h>
 #include <stdlib.h>

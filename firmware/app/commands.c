@@ -17,7 +17,7 @@ static enum machine_refusal locked(struct machine *machine,
     return refusal;
 }
 
-/* At the start of the program the point is that of the image; elsewhere the kernel computes it. */
+/* A start at the beginning uses the start point stored in the image; a start elsewhere computes it. */
 static int prepare(struct controller *controller, int64_t from_q40_mm, struct motion *prepared,
                    int32_t start_counts[AXES_MAX])
 {

@@ -1,6 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* commands: executes the commands of the operator, which are written to object 0x2001. Called by objects.c; urgent ones
- * also by controller.c while a chunk is checked. Main loop. */
+/*
+ * commands: executes the commands of the operator, which are written to object 0x2001.
+ *
+ * Main loop: objects.c calls commands_execute for each write of 0x2001, controller.c calls it at shut-down. While a
+ * chunk is checked, controller.c calls commands_execute_urgent. Receive interrupt: controller.c calls
+ * command_urgent_request.
+ */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
 
@@ -19,8 +24,8 @@ enum command {
     COMMAND_HOME = 10,
 };
 
-/* Whether a command is executed at once, without waiting for a transfer of another client or the check of a chunk:
- * hold, stop and quick stop. Pure. */
+/* Whether a command is executed at once, even while another SDO client has a transfer open, or a chunk is being
+ * checked: hold, stop and quick stop. Pure. */
 static inline bool command_is_urgent(uint8_t number)
 {
     return number == (uint8_t)COMMAND_STOP || number == (uint8_t)COMMAND_HOLD ||
@@ -30,10 +35,11 @@ static inline bool command_is_urgent(uint8_t number)
 /* Whether a frame is an SDO request to this node for an urgent command: an expedited write of one byte. Pure. */
 bool command_urgent_request(const struct can_msg *frame, uint8_t node);
 
-/* Executes the urgent commands of a set (bit: enum command), the most severe last. Under the lock. */
+/* Executes the urgent commands of a set (bit: enum command), the most severe last. The caller holds port_lock(). */
 void commands_execute_urgent(struct machine *machine, uint16_t set);
 
-/* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. */
+/* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. Takes port_lock()
+ * itself. */
 enum machine_refusal commands_execute(struct controller *controller, enum command command);
 
 #endif

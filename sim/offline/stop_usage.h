@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stop_usage: the limit usage of a motion along a path; above 1 a limit is exceeded. Used by offline/stop_brake,
- * offline/stop_verdict and offline/stop_trial.
+ * offline/stop_verdict and offline/stop_search.
  *
  * There are two computations: the exact usage in a state (stop_usage), and bounds for all states of a stretch of the
  * path at once (stop_extent_keeps), which cost as much as one state. If the bounds show that a limit is kept, no state
@@ -14,10 +14,10 @@
 #include "offline/stop_limits.h"
 #include "offline/stop_path.h"
 
-/* One over the limits, less STOP_MARGIN; 0: none. */
+/* Reciprocals of the axis limits, each limit reduced by STOP_MARGIN. 0: no limit. `time_constant` is the exception: it
+ * belongs to `reach` and is in s. */
 struct stop_inverse {
-    double
-        feed; /* factor of the feed in the comparison with the path's feed; below 1 it allows more */
+    double feed; /* the feed is multiplied by this before it is compared with the path's feed */
     double velocity[PROGRAM_AXES], axis_acceleration[PROGRAM_AXES], axis_jerk[PROGRAM_AXES],
         reach[PROGRAM_AXES], time_constant[PROGRAM_AXES];
 };

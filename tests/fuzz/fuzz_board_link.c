@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A line that is
- * decoded is a frame, and its line gives the same frame again; a request is replied to within the time that it names.
+ * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A decoded frame,
+ * encoded and decoded again, is the same frame. A request is replied to after fewer than ROUNDS_MAX waits, each longer
+ * than 0.
  *
  * Input: requests (one byte each selects the kind), then characters.
  */
@@ -12,7 +13,7 @@
 #include "gateway/pacing.h"
 
 #define REQUESTS_MAX 64u
-#define ROUNDS_MAX   10000u /* every period and guard time of an input, in slices of 10 ms */
+#define ROUNDS_MAX   10000u /* more waits than any request needs */
 
 static void decode_again(const struct can_msg *frame)
 {

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Toolpaths on the bus: sections one after the other, what happens between them, and how a job ends before its end."""
+"""Toolpaths on a local bus in virtual time: sections one after the other, what happens between them, and how a job ends
+before its end.
+"""
 
 from __future__ import annotations
 

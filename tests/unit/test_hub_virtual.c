@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A local bus in virtual time, seen by one participant (clock.h) and by others that speak for themselves. */
+/* Tests the hub in virtual time. One participant uses clock.h; the others send protocol messages directly. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <signal.h>

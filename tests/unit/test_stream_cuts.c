@@ -2,11 +2,11 @@
 /*
  * Cuts of a stream at random: chunks that come early, late, twice, damaged or never, while hold, resume, override, stop
  * and fault stop are commanded at any instant. In each tick the setpoint is on the path of the whole program and inside
- * its limits, and goes forward; without commands and in time it is that of the whole program, bit for bit. Each case
- * ends with a host that sends no more: then the motion comes to rest. In each tick as many events of the path have
- * acted as are at or before the farthest setpoint: none acts twice, is left out or is late. Records are those of a
- * coefficient cache, from the least that does to one for whole chunks; where it has room to spare, the main loop is
- * late with them by a tick.
+ * its limits, and goes forward. If no command is given and all chunks are in time, the setpoints equal those of the
+ * whole program, bit for bit. Each case ends with a host that sends no more: then the motion comes to rest. Each path
+ * event acts once, in the tick whose setpoint reaches it. The records are those of a coefficient cache. The cache size
+ * varies from the smallest that works to one that holds whole chunks. With a large cache the main loop is sometimes one
+ * tick late.
  *
  * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
  */
@@ -26,7 +26,7 @@
 #define WHOLES     12u
 #define LINES      4u /* of them: one for each period */
 #define IN_SPACE   4u /* more of them: with three axes and with six */
-#define SPACE_PART 8u /* of the cuts there is one in space for so many in the plane */
+#define SPACE_PART 8u /* one spatial cut for each 8 planar ones */
 #define CHAINS     6u /* of each whole program */
 #define MOST_TICKS 6000u
 #define LONGEST    20000u /* until standstill */
@@ -34,7 +34,8 @@
 #define EVENTS     40u
 #define CACHE_LATE 12288u /* from this size on the main loop may be late */
 
-/* Found among 10^6: a hold while the override rises is late by the bound of the piece where it was commanded. */
+/* Case found in 10^6 runs: a hold during a rising override ends later than the stop time bound of the piece in which
+ * it is commanded. */
 #define HOLD_IN_A_RISE 525090u
 
 static const char *const GOLDEN[] = {"alpha_minimax.hdgp", "heart_minimax.hdgp", "line.hdgp",

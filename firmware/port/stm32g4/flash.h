@@ -4,10 +4,11 @@
  *
  * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts continue: they
  * run from bank 1, which can be read at the same time. A read of bank 2 stalls the core until the operation has ended.
- * Used by flash_store; flash_take_ecc_error also by faults, in the NMI. Main loop.
+ * Used by flash_store in the main loop, by port_stm32g4 at start (flash_is_dual), and by faults in the NMI
+ * (flash_take_ecc_error).
  *
- * The data cache is off during an operation and empty afterwards. On other dual-bank chips of the family it may keep
- * wrong data of a read during a write, and after an erase it would keep the old contents.
+ * The data cache is off during an operation and empty afterwards. On other dual-bank chips of the family it may cache
+ * wrong data if bank 2 is read during a write, and would keep old contents after an erase.
  */
 #ifndef PORT_STM32G4_FLASH_H
 #define PORT_STM32G4_FLASH_H
@@ -23,7 +24,7 @@ bool flash_is_dual(void);
 /* False: not done, or not proved by reading back. */
 bool flash_erase_page(uint32_t page);
 
-/* One double word, at a multiple of 8 from the beginning of the bank, that has been erased. False: as above. */
+/* Programs one erased double word. `offset`: from the start of bank 2, a multiple of 8. False: as above. */
 bool flash_program(uint32_t offset, const uint8_t data[8]);
 
 /* For the NMI: true if the error correction of a word of bank 2 failed. Clears the flag. */

@@ -27,7 +27,7 @@ class OfflineStream(FeedCommands):
     """Takes chunks (docs/reference/protocol.md 1.7) and gives setpoints. Chunks and commands take effect from the next
     tick.
 
-    The memory of a chunk is freed after the takeover of a later one.
+    Keeps the memory of a chunk until a later chunk has taken over.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class OfflineStream(FeedCommands):
         *,
         cache_bytes: int = CACHE_BYTES,
     ) -> None:
-        """Raises InputError for an unknown kernel. Without limits those of the format hold.
+        """Raises InputError for an unknown kernel. If `limits` is None, only the limits of the program format apply.
 
         The setpoints do not depend on the size of the cache.
         """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Infeasible limits of profile `optimal`: the message names limit and place, and its value is feasible."""
+"""Infeasible limits of profile `optimal`: the message names limit and place, and the value that it proposes is
+feasible.
+"""
 
 from __future__ import annotations
 

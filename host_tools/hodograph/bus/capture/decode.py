@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""From recorded frames to ticks: setpoints and answers by SYNC.
+"""From recorded frames to ticks: setpoints and answers by SYNC. Also decodes offsets and outputs, and counts unhomed
+starts. Used by bus/analysis.py, bus/run.py, bus_recording.py and identify/stretches.py; others use the identifiers.
 
-Order on the bus (docs/reference/protocol.md section 2): SYNC j, then the setpoints of tick j; the drives
-answer SYNC j with TPDO1
-and TPDO2, which may come before or after the setpoints, on a late host even after SYNC j+1, but never out of
-order. So the n-th answer belongs to the n-th SYNC; the answers between two SYNCs only confirm that.
+Order on the bus (docs/reference/protocol.md section 2): SYNC j, then the setpoints of tick j. The drives answer SYNC j
+with TPDO1 and TPDO2. An answer may come before or after the setpoints of tick j; on a slow host even after SYNC j+1.
+The answers of one drive stay in order. So the n-th answer belongs to the n-th SYNC. Where an answer lies between two
+SYNCs is used only to detect lost frames.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ _UNHOMED_START = bytes([0x2F, 0x55, 0x20, 0x01, 0x01])
 _LONGEST_LAG = 250
 """Greatest lateness of an answer in SYNCs: a slow host delays drives, but frames keep their order."""
 _LEAD_IN = 200
-"""SYNCs at both ends of a recording (standstill) in which lateness becomes visible or disappears."""
+"""At the start of a recording, the first so many answers show how many of them belong to earlier SYNCs. At its end, the
+answers to at most so many SYNCs may be missing. The axes stand still at both ends."""
 
 Int32 = NDArray[np.int32]
 
