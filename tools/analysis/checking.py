@@ -21,8 +21,11 @@ from hodograph.program.stops import DECELERATION
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("alpha", "heart", "star", "alpha_optimal", "heart_optimal")
 CORES = ("an386", "microbit")
+"""The cores that are counted."""
+
 STOP_NAMES = ("alpha", "alpha_optimal")
-"""The cores that are counted; others take minutes."""
+"""The programs whose stops are counted; others take minutes."""
+
 KINDS = ("hold", "fault")
 
 
