@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* commands: executes the commands of the operator, which are written to object 0x2001. Called by objects.c; urgent ones
- * also by controller.c while a chunk is checked. Main loop. */
+/* commands: executes the commands of the operator, which are written to object 0x2001. Called by objects.c and
+ * controller.c (urgent ones while a chunk is checked). Main loop. */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
 

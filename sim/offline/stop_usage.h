@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * stop_usage: the limit usage of a motion along a path; above 1 a limit is exceeded. Used by offline/stop_brake,
- * offline/stop_verdict and offline/stop_trial.
+ * stop_usage: the limit usage of a motion along a path; above 1 a limit is exceeded. Used by offline/stop_brake and
+ * offline/stop_verdict.
  *
  * There are two computations: the exact usage in a state (stop_usage), and bounds for all states of a stretch of the
  * path at once (stop_extent_keeps), which cost as much as one state. If the bounds show that a limit is kept, no state

@@ -4,7 +4,7 @@
  *
  * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts continue: they
  * run from bank 1, which can be read at the same time. A read of bank 2 stalls the core until the operation has ended.
- * Used by flash_store; flash_take_ecc_error also by faults, in the NMI. Main loop.
+ * Used by flash_store, by port_stm32g4.c and, in the NMI (flash_take_ecc_error), by faults. Main loop.
  *
  * The data cache is off during an operation and empty afterwards. On other dual-bank chips of the family it may keep
  * wrong data of a read during a write, and after an erase it would keep the old contents.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Quality of a solution: turning of the tangent and bending energy; docs/theory/numerics.md 3.2. Used by loops.py and
-verdict.py.
+"""Quality of a solution: turning of the tangent and bending energy; docs/theory/numerics.md 3.2. Used by loops.py,
+solve.py and verdict.py.
 
 The spline has hodograph w^2 with a quadratic w, its guide a quadratic hodograph. `Shape` handles both: it takes the
 quadratic and its power.
