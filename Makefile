@@ -452,6 +452,7 @@ lint-js: $(READY)/packages-lint
 lint-directions:
 	$(call say,who,may use whom)
 	$(Q)$(PYTHON) tools/check_directions.py
+	$(Q)$(PYTHON) tools/check_users.py
 	$(Q)$(PYTHON) tools/check_test_names.py
 lint-symbols: $(HOST_LIBS)
 	$(call say,names,of the libraries)

@@ -9,7 +9,7 @@
  * The commit record also holds the CRC-32 of the configuration that the program was checked against. Under another
  * configuration, and once after each power-on, the program is checked again before it may run.
  *
- * Used by app/commands, app/objects_program and app/controller.c. Main loop. The program must not run when an upload
+ * Called by app/commands, app/objects_program and app/controller.c. Main loop. The program must not run when an upload
  * ends (see machine_moving).
  */
 #ifndef APP_PROGRAM_SLOT_H

@@ -4,7 +4,7 @@
  * setpoints.
  *
  * The timer interrupt calls tick_run once a period, under the port's lock. tick.c contains the order on the bus and all
- * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints. Used by
+ * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints. Called by
  * app/controller.c.
  */
 #ifndef APP_TICK_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* can_match: which frames a node receives, in the form of acceptance filters. Used by the ports and SocketCAN. Pure. */
+/* can_match: which frames a node receives, in the form of acceptance filters. Used by the ports. Pure. */
 #ifndef CAN_CAN_MATCH_H
 #define CAN_CAN_MATCH_H
 

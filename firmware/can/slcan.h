@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * slcan: CAN frames as lines of text, in the format of LAWICEL's adapters and their many descendants. Used by the
- * gateway (sim/gateway) and by emulated boards (port/mps2).
+ * slcan: CAN frames as lines of text, in the format of LAWICEL's adapters and their many descendants. Used by
+ * sim/gateway and port/mps2.
  *
  *   tiiildd...\r    a frame: identifier (three hex digits), length (one), data (two for each byte)
  *   Sn\r O\r C\r    to an adapter: bit rate (8: 1 Mbit/s), open, close

@@ -2,8 +2,8 @@
 /* pdo_map: one remappable PDO of a device (CiA 301, 7.2.2, objects 0x1400 ... 0x1BFF): parameters, mapping, packing,
  * times.
  * 
- * Used by the simulated drives and the I/O module. The parameters are in the object dictionary, with the sub-indices of
- * its EDS. This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
+ * Used by app/objects_axis and sim/node. The parameters are in the object dictionary, with the sub-indices of its EDS.
+ * This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
  * (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of 0x1400 ... are
  * received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object must be readable
  * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * counts: converts positions from mm to bus counts. Used by the tick and by the host tools. Pure, any context.
+ * counts: converts positions from mm to bus counts. Used by app/machine/path_counts and sim/offline. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_COUNTS_H
 #define HODOGRAPH_CORE_COUNTS_H

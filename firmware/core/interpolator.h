@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * interpolator: program time in, point on the path out. Used by core/feed_override, app/machine and host tools.
+ * interpolator: program time in, point on the path out. Used by core, app/machine, sim/offline and host tools.
  *
  * The point is a pure function of (program, time, kernel): the cursor inside struct interpolator only stores the
  * present segment and piece. So a run, a seek and a run backwards by seeks give the same bits. Kernels:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * override_ramp: ramps of the feed override from one constant value to another. Used by core/override_plan.
+ * override_ramp: ramps of the feed override from one constant value to another. Used by core/chunk, core/coefficients,
+ * core/override_plan and core/program_clock.
  *
  * The override is the rate of program time (lambda of docs/theory/numerics.md section 12, "Feed override"); 1 is the
  * nominal motion. On a ramp its second derivative is constant in each tick, so the override is piecewise quadratic in

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * ph_segment: expands a PH segment for evaluation: the one exact-integer step that all kernels start from. Used by the
- * kernels, core/coefficients and the checks of segments.
+ * ph_segment: expands a PH segment for evaluation: the one exact-integer step that all kernels start from.
  *
  * The image holds the preimage in Bernstein form. Products of its coefficients are formed exactly (25-bit
  * limbs) and give x, y, z and the arc length s as polynomials in z = 2 xi - 1, z from -1 to 1:

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * segment_length_check: minimum segment length (docs/reference/protocol.md 1.2): no tick crosses more than two segment
- * ends. This rule needs segments and feed pieces together. Used by program_check; length_exceeds_tick also by
- * event_check. Main loop.
+ * ends. This rule needs segments and feed pieces together. Used by program_check and event_check. Main loop.
  */
 #ifndef HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H
 #define HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * port.h: everything that the controller needs of a machine. Called by firmware/app.
+ * port.h: everything that the controller needs of a machine. Used by firmware/app and the ports.
  *
  * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
  * includes nothing above this file but the headers of can/. docs/guides/port-to-your-board.md makes one.

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8). Used by compiler, checks,
-stream and simulation.
-"""
+"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8)."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 
 `load_job` divides a toolpath into sections, fits a curve to each within the tolerance, and gives it a pipeline that
 makes its program. Commands at rest (dwells, spindle, outputs, tool changes) are kept with the section that follows
-them. Used by simulation, runs on the bus, reports and the API; stream/ makes its sections by `SectionMaker`.
+them. `stream` makes its sections by `SectionMaker` too.
 """
 
 from __future__ import annotations

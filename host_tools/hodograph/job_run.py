@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Runs a job on the bus: its sections one after the other, and the machine commands at rest between them.
 
-Used by `hodograph run` and the API; `stream/sender` uses the functions for rests. Each section is one program: it is
-uploaded where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator
-at program stops and tool changes, and prints messages.
+Used by cli/, by api/bus, and by stream/sender (the functions for rests). Each section is one program: it is uploaded
+where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator at
+program stops and tool changes, and prints messages.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What a browser draws of a job: the programmed path, and the curves with feed and source line at each place.
 
-Used by the report of a toolpath and by the live page.
+Used by report/toolpath_report and cli/monitor_command.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What a machine requires of plans and programs: its limits in the forms of feed/, program/ and native/, and what its
-controller proves of a program with them. Used by pipeline.py, by stream/, and by commands that check programs.
+controller proves of a program with them.
 """
 
 from __future__ import annotations

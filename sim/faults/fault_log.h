@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault_log: writes injected faults to a stream, one JSON object for each line. Used by the main program of
- * sim/injector and by sim/node/drives. Any thread; writes to `out` only.
+/* fault_log: writes injected faults to a stream, one JSON object for each line. Used by sim/injector/main and
+ * sim/node/drives. Any thread; writes to `out` only.
  *
  * Keys: t_ns (CLOCK_MONOTONIC), tick, line (of the rule), kind; of a frame also from ("controller" or "drives"), id and
  * data (hexadecimal, as it came); of a state also on (true, false) and, of a drive's, node. */

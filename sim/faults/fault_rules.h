@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* fault_rules: scripted faults, one a line of text (docs/reference/protocol.md section 4): the rules as structs, and
- * their parser. Used by sim/injector, sim/node and their command lines. Any thread; fault_rules_read reads a file, the
- * other functions change their arguments only.
+ * their parser. Used by sim/faults, sim/injector and sim/node. Any thread; fault_rules_read reads a file, the other
+ * functions change their arguments only.
  */
 #ifndef FAULTS_FAULT_RULES_H
 #define FAULTS_FAULT_RULES_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* bus: the CAN side of the gateway, its signals and its errors. Used by main of the gateway and by both sides to the
- * board, fifo and slcan. One thread. */
+/* bus: the CAN side of the gateway, its signals and its errors. Used by gateway/main, gateway/fifo_side and
+ * gateway/slcan_side. One thread. */
 #ifndef GATEWAY_BUS_H
 #define GATEWAY_BUS_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by main of the
- * gateway. One thread, once: its state is static. */
+/* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by gateway/main. One
+ * thread, once: its state is static. */
 #ifndef GATEWAY_FIFO_SIDE_H
 #define GATEWAY_FIFO_SIDE_H
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* gateway_options: reads the command line of hodograph-bridge. Used by main of the gateway. Main thread, once; prints
+/* gateway_options: reads the command line of hodograph-bridge. Used by gateway/main. Main thread, once; prints
  * nothing. */
 #ifndef GATEWAY_GATEWAY_OPTIONS_H
 #define GATEWAY_GATEWAY_OPTIONS_H

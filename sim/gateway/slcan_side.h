@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* slcan_side: forwards frames between a CAN bus and a stream of SLCAN lines (can/slcan.h), which an emulated board
- * reads and writes. Called by the main program of the gateway (hodograph-bridge --slcan). One thread. */
+ * reads and writes. Called by gateway/main (hodograph-bridge --slcan). One thread. */
 #ifndef GATEWAY_SLCAN_SIDE_H
 #define GATEWAY_SLCAN_SIDE_H
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * hub: CAN buses for the processes of one computer, without kernel CAN, in real or in virtual time. Used by the main
- * program hodograph-hub. One thread. It makes the sockets of the buses in the file system and nothing else outside of
- * struct hub.
+ * hub: CAN buses for the processes of one computer, without kernel CAN, in real or in virtual time. Used by hub/main
+ * (hodograph-hub). One thread. It makes the sockets of the buses in the file system and nothing else outside of struct
+ * hub.
  *
  * The messages between processes and hub are in port/linux/local_bus.h. Each frame that a member sends goes to all
  * other members of its bus, in one order.

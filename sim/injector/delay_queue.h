@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* delay_queue: keeps frames until they are due. Bounded, no heap. Used by the injector's forwarder. The functions
- * change their struct only; one thread. */
+/* delay_queue: keeps frames until they are due. Bounded, no heap. Used by injector/forwarder. The functions change
+ * their struct only; one thread. */
 #ifndef INJECTOR_DELAY_QUEUE_H
 #define INJECTOR_DELAY_QUEUE_H
 

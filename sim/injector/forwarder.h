@@ -7,7 +7,7 @@
  * a flood reaches the other side only. The same frames give the same faults, except delays and durations in ms, which
  * follow the wall clock.
  *
- * Used by the injector's main program. No I/O, no heap. All functions in one thread.
+ * Used by injector/main. No I/O, no heap. All functions in one thread.
  */
 #ifndef INJECTOR_FORWARDER_H
 #define INJECTOR_FORWARDER_H

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* injector_options: reads the command line of hodograph-injector. Used by its main program. Main thread, once; prints
+/* injector_options: reads the command line of hodograph-injector. Used by injector/main. Main thread, once; prints
  * nothing. */
 #ifndef INJECTOR_INJECTOR_OPTIONS_H
 #define INJECTOR_INJECTOR_OPTIONS_H

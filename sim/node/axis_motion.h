@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* axis_motion: the simulated axis of a drive node. It follows setpoints, makes ramps of its own, or coasts with its
- * brake closed. It has its coordinates and its place in the machine. Used by node/servo and its parts.
+ * brake closed. It has its coordinates and its place in the machine. Used by sim/node only.
  *
  * Positions are bus counts as the drive reads them. One call of follow, ramp, brake or hold in each bus period. The
  * functions change their struct only. All in one context.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values
- * act on the servo: a controlword at once or at SYNC, a target from the next period on. Used by node/drive_node and
+ * act on the servo: a controlword at once or at SYNC, a target from the next period on. Called by node/drive_node and
  * node/drive_od. All in one context.
  */
 #ifndef NODE_DRIVE_PDOS_H

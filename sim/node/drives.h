@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* drives: all simulated drives of one process on one bus, with its I/O module. Used by the main program
- * hodograph-drive.
+/* drives: all simulated drives of one process on one bus, with its I/O module. Used by node/main (hodograph-drive).
  *
  * It reads frames from the socket, gives them to the nodes, and sends what they return. All functions in one thread. An
  * error of the bus is stored in `failed`, which the caller checks. Frames for which the interface has no room are lost.

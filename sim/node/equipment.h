@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by the simulated
- * drive (node/drive_node, node/servo).
+/* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by sim/node only.
  *
  * Switches have places in the coordinates that the axis has at power-on. Homing changes the coordinates, not the
  * switches. Pure functions.

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* node_options: reads the command line of hodograph-drive. Used by its main program. Main thread, once; prints
- * nothing. */
+/* node_options: reads the command line of hodograph-drive. Called by node/main. Main thread, once; prints nothing. */
 #ifndef NODE_NODE_OPTIONS_H
 #define NODE_NODE_OPTIONS_H
 

@@ -3,7 +3,7 @@
  * supervision, reactions to errors. What each object does: docs/reference/protocol.md section 5.
  *
  * The object dictionary holds its parameters and results; servo_refresh brings the results up to date. One period is
- * servo_step. Used by node/drive_node, node/drive_pdos, node/drive_od and node/node_faults. No I/O, no heap. All
+ * servo_step. Called by node/drive_node, node/drive_pdos, node/drive_od and node/node_faults. No I/O, no heap. All
  * functions in one context.
  */
 #ifndef NODE_SERVO_H

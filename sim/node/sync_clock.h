@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* sync_clock: the time base of a simulated drive: SYNC, or the wall clock while SYNC is missing. It returns how many
- * periods pass; the caller computes them. Used by node/drive_node. All in one context.
+ * periods pass; the caller computes them. Called by node/drive_node. All in one context.
  */
 #ifndef NODE_SYNC_CLOCK_H
 #define NODE_SYNC_CLOCK_H

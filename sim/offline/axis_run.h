@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* axis_run: runs one simulated axis with given setpoints and offsets, to fit its plant to a recording. It returns the
  * motion of the motor in the model, before encoder and bus round it; the drive itself uses its encoder as usual. Called
- * by Python through host_tools/hodograph/native. Pure, any thread.
+ * by host_tools/hodograph/native. Pure, any thread.
  */
 #ifndef HODOGRAPH_OFFLINE_AXIS_RUN_H
 #define HODOGRAPH_OFFLINE_AXIS_RUN_H

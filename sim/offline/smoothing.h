@@ -2,7 +2,7 @@
 /*
  * smoothing: moves points of a path sideways, each within its bound, so that the sum of squared third differences
  * becomes least: docs/theory/toolpath-fitting.md section 3. The bounds are kept by a barrier, so every step stays
- * inside them. Called by Python through host_tools/hodograph/native.
+ * inside them. Called by host_tools/hodograph/native.
  *
  * Newton's method on a banded system, in double arithmetic. No heap: the caller lends all arrays, and no others are
  * written. Any thread.

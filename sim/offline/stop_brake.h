@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stop_brake: whether a brake of the controller (core/path_brake.h) along the path of a program keeps given limits.
- * Used by the search of stop parameters (offline/stop_search and its parts).
+ * Used by offline/stop_search, offline/stop_piece and offline/stop_verdict.
  *
  * A brake has three numbers: jerk of onset, deceleration, jerk of release, as codes of docs/reference/protocol.md 1.4.
  * It is followed tick by tick. If bounds of all its remaining ticks, or of some of them, show that the limits are kept,

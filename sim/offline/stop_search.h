@@ -2,7 +2,7 @@
 /*
  * stop_search: searches the stop parameters of a program: for each feed piece the jerk, deceleration and jerk (codes of
  * docs/reference/protocol.md 1.4) with which a path stop may begin anywhere in the piece and keeps given limits until
- * standstill. Called by Python through host_tools/hodograph/native.
+ * standstill. Called by host_tools/hodograph/native.
  *
  * Each brake is followed in double arithmetic from a grid of instants of the piece. Limits are reduced by STOP_MARGIN
  * for the motion between the instants. Derivation: docs/theory/feed.md section 7. No heap: the caller lends all

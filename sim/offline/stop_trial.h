@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stop_trial: executes random sequences of hold, resume, override, stop and fault stop in a program, and compares them
- * with the limits and with the stop time bounds of its stop table. Setpoints only, no drives. Called by Python through
+ * with the limits and with the stop time bounds of its stop table. Setpoints only, no drives. Called by
  * host_tools/hodograph/native.
  *
  * A trial begins at a tick of the program at override 100 %, gives up to four commands with up to 60 ticks between

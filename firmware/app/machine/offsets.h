@@ -2,7 +2,7 @@
 /*
  * offsets: velocity and torque offsets that feedforward (core/feedforward) adds to the setpoints of a motion.
  *
- * Called by the tick (app/tick.c) after the machine's step, while feedforward is configured.
+ * Called by app/tick after the machine's step, while feedforward is configured.
  */
 #ifndef APP_MACHINE_OFFSETS_H
 #define APP_MACHINE_OFFSETS_H

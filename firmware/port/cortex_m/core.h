@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* core: what every Cortex-M has at the same addresses: SysTick, interrupt controller, the mask of all interrupts. Used
- * by the ports of a Cortex-M. Any context. */
+ * by port/cortex_m, port/mps2 and port/stm32g4. Any context. */
 #ifndef PORT_CORTEX_M_CORE_H
 #define PORT_CORTEX_M_CORE_H
 

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without kernel CAN. Used by the
- * Linux port and by the programs of sim/. One thread at a time for each socket, except that can_socket_send may be
- * called by a second one.
+ * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without kernel CAN. Used by
+ * port/linux and sim/. One thread at a time for each socket, except that can_socket_send may be called by a second one.
  *
  * The socket never blocks. Received remote, extended and error frames are dropped. A socket does not receive its own
  * frames; other sockets of the same machine receive them.

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * local_bus: the messages between a process and hodograph-hub (docs/reference/virtual-time.md). Data only; used by
- * port/linux/clock, can_socket and local_connection, and by sim/hub.
+ * local_bus: the messages between a process and hodograph-hub (docs/reference/virtual-time.md). Data only. Used by
+ * port/linux and sim/hub.
  *
  * A connection is a UNIX socket of type SOCK_SEQPACKET to the path of a bus; a message is one packet, in the byte order
  * of the machine. There are two kinds of connection:

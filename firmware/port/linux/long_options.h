@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* long_options: reads the command line of a program, one option after the other, by getopt_long. Everything except the
- * known options is an error, reported in one line. An option may be shortened as long as it is unique. Used by the
- * command lines of port/linux and sim/.
+ * known options is an error, reported in one line. An option may be shortened as long as it is unique. Used by
+ * port/linux/options and sim/.
  *
  *     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
  *     for (int option = long_options_next(&line); option > 0; option = long_options_next(&line)) ...

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * command_line: reads the words that the emulator passes on, in place of a board's straps and switches. Used by
- * port_mps2.c, once, at the start. Pure.
+ * command_line: reads the words that the emulator passes on, in place of a board's straps and switches. Used by link
+ * and by port_mps2.c at the start. Pure.
  *
  *   node=N            node number of the controller, 1 to 127; default 1
  *   link=fifo|slcan   how CAN frames are exchanged; default slcan

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Motion and bus load from the frames of a run. Used by `run`, which records them, and `replay`, which reads them from
-a file.
-"""
+"""Motion and bus load from the frames of a run. Used by bus/run, cli/replay_command and identify/stretches."""
 
 from __future__ import annotations
 

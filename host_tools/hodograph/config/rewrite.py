@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Writes figures into machine and drive files; all other text stays, also comments and order. Used by `hodograph
-tune`.
+"""Writes figures into machine and drive files; all other text stays, also comments and order. Used by cli/tune_command
+and cli/identify_command.
 """
 
 from __future__ import annotations

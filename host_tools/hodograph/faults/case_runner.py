@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Runs fault cases (start, program, disturbance, recovery, the program again) and judges them. A case is one scenario
-with one seed. Called by `hodograph faults`.
+with one seed. Called by cli/faults_command.
 """
 
 from __future__ import annotations

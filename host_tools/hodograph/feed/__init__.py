@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Plans the feed along a path inside limits: profiles, plans, and the feed pieces of a program.
 
-Used by `pipeline`, `stream` and `toolpath/fit`. `feed/optimal` plans for least time. It reads no files and does not use
-machine files: limits come as `Limits`, `ControllerLimits` and `AxisLimits`.
+`feed/optimal` plans for least time. This package reads no files and does not use machine files: limits come as
+`Limits`, `ControllerLimits` and `AxisLimits`.
 """
 
 from .limits import (

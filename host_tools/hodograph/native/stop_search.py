@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Searches stop parameters ("numbers") in C (sim/offline/stop_search.h). Used by program/stop_planning."""
+"""Searches stop parameters ("numbers") in C (sim/offline/stop_search.h). Used by program/stop_planning and
+native/stop_trial.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reasons for refusing a program: the codes of the controller, with its names and numbers. Used by check.py and bus/.
+"""Reasons for refusing a program: the codes of the controller, with its names and numbers.
 
 The same table as `enum program_error` in firmware/core/program_rules.h (a test compares them).
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The program image: reads it from a file, decodes it to arrays, encodes it to bytes; and the memory that it needs.
 
-docs/reference/protocol.md 1.1 to 1.4. Used by the compiler, the checks, the commands and the API.
+docs/reference/protocol.md 1.1 to 1.4.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Plans the stops of a program: stop parameters and stop time bounds; docs/theory/feed.md section 7. Used by
-compiler.py and stream/. In this module "numbers" are stop parameters.
+"""Plans the stops of a program: stop parameters and stop time bounds; docs/theory/feed.md section 7. In this module
+"numbers" are stop parameters.
 """
 
 from __future__ import annotations

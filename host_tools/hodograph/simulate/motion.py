@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima. Used by simulate/, reports and the
-API.
-"""
+"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima."""
 
 from __future__ import annotations
 

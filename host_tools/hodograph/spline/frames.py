@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/feed.md 5.6. Used by
-feed/ and verify/.
-"""
+"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/feed.md 5.6."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: MIT
 """Jobs of any length: read, fitted, planned, sent and recorded in chunks, in bounded memory; docs/theory/feed.md
-5.6 and docs/reference/protocol.md 1.7. Used by `hodograph stream`, `run` and the live page.
+5.6 and docs/reference/protocol.md 1.7. Used by cli/stream_command and monitor/.
 """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A section as a sequence of chunks: each piece is planned once and has the same bits in all chunks that contain it;
-docs/reference/protocol.md 1.7. Used by plan.py; paths.py makes chunks of path files.
+docs/reference/protocol.md 1.7. Used by plan.py, by paths.py for path files, and by cli/stream_command.
 """
 
 from __future__ import annotations

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The part of a section's path that is in memory: integer segments as in a program image, and their curve. Used by
-windows.py and chunks.py.
+"""The part of a section's path that is in memory: integer segments as in a program image, and their curve.
 
 Blocks of segments are added at its end as they are fitted and removed from its start as they are passed. A segment
 never changes: chunks that were sent have its bits.

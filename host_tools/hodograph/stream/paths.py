@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path files with several paths as one job: each path becomes one chunk, with a rest before it; used by plan.py."""
+"""Path files with several paths as one job: each path becomes one chunk, with a rest before it. Used by plan.py."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The plan of a job: a thread makes its chunks ahead of the sender and keeps them on the disk, not in memory. Used by
-`hodograph stream`, with or without a bus.
+cli/stream_command, resuming.py and sender.py.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Sends a planned job to the controller: uploads chunks in order as the ring has room, starts the motion, executes
-commands at rest, and waits for the end. Used by `hodograph stream` and `run`.
+commands at rest, and waits for the end. Used by cli/stream_command.
 """
 
 from __future__ import annotations

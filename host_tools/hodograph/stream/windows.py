@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The feed of a section in planning windows; docs/theory/feed.md 5.6. Used by chunks.py.
+"""The feed of a section in planning windows; docs/theory/feed.md 5.6. Used by chunks.py, stop_search.py and tails.py.
 
 A window begins in motion, where the kept part of the last window ends, and is planned to rest at its own end. Kept
 pieces never change again. A chunk ends with a tail: a fast brake from its last joint to rest at the end of a segment.

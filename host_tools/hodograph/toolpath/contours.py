@@ -2,8 +2,7 @@
 """Contours of a drawing: lines, arcs and splines that follow each other, kept in little memory.
 
 A reader of drawings calls `move_to` and then the methods that draw, in the coordinates of the drawing; the affine map
-`Contours.affine` takes them to mm. Contours may then be read in any order and direction (`steps`). Used by `svg`,
-`dxf`, `drawing` and `ordering`.
+`Contours.affine` takes them to mm. Contours may then be read in any order and direction (`steps`).
 
 A contour takes 60 bytes, a step of it 30 to 80, so that a drawing of any size takes a few times the memory of its file.
 """

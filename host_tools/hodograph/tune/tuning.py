@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Tunes a machine: from the requested properties to gains, feedforward and their results. Used by `hodograph tune`."""
+"""Tunes a machine: from the requested properties to gains, feedforward and their results. Used by cli/tune_command."""
 
 from __future__ import annotations
 

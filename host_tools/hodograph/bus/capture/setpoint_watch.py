@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The setpoint step check for frames as they come, in windows that overlap; used by bus_recording."""
+"""The setpoint step check for frames as they come, in windows that overlap."""
 
 from __future__ import annotations
 

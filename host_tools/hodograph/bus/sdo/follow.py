@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Waits until a program has ended, and prints each reason for which it does not move once. Used by `start --follow`,
-`goto` and `run`.
+"""Waits until a program has ended, and prints each reason for which it does not move once. Used by bus/run,
+stream/sender and cli/.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Object 0x2060 of the controller: sends chunks of a job, and reads the state of the job (docs/reference/protocol.md
-3.7). Used by stream/sender.
+3.7). Used by bus/, cli/stream_command and stream/sender.
 """
 
 from __future__ import annotations

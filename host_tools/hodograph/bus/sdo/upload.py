@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sends a program image to the controller by SDO block download.
 
-Called by `sdo/controller`; `stream_channel` sends chunks in the same way.
+Used by sdo/controller, sdo/status and sdo/stream_channel.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: MIT
 """C2 Pythagorean-hodograph quintic splines in space, with up to three extra axes (docs/theory/spatial-splines.md).
 
-The counterpart of `spline` for points [x, y, z, …]; used by `pipeline`, `toolpath/fit` and the API. Lengths are in
-mm, in degrees for rotary axes.
+The counterpart of `spline` for points [x, y, z, …]. Lengths are in mm, in degrees for rotary axes.
 """
 
 from .build import SpatialSplineResult, spatial_from_control_polygon, spatial_through_points

@@ -2,6 +2,5 @@
 """From the moves of a toolpath to curves of continuous curvature within a certified tolerance.
 
 Theory: docs/theory/toolpath-fitting.md. `sections` divides a toolpath at its stops. `fitting` makes a curve of each
-section from `corners` and smoothed `stations`. `certificate` proves its distance from the programmed path. Used by
-job.py and stream/.
+section from `corners` and smoothed `stations`. `certificate` proves its distance from the programmed path.
 """

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """From a programmed path to a curve of continuous curvature within a certified tolerance.
 
-Theory: docs/theory/toolpath-fitting.md. `fit` is used by job.py, by stream/ and by the API.
+Theory: docs/theory/toolpath-fitting.md.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Chooses the channel of a recording that holds several buses (`--channel`). Used by the readers of all formats."""
+"""Chooses the channel of a recording that holds several buses (`--channel`). Used by recordings/candump and
+recordings/vector.
+"""
 
 from __future__ import annotations
 
