@@ -72,7 +72,7 @@ def find_unconfigured(network: Network) -> Unconfigured:
                 return Unconfigured(tuple(found), answer)
             if answer in found:
                 doubt = (
-                    f"{answer}: answers twice, and may hide further nodes without number: give it its number and "
+                    f"{answer}: answers twice, and may hide nodes without number: give it its number and "
                     "scan again"
                 )
                 return Unconfigured(tuple(found), doubt)
