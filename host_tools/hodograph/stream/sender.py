@@ -69,7 +69,9 @@ class _ResumedError(Exception):
 
 @dataclass(frozen=True)
 class StreamProgress:
-    """Progress of a job. ahead_s motion that the controller has until it would come to rest
+    """Progress of a job.
+
+    ahead_s      motion that the controller has until it would come to rest
     remaining_s  time to the end of the job; None: not all of it is planned yet
     planned_s    planned time to come
     """

@@ -223,8 +223,8 @@ class SectionFeed:
         return self.path.complete and window.stretch.end_q40 == int(self.path.start_q40[-1])
 
     def rest_at(self, end_q40: int, last_s: float) -> None:
-        """Lets the next window begin at rest at this end of a segment, in place of the end of the present window.
-        last_s duration of the piece before
+        """Lets the next window begin at rest at this end of a segment, in place of the end of the present window;
+        `last_s`: duration of the piece before.
         """
         self._rest = end_q40, last_s
 
