@@ -67,12 +67,7 @@ static void motion_at(const struct cell *cell, struct real x, struct motion *out
     for (int k = 0; k <= FEED_DEGREE; k++) {
         c[k] = cell->c[k];
     }
-    /* Horner's rule again and again: c[0] to c[3] become the Taylor coefficients at x. */
-    for (int order = 0; order <= QUANTITIES; order++) {
-        for (int k = FEED_DEGREE - 1; k >= order; k--) {
-            c[k] = real_add(real_mul(c[k + 1], x), c[k]);
-        }
-    }
+    path_motion_taylor(c, FEED_DEGREE, x, QUANTITIES + 1);
     for (int order = 0; order < QUANTITIES; order++) {
         f[order] = real_times(real_mul(c[order + 1], per_s), factorials[order]);
         per_s = real_mul(per_s, cell->per_s);
@@ -87,17 +82,19 @@ static int64_t factor_q14(const struct program_override *own, uint32_t level)
     return level == PROGRAM_LEVEL_FULL ? own->factor_q14 : (int64_t)program_level_q9(level) * 32;
 }
 
-/* 1 when another level allows all that this one allows; of equal levels the first one stays. */
+/* 1 when one level allows all that another one allows. */
+static int contains(const struct program_override *own, uint32_t wide, uint32_t narrow)
+{
+    return factor_q14(own, wide) >= factor_q14(own, narrow) &&
+           own->rate[wide] >= own->rate[narrow] && own->second[wide] >= own->second[narrow];
+}
+
+/* 1 when another level contains this one; of equal levels the first one stays. */
 static int is_contained(const struct program_override *own, uint32_t level)
 {
-    const int64_t f_q14 = factor_q14(own, level);
     for (uint32_t other = 0; other < PROGRAM_LEVELS; other++) {
-        const int64_t other_q14 = factor_q14(own, other);
-        const int covers = other_q14 >= f_q14 && own->rate[other] >= own->rate[level] &&
-                           own->second[other] >= own->second[level];
-        const int equal = other_q14 == f_q14 && own->rate[other] == own->rate[level] &&
-                          own->second[other] == own->second[level];
-        if (other != level && covers && (!equal || other < level)) {
+        if (other != level && contains(own, other, level) &&
+            (other < level || !contains(own, level, other))) {
             return 1;
         }
     }
@@ -220,14 +217,18 @@ static int check_cell(const struct check *check, const struct cell *cell, int *c
             code = take_sample(check, cell, real_make(next, -PARTS_LOG2), &samples[1 - last]);
             open = code != 0 ? 0 : judge(check, &samples[1 - last], &bend, scale);
         }
+        if (open != 0 && width == 0) {
+            *certain = 0;
+            return open;
+        }
         if (open != 0) {
-            *certain = width > 0;
-            code = width > 0 ? 0 : open;
-            width -= 1;
+            width--;
         } else {
             at += 1 << width;
             last = 1 - last;
-            width += (at & ((2 << width) - 1)) == 0 && width < PARTS_LOG2;
+            if ((at & ((2 << width) - 1)) == 0 && width < PARTS_LOG2) {
+                width++;
+            }
         }
     }
     return code;

@@ -55,14 +55,19 @@ struct real path_motion_horner(const struct real *c, int degree, struct real x)
     return value;
 }
 
-/* c(x) becomes c(x + by). */
-void path_motion_shift(struct real *c, int degree, struct real by)
+void path_motion_taylor(struct real *c, int degree, struct real at, int count)
 {
-    for (int k = 0; k < degree; k++) {
+    for (int k = 0; k < count; k++) {
         for (int i = degree - 1; i >= k; i--) {
-            c[i] = real_add(c[i], real_mul(c[i + 1], by));
+            c[i] = real_add(c[i], real_mul(c[i + 1], at));
         }
     }
+}
+
+/* The last coefficient stays. */
+void path_motion_shift(struct real *c, int degree, struct real by)
+{
+    path_motion_taylor(c, degree, by, degree);
 }
 
 /* c(x) becomes c(by x). */
@@ -351,7 +356,7 @@ static struct real product_at(const struct real *a, const struct real *b, int n)
     return sum;
 }
 
-/* Of the feed polynomial, at every instant from x = -1 to 1. */
+/* Of the feed polynomial, at every instant from x = -1 to 1: `majorant` with middle 0 and half 1, which needs no products. */
 static void feed_majorant(struct real out[FEED_DEGREE + 1], const struct real c[FEED_DEGREE + 1])
 {
     for (int k = 0; k <= FEED_DEGREE; k++) {

@@ -59,6 +59,9 @@ void path_motion_clear(struct motion *out);
 /* c(x), by Horner. */
 struct real path_motion_horner(const struct real *c, int degree, struct real x);
 
+/* The first `count` coefficients of c become those of its Taylor series at `at`; at most `degree` of them. */
+void path_motion_taylor(struct real *c, int degree, struct real at, int count);
+
 /* c(x) becomes c(x + by), and c(by x). */
 void path_motion_shift(struct real *c, int degree, struct real by);
 void path_motion_stretch(struct real *c, int degree, struct real by);
