@@ -16,6 +16,11 @@ from hodograph.config import Machine
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 PAPER_ALPHA = EXAMPLES / "machines" / "paper_alpha.toml"
 VCAN0 = parse_address("socketcan:vcan0")
+_PATIENT = """
+[supervision]
+answer_wait_ms = 10000
+setpoint_timeout_ms = 60000
+"""
 
 
 @dataclass(frozen=True)
@@ -35,3 +40,14 @@ class Bench:
 
 MakeBench = Callable[..., Bench]
 MakeAlpha = Callable[[float], Path]
+
+
+def patient_machine(file: Path, folder: Path) -> Path:
+    """A copy of a machine file in `folder`, whose supervision waits longer than a busy computer pauses a process: for
+    tests in real time that are about something else.
+    """
+    text = file.read_text().replace('"../drives/', f'"{EXAMPLES}/drives/')
+    copy = folder / file.name
+    copy.write_text(text.replace("\n[work]\n", f"{_PATIENT}\n[work]\n", 1))
+    assert _PATIENT in copy.read_text()
+    return copy

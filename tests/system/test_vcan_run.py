@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from bench import EXAMPLES, PAPER_ALPHA, VCAN0, MakeAlpha, MakeBench
+from bench import EXAMPLES, PAPER_ALPHA, VCAN0, MakeAlpha, MakeBench, patient_machine
 from commands import result
 from hodograph.bus.sdo.controller import OFF, RUNNING, connect
 from hodograph.bustime import machine_bus_time
@@ -30,8 +30,9 @@ LIMIT_S = 120.0
 @pytest.mark.parametrize("pace", ["real-time", "fast"])
 def test_run_equals_simulate(capsys: pytest.CaptureFixture[str], tmp_path: Path, pace: str) -> None:
     traces = [tmp_path / "simulated.csv", tmp_path / "recorded.csv"]
-    simulated = result(capsys, "simulate", ALPHA, "--json", "--trace", str(traces[0]))
-    recorded = result(capsys, "run", ALPHA, "--json", "--trace", str(traces[1]), "--pace", pace)
+    job = (ALPHA, "--json", "--machine", str(patient_machine(PAPER_ALPHA, tmp_path)))
+    simulated = result(capsys, "simulate", *job, "--trace", str(traces[0]))
+    recorded = result(capsys, "run", *job, "--trace", str(traces[1]), "--pace", pace)
     assert same_motion(recorded, simulated)
     assert (recorded["bus"], recorded["pace"]) == ("socketcan:vcan0", pace)
     assert traces[0].read_text() == traces[1].read_text()

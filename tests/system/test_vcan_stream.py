@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from other_node import latched
 
-from bench import EXAMPLES, VCAN0, Bench, MakeBench
+from bench import EXAMPLES, VCAN0, Bench, MakeBench, patient_machine
 from hodograph.bus.capture.frames import Frames
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.processes import CONTROLLER, find_program
@@ -50,6 +50,7 @@ class Host:
     def __init__(self, folder: Path, corners: tuple[tuple[float, ...], ...], text: str) -> None:
         self.file, self.journal = folder / "part.ngc", folder / "stream.json"
         self.file.write_text(text)
+        self.machine = patient_machine(MILL, folder)
         self.corners = np.array(corners) * COUNTS_PER_MM
 
     @contextmanager
@@ -63,7 +64,7 @@ class Host:
             child.communicate(timeout=LIMIT_S)
 
     def _start(self, *words: str) -> subprocess.Popen[str]:
-        words = words or (str(self.file), "--machine", str(MILL))
+        words = words or (str(self.file), "--machine", str(self.machine))
         command = [
             sys.executable,
             "-m",
@@ -168,18 +169,19 @@ def test_a_host_that_is_killed_and_one_that_stops(
     corners = [(0.0, 0.0, 0.0), *((4.0 - k % 2, 0.4 * k, 0.0) for k in range(61)), (0.0, 0.0, -2.0)]
     moves = "\n".join(f"G1 X{x:g} Y{y:g} Z{z:g}" for x, y, z in corners[1:])
     host = Host(tmp_path, tuple(corners), f"F6000\nG61\n{moves}\nM2\n")
-    _killed_and_stopped(make_bench("fast", MILL), host, 0.3, 6.0)
+    _killed_and_stopped(make_bench("fast", host.machine), host, 0.3, 6.0)
 
 
 @pytest.mark.long
 def test_the_same_of_a_longer_job(make_bench: MakeBench, tmp_path: Path) -> None:
     corners = ((0, 0, 0), (4, 0, 0), (4, 90, 0), (0, 0, -2))
-    _killed_and_stopped(make_bench("fast", MILL), Host(tmp_path, corners, LONG_PART), 20.0, 40.0)
+    host = Host(tmp_path, corners, LONG_PART)
+    _killed_and_stopped(make_bench("fast", host.machine), host, 20.0, 40.0)
 
 
 @contextmanager
-def _machine() -> Iterator[subprocess.Popen[str]]:
-    words = [sys.executable, "-m", "hodograph", "rig", str(MILL), "--pace", "fast"]
+def _simulated(machine: Path) -> Iterator[subprocess.Popen[str]]:
+    words = [sys.executable, "-m", "hodograph", "rig", str(machine), "--pace", "fast"]
     with subprocess.Popen([*words, "--bus", str(VCAN0)], stderr=subprocess.PIPE, text=True) as rig:
         assert rig.stderr is not None
         assert "are on " in rig.stderr.readline()
@@ -201,7 +203,7 @@ def test_an_interface_that_goes_down_and_a_machine_that_has_lost_its_place(tmp_p
     is refused until the axes are back on the path, and goes on there.
     """
     host = Host(tmp_path, CORNERS, PART)
-    with _machine() as rig, connect(VCAN0, 1, 1_000_000) as controller:
+    with _simulated(host.machine) as rig, connect(VCAN0, 1, 1_000_000) as controller:
         controller.require(LIMIT_S)
         with host.running() as child:
             _until(lambda: child.poll() is not None or controller.targets(2)[1] > COUNTS_PER_MM)
@@ -211,7 +213,7 @@ def test_an_interface_that_goes_down_and_a_machine_that_has_lost_its_place(tmp_p
                 rig.wait(LIMIT_S)
             finally:
                 _link("up")
-    with _machine():
+    with _simulated(host.machine):
         with host.running("--continue") as child:
             refused = _ended(child, REFUSED)
         way_back = re.search(r"hodograph (goto .*), then hodograph stream --continue", refused)

@@ -42,3 +42,8 @@ bool fault_is_vague(uint16_t code)
 {
     return code == EMCY_GENERIC || code == FAULT_DROPPED_OUT || code == FAULT_NOT_FOLLOWING;
 }
+
+uint32_t fault_drive_detail(uint16_t code, uint16_t statusword)
+{
+    return code == EMCY_RPDO_TIMEOUT ? 0u : statusword;
+}

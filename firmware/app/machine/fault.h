@@ -42,4 +42,8 @@ const char *fault_text(uint16_t code);
  * Pure. */
 bool fault_is_vague(uint16_t code);
 
+/* The detail of a fault of this code that a drive reports: its statusword. 0 for EMCY_RPDO_TIMEOUT, since the detail of
+ * that code counts TPDO1s that the controller has missed. Pure. */
+uint32_t fault_drive_detail(uint16_t code, uint16_t statusword);
+
 #endif

@@ -75,7 +75,7 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
     }
     const struct fault *fault = &machine->fault;
     if (fault->node == node && code != EMCY_NO_ERROR && fault_is_vague(fault->code)) {
-        set_fault(machine, code, node, fault->detail);
+        set_fault(machine, code, node, fault_drive_detail(code, (uint16_t)fault->detail));
     }
 }
 
@@ -113,7 +113,8 @@ enum machine_refusal machine_reset(struct machine *machine)
 /* The fault again, with its reason as it is now. */
 static void step_not_reset(struct machine *machine, const struct axis *axis)
 {
-    set_fault(machine, machine_code_of(axis, EMCY_GENERIC), axis->node, axis->statusword);
+    const uint16_t code = machine_code_of(axis, EMCY_GENERIC);
+    set_fault(machine, code, axis->node, fault_drive_detail(code, axis->statusword));
     machine_switch_off(machine);
 }
 

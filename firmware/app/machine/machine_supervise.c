@@ -21,8 +21,10 @@ static uint16_t trouble_of(const struct axis *axis)
 static void supervise_axis(struct machine *machine, const struct axis *axis, uint32_t now_us)
 {
     const uint16_t trouble = trouble_of(axis);
-    const uint32_t detail =
-        trouble == FAULT_POSITION_DEVIATION ? axis_deviation_counts(axis) : axis->statusword;
+    const uint16_t code = machine_code_of(axis, trouble);
+    const uint32_t detail = trouble == FAULT_POSITION_DEVIATION
+                                ? axis_deviation_counts(axis)
+                                : fault_drive_detail(code, axis->statusword);
     if (machine->state == MACHINE_OFF && axis->tpdo1.lost) {
         if (axis_lost_for_long(axis, now_us)) {
             machine_enter_boot(machine);
@@ -30,7 +32,7 @@ static void supervise_axis(struct machine *machine, const struct axis *axis, uin
     } else if (axis->tpdo1.lost) {
         machine_raise(machine, EMCY_RPDO_TIMEOUT, axis->node, axis->tpdo1.absent_in_row);
     } else if (trouble != EMCY_NO_ERROR) {
-        machine_raise(machine, machine_code_of(axis, trouble), axis->node, detail);
+        machine_raise(machine, code, axis->node, detail);
     }
 }
 

@@ -20,8 +20,8 @@ static void raise_found(struct machine *machine)
     for (uint8_t i = 0; i < machine->config.axis_count; ++i) {
         const struct axis *axis = &machine->axes[i];
         if (axis_in_fault(axis)) {
-            machine_raise(machine, machine_code_of(axis, EMCY_GENERIC), axis->node,
-                          axis->statusword);
+            const uint16_t code = machine_code_of(axis, EMCY_GENERIC);
+            machine_raise(machine, code, axis->node, fault_drive_detail(code, axis->statusword));
             return;
         }
     }

@@ -141,6 +141,7 @@ def test_inputs_by_name() -> None:
 def test_details() -> None:
     assert detail_text(0xFF02, 0x0218) == "statusword 0x0218, fault"
     assert detail_text(0x8250, 3) == "3 positions missed in a row"
+    assert detail_text(0x8250, 0) == "the drive received no setpoints for setpoint_timeout_ms"
     assert detail_text(0x6100, 7) == "detail 0x7"
     assert detail_text(0x8130, 0) == ""
 

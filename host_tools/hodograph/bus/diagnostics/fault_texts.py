@@ -88,7 +88,7 @@ _SINGLE = {
     0x8250: (
         "expected PDOs were not received",
         "is the drive powered and connected? check the CAN cable and the bus load; "
-        "on a slow host raise answer_wait_ms in the machine file",
+        "on a slow host raise answer_wait_ms and setpoint_timeout_ms in the machine file",
     ),
     0x8311: ("torque above its limit", "look for a collision, lower feed or acceleration"),
     0x8480: ("speed out of bounds", "lower the feed, check the encoder"),
@@ -273,8 +273,10 @@ def fault_text(code: int) -> str:
     return fault_words(code).text
 
 
+_MISSED = 0x8250
+"""Reported by the controller with a count, and by a drive, with 0."""
 _COUNTS = {
-    0x8250: "positions missed in a row",
+    _MISSED: "positions missed in a row",
     0xFF07: "ticks in a row",
     0xFF08: "counts apart",
     0xFF09: "us",
@@ -286,6 +288,8 @@ _PLAIN = (0x6100, 0xFF10)
 
 def detail_text(code: int, detail: int) -> str:
     """The detail in object 0x2003 sub 3 as text, by the code of the controller; empty: none. Mostly a statusword."""
+    if code == _MISSED and not detail:
+        return "the drive received no setpoints for setpoint_timeout_ms"
     if code in _COUNTS:
         return f"{detail} {_COUNTS[code]}"
     if not detail:
