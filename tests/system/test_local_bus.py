@@ -19,6 +19,10 @@ HANGS_S = 600.0
 REAL_TIME_TRIES = 3
 LATE_S = 0.02
 """The host kept a thread that comes before the board's from its core for so long: twenty ticks of the board's."""
+WAITED_S = 0.3
+"""A thread of the board, or of what serves it, was ready to run for so long in all and had no core. A board whose main
+loop has no time for 1 s ends the motion.
+"""
 
 
 def in_the_loop(file: Path, link: str, *boards: str) -> subprocess.CompletedProcess[str]:
@@ -63,11 +67,12 @@ def test_alpha_over_slcan_in_real_time() -> None:
     for _ in range(REAL_TIME_TRIES):
         with Lateness() as host:
             done = in_the_loop(EXAMPLES / "alpha.toml", "slcan")
-        print(f"the host was late by {1000 * host.worst_s:.1f} ms at worst")
+        late = f"late by {1000 * host.worst_s:.1f} ms at worst; a thread waited for {host.waited_s:.2f} s for a core"
+        print(f"the host was {late}")
         if same_bits(done):
             return
-        assert host.worst_s > LATE_S, done.stderr + done.stdout
-    pytest.skip(f"the host was late by {1000 * host.worst_s:.0f} ms, in each of several runs")
+        assert host.worst_s > LATE_S or host.waited_s > WAITED_S, done.stderr + done.stdout
+    pytest.skip(f"the host was {late}, and as late in each of several runs")
 
 
 def test_a_bus_that_nobody_serves_is_said(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from typing import NoReturn
 import packages
 from vcan import broker, forward, kernel, registry, user_mode
 from vcan.client import Client
-from vcan.errors import BusUnavailable
+from vcan.errors import BusUnavailable, NameTaken
 from vcan.forward import Forward
 from vcan.registry import Bus
 
@@ -48,6 +48,8 @@ def main(arguments: list[str]) -> int:
     except BusUnavailable as error:
         print(f"with-vcan: {error}", file=sys.stderr)
         return _TROUBLE
+    except KeyboardInterrupt:  # before there is anything to end
+        return 128 + signal.SIGINT
 
 
 def _parse(arguments: list[str]) -> argparse.Namespace:
@@ -171,8 +173,7 @@ def _become(command: list[str]) -> NoReturn:
 
 
 def _open_namespace(options: argparse.Namespace) -> NoReturn:
-    bus = Bus(options.name or f"bus-{os.getpid()}", "namespace", os.getpid(), None, options.command)
-    lock = registry.create(bus)
+    lock = _locked(options)
     os.set_inheritable(
         lock, True
     )  # the bus is open as long as the command, or a child of it, lives
@@ -181,12 +182,29 @@ def _open_namespace(options: argparse.Namespace) -> NoReturn:
     _become_beside(options, listeners)
 
 
+def _locked(options: argparse.Namespace) -> int:
+    """The lock of a new bus. Several user-mode kernels share the host's folders and may have the same process number:
+    then a bus without a name of its own has a number more.
+    """
+    pid = os.getpid()
+    for name in (
+        [options.name]
+        if options.name
+        else [f"bus-{pid}", *(f"bus-{pid}-{k}" for k in range(2, 100))]
+    ):
+        with contextlib.suppress(NameTaken):
+            return registry.create(Bus(name, "namespace", pid, None, options.command))
+    raise NameTaken(f"a bus named {name} is open already; tools/with-vcan --list")
+
+
 def _open_user_mode(options: argparse.Namespace) -> int:
     listeners = forward.listen(options.forward)
     cpu = options.cpu if options.cpu is not None else _quietest_cpu()
     bus = Bus(options.name or f"bus-{os.getpid()}", "user-mode", os.getpid(), cpu, options.command)
     here, there = socket.socketpair()
     user_mode.adopt_orphans()
+    # First, since it receives the signals: none may end this process while the broker starts.
+    client = Client(here, options.command)
     process = subprocess.Popen(
         [
             sys.executable,
@@ -205,7 +223,7 @@ def _open_user_mode(options: argparse.Namespace) -> int:
     there.close()
     forward.through_broker(options.forward, listeners, bus.folder / "socket")
     try:
-        return Client(here, options.command).run()
+        return client.run()
     finally:
         # The broker ends everything inside and is the last to go.
         with contextlib.suppress(OSError):

@@ -18,7 +18,7 @@ import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from vcan.errors import BusUnavailable
+from vcan.errors import BusUnavailable, NameTaken
 
 TREE = Path(__file__).resolve().parents[2]
 """The source tree this file belongs to."""
@@ -60,9 +60,7 @@ def create(bus: Bus) -> int:
     try:
         bus.folder.mkdir(mode=0o700)
     except FileExistsError:
-        raise BusUnavailable(
-            f"a bus named {bus.name} is open already; tools/with-vcan --list"
-        ) from None
+        raise NameTaken(f"a bus named {bus.name} is open already; tools/with-vcan --list") from None
     lock = os.open(bus.folder / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     fcntl.flock(lock, fcntl.LOCK_EX)
     _write(bus.folder / "info.json", json.dumps(asdict(bus)))
