@@ -100,6 +100,23 @@ def test_the_same_bytes_with_any_process_stopped(scenario: str) -> None:
     assert len(stopped) >= 3  # hub, injector, drives, controller: those that lived for long enough
 
 
+def test_a_started_process_waits_for_the_one_that_started_it(
+    hub: LocalHub, clock: VirtualClock, tmp_path: Path
+) -> None:
+    """Both take part at the same instant. Which of them sends first must not depend on the computer."""
+    done = tmp_path / "done"
+    script = (
+        "import pathlib; from hodograph.bus.clock import hub_clock; "
+        f"hub_clock({hub.address.channel!r}); pathlib.Path({str(done)!r}).touch()"
+    )
+    child = Process("child", [sys.executable, "-c", script], clock)
+    time.sleep(0.5)  # in real time: enough for a process that does not wait
+    assert not done.exists()
+    clock.sleep(0.001)
+    assert clock.await_end("child", child.child) == 0
+    assert done.exists()
+
+
 @contextlib.contextmanager
 def one_core_only() -> Iterator[None]:
     """This process and all that it starts."""
