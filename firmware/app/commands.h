@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * commands: executes the commands of the operator, which are written to object 0x2001.
+ * commands: executes the commands of the operator, which are written to object 0x2001. Called by app/objects and
+ * app/controller.
  *
  * Main loop: objects.c calls commands_execute for each write of 0x2001, controller.c calls it at shut-down. While a
  * chunk is checked, controller.c calls commands_execute_urgent. Receive interrupt: controller.c calls

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * controller_state: the state of the controller, and the functions on it that several of its parts call (commands,
- * objects, report). app/controller.h begins it, runs it and shuts it down.
+ * objects, report). app/controller.h begins it, runs it and shuts it down. Used by firmware/app, except its folders.
  *
  * All functions: main loop.
  */

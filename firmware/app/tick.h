@@ -3,9 +3,9 @@
  * tick: all that the controller does in one period: SYNC, supervision of the drives, one step of the machine,
  * setpoints.
  *
- * The timer interrupt calls tick_run once a period, under the port's lock. tick.c contains the order on the bus and all
- * frames of a tick; states and faults are in app/machine. No other module sends SYNC or setpoints. Called by
- * app/controller.c.
+ * tick.c contains the order on the bus and all frames of a tick; states and faults are in app/machine. No other module
+ * sends SYNC or setpoints. Called by app/controller.c. Timer, once a period, under the port's lock; tick_init in the
+ * main loop.
  */
 #ifndef APP_TICK_H
 #define APP_TICK_H

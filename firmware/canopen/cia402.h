@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* cia402: states, controlword and statusword of the drive profile (CiA 402-2, finite state
- * automaton).
+/* cia402: states, controlword and statusword of the drive profile (CiA 402-2, finite state automaton). Used by
+ * firmware/app, firmware/canopen and sim/node.
  *
  * Names and codes that drive and controller share. The state machine of a drive is in cia402_device.h, the controlwords
  * that the controller sends are in cia402_master.h. Pure functions, any context.

@@ -2,8 +2,7 @@
 /* cob: identifiers of the predefined connection set (CiA 301, 7.3.3) and little-endian access to
  * frame bytes.
  *
- * Pure functions, any context.
- */
+ * Used by firmware/app, firmware/canopen and sim/node. Pure functions, any context. */
 #ifndef CANOPEN_COB_H
 #define CANOPEN_COB_H
 

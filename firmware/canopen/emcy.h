@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * emcy: emergency messages (CiA 301, 7.2.7), error register 0x1001 and error history 0x1003. The controller and each
- * simulated drive have a producer. The controller reads messages of drives with emcy_decode. No I/O: the caller sends.
+ * simulated drive have a producer. The controller reads messages of drives with emcy_decode. Used by firmware/app and
+ * sim/node. No I/O: the caller sends.
  *
  * All functions of one producer in one context: the main loop of the controller, the period of a simulated drive. The
  * functions without a producer are pure, any context.

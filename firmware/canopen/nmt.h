@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * nmt: network management (CiA 301, 7.2.8 and 7.3.2): the state machine of a slave, and the frames of the master's
- * commands. The controller is master and slave, each simulated drive a slave. No I/O: the caller sends.
+ * commands. The controller is master and slave, each simulated drive a slave. Used by firmware/app, canopen/heartbeat
+ * and sim/node. No I/O: the caller sends.
  *
  * A slave is used by the receive interrupt (nmt_slave_receive) and the main loop (all other functions); both may run at
  * any time, because the shared fields are single words. The other functions are pure, any context.

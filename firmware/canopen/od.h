@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
-/* od: an object dictionary, as a constant table of entries and one struct with the values.
+/* od: an object dictionary, as a constant table of entries and one struct with the values. Used by canopen/od_transfer,
+ * canopen/pdo_map, firmware/app and sim/node.
  *
  * tools/eds generates both from an EDS file: `struct od_<name>` with a named, typed field for each value, in the
  * processor's byte order, `od_<name>_defaults` and `od_<name>_table`. The application uses the fields directly. This
  * module finds entries, and moves values between the struct and the little-endian bytes of the bus. It makes the checks
- * of CiA 301: existence, access, size, limits of the EDS. Its callers are od_transfer, pdo_map and the application.
+ * of CiA 301: existence, access, size, limits of the EDS. 
  *
  *     static struct od_controller values;
  *     values = od_controller_defaults;

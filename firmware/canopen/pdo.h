@@ -4,8 +4,8 @@
  * `drive` is always the node id of the drive, on both sides. Decoding returns the drive's node id, or 0 when the frame
  * is not this PDO of a node, or PDO_ERR_SHORT when it is but has fewer bytes than the mapping (CiA 301: such a PDO is
  * not processed); longer ones are accepted, extra bytes ignored. Both directions are here, though the controller needs
- * one of each: the simulated drives of tests use the other, so that both sides share one definition. Pure functions,
- * any context. */
+ * one of each: the simulated drives of tests use the other, so that both sides share one definition. Used by
+ * firmware/app, and by the simulated drives of the tests. Pure functions, any context. */
 #ifndef CANOPEN_PDO_H
 #define CANOPEN_PDO_H
 

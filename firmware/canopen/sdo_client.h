@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* sdo_client: reads and writes objects of other nodes, expedited or segmented (CiA 301, 7.2.4). A state machine without
- * I/O: the controller's main loop gives it frames and time, and sends what it returns.
+ * I/O: the controller's main loop gives it frames and time, and sends what it returns. Used by app/drives.
  *
  *     sdo_client_write_number(&client, 2, 0x6060, 0, 8, 1, &out);      -> send out
  *     each frame:      if (sdo_client_receive(&client, &in, &out)) -> send out

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * sync: produces and consumes SYNC frames with a counter (CiA 301, 7.2.5; objects 0x1005, 0x1006, 0x1019). The tick of
- * the controller is the producer, each simulated drive a consumer. The caller decides when a SYNC is due. No I/O.
+ * the controller is the producer, each simulated drive a consumer. Used by app/tick and sim/node/sync_clock. The caller
+ * decides when a SYNC is due. No I/O; changes its struct only.
  */
 #ifndef CANOPEN_SYNC_H
 #define CANOPEN_SYNC_H

@@ -2,8 +2,8 @@
 /*
  * coefficients: coefficient records of a program for one kernel. The tick reads them in place, so it computes nothing
  * anew when it crosses the end of a segment or of a piece (docs/theory/numerics.md section 12, "Precomputed
- * coefficients"). Made by app/program_table, core/coefficient_cache and host tools; read by interpolator and program
- * clock.
+ * coefficients"). Used by firmware/app, firmware/core and host tools: app/program_table, core/coefficient_cache and
+ * host tools make the records, interpolator and program clock read them.
  *
  * The controller itself makes the records from a program that has passed program_check; they are never uploaded. They
  * hold native structs, so they are valid only for the binary that made them. Any context, if not stated otherwise.

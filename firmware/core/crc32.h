@@ -2,7 +2,7 @@
 /*
  * crc32: the CRC-32 of IEEE 802.3, for images, chunks and banks: polynomial 0xEDB88320 reflected, initial value and
  * final XOR 0xFFFFFFFF (the CRC of zlib, so `zlib.crc32` in Python gives the same). Source: docs/reference/protocol.md
- * 1.1. Pure functions, any context.
+ * 1.1. Used by firmware/app, core/chunk and core/program. Pure functions, any context.
  */
 #ifndef HODOGRAPH_CORE_CRC32_H
 #define HODOGRAPH_CORE_CRC32_H

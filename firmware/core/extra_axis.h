@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * extra_axis: extra axes (after x, y, z) of a spatial program, for the kernels fixed and float. The position of one is
- * a quintic in the curve parameter. Its coefficients are precomputed; the kernel evaluates it at the parameter that it
- * has found for an arc length. Ranges and error: docs/theory/numerics.md section 9, "Extra axes". Positions are in mm,
- * in degrees for a rotary axis. Pure; extra_axis_set in the main loop, the others in the tick.
+ * extra_axis: extra axes (after x, y, z) of a spatial program, for the kernels fixed and float. Used by
+ * core/kernel_fixed and core/kernel_float. The position of one is a quintic in the curve parameter. Its coefficients
+ * are precomputed; the kernel evaluates it at the parameter that it has found for an arc length. Ranges and error:
+ * docs/theory/numerics.md section 9, "Extra axes". Positions are in mm, in degrees for a rotary axis. Pure;
+ * extra_axis_set in the main loop, the others in the tick.
  */
 #ifndef HODOGRAPH_CORE_EXTRA_AXIS_H
 #define HODOGRAPH_CORE_EXTRA_AXIS_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * hodograph: the core, from a program image to one setpoint in each period. This header is its manual, and includes
- * what an application needs. Each function is described in the header that declares it.
+ * what an application needs. Each function is described in the header that declares it. Included by applications that
+ * take the core as a library.
  *
  * ## What to call, in this order
  *

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * kernel_double: the double kernel, IEEE double, the host's reference; docs/theory/numerics.md section 11. Only + - * /
- * and conversions, so with -ffp-contract=off its bits are the same on every IEEE host. Called through struct kernel
- * (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.
+ * and conversions, so with -ffp-contract=off its bits are the same on every IEEE host. Used by core/coefficients;
+ * called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the
+ * tick.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_DOUBLE_H
 #define HODOGRAPH_CORE_KERNEL_DOUBLE_H

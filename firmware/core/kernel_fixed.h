@@ -2,8 +2,8 @@
 /*
  * kernel_fixed: the fixed kernel, integers only, for targets without an FPU; the same bits everywhere. Derivation,
  * ranges and the error bound: docs/theory/numerics.md sections 9 and 12. Feed pieces are evaluated by
- * core/feed_piece.h. Called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop,
- * the others in the tick.
+ * core/feed_piece.h. Used by core/coefficients; called through struct kernel (core/kernel.h). Pure; the functions named
+ * *_set in the main loop, the others in the tick.
  *
  * "Normalised" is divided by 2^exponent of the segment, so that sigma lies in [1/8, 1). Polynomials
  * in z keep their coefficient k times 2^k, because a product of the upper halves with z in q31 is

@@ -5,8 +5,9 @@
  * no double, and converts only int32 to float and back. Derivation and error bound: docs/theory/numerics.md section 10.
  * Feed pieces are evaluated by core/feed_piece.h.
  *
- * Only + - * / are used, with -ffp-contract=off: the same bits on every target with IEEE single precision. Called
- * through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the tick.
+ * Only + - * / are used, with -ffp-contract=off: the same bits on every target with IEEE single precision. Used by
+ * core/coefficients; called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop,
+ * the others in the tick.
  */
 #ifndef HODOGRAPH_CORE_KERNEL_FLOAT_H
 #define HODOGRAPH_CORE_KERNEL_FLOAT_H

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program: reads the program image: its header, segments, feed pieces, stop table and events.
+ * program: reads the program image: its header, segments, feed pieces, stop table and events. Used by firmware/core,
+ * firmware/app, sim/offline and host tools.
  *
  * The format is docs/reference/protocol.md section 1: little-endian scaled integers at any alignment. The image is
  * never copied; it must stay unchanged as long as a struct program or a struct interpolator refers to it.
  * `program_open` checks what is needed to read without leaving the image (sizes, counts, CRC); `program_check`
  * (core/program_check.h) checks everything else, and has to pass before a program is interpolated.
  *
- * No heap, no globals; every function may be called from any context.
+ * No heap, no globals. Any context.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_H
 #define HODOGRAPH_CORE_PROGRAM_H

@@ -4,8 +4,8 @@
  * 1.4 and 1.8, and the limits of the controller. Used by app/program_slot, core/chunk and host tools.
  *
  * Integer arithmetic only, so every target and compiler refuses the same programs with the same code. Constant memory,
- * no recursion; about 10^3 to 10^4 instructions for each segment and piece. Call it from the main loop, not from an
- * interrupt. It reads the image and changes nothing but *fault.
+ * no recursion; about 10^3 to 10^4 instructions for each segment and piece. Main loop, never an interrupt. It reads the
+ * image and changes nothing but *fault.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_CHECK_H
 #define HODOGRAPH_CORE_PROGRAM_CHECK_H

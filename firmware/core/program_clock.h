@@ -8,7 +8,8 @@
  * q32 likewise, which the object dictionary shows. At another override the time is exact to 2^-62 s in each tick
  * (docs/theory/numerics.md section 12, "Feed override").
  *
- * Integers only, the same on every target. No heap; about 0.1 KiB. What a tick calls is inline here.
+ * Integers only, the same on every target. No heap; about 0.1 KiB. What a tick calls is inline here. Tick context, if
+ * not stated otherwise.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_CLOCK_H
 #define HODOGRAPH_CORE_PROGRAM_CLOCK_H

@@ -2,8 +2,8 @@
 /*
  * program_rules: what all parts of the program check share: the codes with which a program is refused (enum
  * program_error), the limits of the controller (struct program_limits), and the place of a fault (struct
- * program_fault). core/program_check.h checks a whole program. Plain data, any context; program_limits_attend: in the
- * check, main loop.
+ * program_fault). core/program_check.h checks a whole program. Used by firmware/core, firmware/app, sim/offline and
+ * host tools. Plain data, any context; program_limits_attend: in the check, main loop.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_RULES_H
 #define HODOGRAPH_CORE_PROGRAM_RULES_H

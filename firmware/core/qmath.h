@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * qmath: integer arithmetic shared by the core: counts of zeros, wide products, slow division.
+ * qmath: integer arithmetic shared by the core: counts of zeros, wide products, slow division. Used by firmware/core,
+ * app/machine/config and app/stream.
  *
  * Right shifts of negative numbers: C99 leaves them to the implementation. gcc, clang and every compiler we build with
  * shift arithmetically (floor); the typedef below stops the build where that is not so. The core relies on one more

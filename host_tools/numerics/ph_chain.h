@@ -2,8 +2,7 @@
 /*
  * ph_chain: chains of Pythagorean-hodograph quintic segments: places by arc length, and derivatives by arc length
  * there. The feed planner needs them at very many places. docs/theory/numerics.md 4.3 and 5.6,
- * docs/theory/spatial-splines.md
- * 2. Called through host_tools/hodograph/native.
+ * docs/theory/spatial-splines.md 2. Called by host_tools/hodograph/native.
  *
  * Double arithmetic without contraction: the same bits on every computer. No heap. The functions write the caller's
  * arrays only; any thread.

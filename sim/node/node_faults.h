@@ -3,8 +3,7 @@
  * (docs/reference/protocol.md section 4) on the drives of this process.
  *
  * Each rule is independent of the others. A fault lasts until its rule ends, also over a restart of the drive: a broken
- * encoder stays broken. Used by node/drives. Same context as drive_node_receive, between two frames.
- */
+ * encoder stays broken. Used by node/drives. All in one context, that of drive_node_receive, between two frames. */
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H
 

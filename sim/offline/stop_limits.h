@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stop_limits: the limits that a path stop keeps: those of the path file and the machine for a feed hold, those of the
- * machine for a fault stop. Data only; set by Python (host_tools/hodograph/native), used by the modules offline/stop_*.
+ * machine for a fault stop. Data only; set by Python (host_tools/hodograph/native). Used by offline/stop_path,
+ * offline/stop_search, offline/stop_usage and host tools.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_LIMITS_H
 #define HODOGRAPH_OFFLINE_STOP_LIMITS_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* drive_properties: values that a drive reported while it was configured: identity, modes, PDO mapping, position.
- * Written by drive_boot, read by homing, drive_polling and the objects 0x2027 ... Main loop. */
+/* drive_properties: values that a drive reported while it was configured: identity, modes, PDO mapping, position. Used
+ * by app/drives. Written by drive_boot, read by homing, drive_polling and the objects 0x2027 ... Main loop. */
 #ifndef APP_DRIVES_DRIVE_PROPERTIES_H
 #define APP_DRIVES_DRIVE_PROPERTIES_H
 

@@ -3,7 +3,7 @@
  * config: the configuration by the host as one value: objects 0x1006, 0x2004 ... 0x2007, 0x2012 ... 0x2016, 0x2018 ...
  * 0x201A, 0x201D ... 0x2023, 0x2030 ... 0x2035, 0x2051 ... 0x2053.
  *
- * Reads the dictionary and writes its results only. The main loop makes it; the tick works with a copy
+ * Used by firmware/app. Main loop: reads the dictionary and writes its results only. The tick works with a copy
  * (machine.config), which the main loop replaces under the port's lock at standstill.
  */
 #ifndef APP_MACHINE_CONFIG_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Plain data of
- * machine. */
+/* fault: codes of the faults that the controller raises, and the present one (0x2003 subs 1 to 3). Used by
+ * firmware/app. Plain data of machine, guarded by the port's lock; the functions are pure. */
 #ifndef APP_MACHINE_FAULT_H
 #define APP_MACHINE_FAULT_H
 

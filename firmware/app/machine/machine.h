@@ -8,8 +8,8 @@
  *           OFF -> HOMING -> OFF        any with drives on -> QUICK_STOP -> OFF
  *
  * The state changes in three places: requests (main loop, under the lock; machine_requests.c), the timer's functions
- * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). The port's lock guards the whole struct. Files
- * use each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
+ * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). Used by firmware/app. Guarded by the port's lock
+ * as a whole. Files use each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H

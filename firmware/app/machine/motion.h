@@ -3,8 +3,8 @@
  * motion: one run of a program. In each tick it computes the point on the path, from the program and the commands
  * (hold, stop, override), and the targets of the axes that follow the path.
  *
- * The main loop prepares it (app/commands.c) and hands it to the machine. Then it belongs to the tick (machine_tick.c),
- * under the port's lock.
+ * Used by firmware/app. Main loop: app/commands.c and app/stream.c prepare it and hand it to the machine. Then it
+ * belongs to the tick (machine_tick.c), under the port's lock.
  */
 #ifndef APP_MACHINE_MOTION_H
 #define APP_MACHINE_MOTION_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* statistics: counters of the tick: lateness, missed TPDOs, refused frames (object 0x2008). Written by the tick and by
- * machine_supervise.c, read by the main loop; all under the port's lock. */
+/* statistics: counters of the tick: lateness, missed TPDOs, refused frames (object 0x2008). Used by app/machine,
+ * app/tick and app/objects. Guarded by the port's lock: written by the tick and by machine_supervise.c, read by the
+ * main loop. */
 #ifndef APP_MACHINE_STATISTICS_H
 #define APP_MACHINE_STATISTICS_H
 

@@ -7,8 +7,8 @@
  * the SYNC that it belongs to. Otherwise it is missed. Missed frames are counted, late ones are not. All pending frames
  * of a lost drive are missed. A drive that becomes late by one SYNC and stays so gives one missed frame.
  *
- * Used by axis.c (receive) and machine_supervise.c (tick), under the port's lock. Times are port_time_us(), which
- * wraps.
+ * Used by axis.c and machine_supervise.c. Receive, timer and main loop, under the port's lock. Times are
+ * port_time_us(), which wraps.
  */
 #ifndef APP_MACHINE_TPDO_MONITOR_H
 #define APP_MACHINE_TPDO_MONITOR_H

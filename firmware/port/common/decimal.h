@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* decimal: an integer as text, for the console of a board without printf. Used by ports. Pure. */
+/* decimal: an integer as text, for the console of a board without printf. Used by the ports. Pure. */
 #ifndef PORT_COMMON_DECIMAL_H
 #define PORT_COMMON_DECIMAL_H
 

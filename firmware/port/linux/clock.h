@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * clock: the time of a process, for the Linux port and the programs of sim/. It is the monotonic clock of the system.
- * If the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time.
+ * If the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time. Used by port/linux
+ * and sim/.
  *
- * The state is one for the whole process. In virtual time one thread uses all functions, except clock_note_signal
+ * The state is one for the whole process. One thread uses all functions in virtual time, except clock_note_signal
  * (signal handlers). It sleeps in clock_poll() only: what it does between two calls takes no virtual time. SIGINT and
  * SIGTERM arrive while it sleeps there. A process that lets them arrive at other times reports each with
  * clock_note_signal(). In real time clock_ns and clock_poll may be called from any thread. Users define _GNU_SOURCE

@@ -6,8 +6,7 @@
  *     struct long_options line = long_options_begin(argc, argv, known, reason, sizeof reason);
  *     for (int option = long_options_next(&line); option > 0; option = long_options_next(&line)) ...
  *
- * getopt_long keeps its state in globals: one command line at a time, in one thread.
- */
+ * One thread, one command line at a time: getopt_long keeps its state in globals. */
 #ifndef PORT_LINUX_LONG_OPTIONS_H
 #define PORT_LINUX_LONG_OPTIONS_H
 

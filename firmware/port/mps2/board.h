@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What differs between the MPS2 boards (clock, UART): constants, which each linker script of firmware/targets sets as
- * addresses of symbols. Used by port/mps2 only, from any context. */
+ * addresses of symbols. Used by port/mps2 only. Any context. */
 #ifndef PORT_MPS2_BOARD_H
 #define PORT_MPS2_BOARD_H
 

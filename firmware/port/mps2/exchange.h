@@ -4,7 +4,7 @@
  * board, then a reply of the gateway, and so on. Little-endian, as both are; a message is one write of at most 4096
  * bytes, which a pipe takes as a whole. docs/guides/target.md has their order.
  *
- * Data, and pure functions for any context. Used by port/mps2/link_fifo and sim/gateway.
+ * Plain data, and pure functions for any context. Used by port/mps2/link_fifo and sim/gateway.
  */
 #ifndef PORT_MPS2_EXCHANGE_H
 #define PORT_MPS2_EXCHANGE_H

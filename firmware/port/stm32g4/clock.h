@@ -10,7 +10,7 @@
  * chip's maximum. Above 150 MHz the core's regulator has to be in range 1 boost mode, where the flash needs 4 wait
  * states (34 MHz each). Instruction cache, data cache and prefetch hide them most of the time.
  *
- * Used by port_stm32g4.c. It changes registers of RCC, PWR and FLASH only.
+ * Used by port_stm32g4.c. Main loop, once; changes registers of RCC, PWR and FLASH only.
  */
 #ifndef PORT_STM32G4_CLOCK_H
 #define PORT_STM32G4_CLOCK_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * reg: access to the registers and memories of the chip, for the files of this port only. Any context: reg_read,
- * reg_write and reg_memory are single accesses; the functions that read, change and write a register need the lock of
- * their caller.
+ * reg: access to the registers and memories of the chip, of port/stm32g4. Used by port/stm32g4 only. Any context:
+ * reg_read, reg_write and reg_memory are single accesses; the functions that read, change and write a register need the
+ * lock of their caller.
  *
  * On the chip each access is one load or store. On any other machine the tests replace the chip: they define
  * reg_read, reg_write and reg_memory as a model of the peripherals (tests/unit/stm32g4_*.c). The reg_*.h headers hold

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* reg_clock: registers of clocks, resets, supply and watchdog (RM0440 chapters 6, 7 and 42). Constants for reg.h. */
+/* reg_clock: registers of clocks, resets, supply and watchdog (RM0440 chapters 6, 7 and 42). Used by port/stm32g4 only.
+ * Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_CLOCK_H
 #define PORT_STM32G4_REG_CLOCK_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* reg_fdcan: registers of FDCAN1, and the fixed layout of its message RAM (RM0440 chapter 44). Constants for reg.h. */
+/* reg_fdcan: registers of FDCAN1, and the fixed layout of its message RAM (RM0440 chapter 44). Used by port/stm32g4
+ * only. Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_FDCAN_H
 #define PORT_STM32G4_REG_FDCAN_H
 

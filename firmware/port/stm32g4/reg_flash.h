@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* reg_flash: registers of the flash memory, category 3 device in dual-bank mode: 2 banks of 128 pages of 2 KB (RM0440
- * chapter 3). Constants for reg.h. */
+ * chapter 3). Used by port/stm32g4 only. Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_FLASH_H
 #define PORT_STM32G4_REG_FLASH_H
 

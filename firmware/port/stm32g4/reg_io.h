@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* reg_io: registers of pins, timers and the console's UART (RM0440 chapters 9, 29 and 38; alternate functions: data
- * sheet DS12288). Constants for reg.h. */
+ * sheet DS12288). Used by port/stm32g4 only. Constants for reg.h. */
 #ifndef PORT_STM32G4_REG_IO_H
 #define PORT_STM32G4_REG_IO_H
 

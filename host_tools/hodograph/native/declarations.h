@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* declarations: the part of the C side that Python uses (cffi API mode: the C compiler checks it against the real
- * headers and fills in each "..."). Read by build_native.py only. Meanings, units and contexts: the headers named here.
- * */
+ * headers and fills in each "..."). Read by build_native.py only. Declarations only. Meanings, units and contexts: the
+ * headers named here. */
 
 /* core/program.h, core/program_rules.h, core/program_check.h */
 struct program_header {
