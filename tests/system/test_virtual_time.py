@@ -115,6 +115,7 @@ def test_a_started_process_waits_for_the_one_that_started_it(
     clock.sleep(0.001)
     assert clock.await_end("child", child.child) == 0
     assert done.exists()
+    child.end()
 
 
 @contextlib.contextmanager
