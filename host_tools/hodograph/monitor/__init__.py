@@ -14,4 +14,7 @@ security     who may see, who may command
 server       HTTP and WebSocket
 session      a monitor from start to end
 page         the files for the browser
+
+Used by cli/monitor_command. Receives frames from the bus or reads a recording, reads and writes objects of the
+controller by SDO, and serves HTTP and WebSocket.
 """

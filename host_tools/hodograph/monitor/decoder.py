@@ -4,6 +4,8 @@
 `bus.capture.decode` requires a complete recording. This decoder continues if frames are missing: the value is NaN then.
 An answer may come after the next SYNC (docs/reference/protocol.md section 2), so the last SYNCs are kept for a few
 ticks, and of two answers between two SYNCs the first is the late one.
+
+Used by monitor/ and cli/monitor_command. No I/O.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ Feed, tangential acceleration and jerk are those of the setpoints: derivatives o
 polynomial fitted to a window of some 21 ms around each tick (Savitzky and Golay), since third differences of counts of
 1 nm would have noise of 4000 mm/s^3; after the fit it is about 2 mm/s^3. A setpoint k is compared with the reports of
 the drives for SYNC k+2 (docs/reference/protocol.md section 2).
+
+Used by monitor/ and cli/monitor_command. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Emergency frames as messages to the browsers: of many equal ones a few, with the number of the others."""
+"""Emergency frames as messages to the browsers: of many equal ones a few, with the number of the others. Used by
+monitor/pump. No I/O. Changes its own object only; one thread.
+"""
 
 from __future__ import annotations
 

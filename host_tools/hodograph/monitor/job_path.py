@@ -2,6 +2,8 @@
 """The contour error of a streamed job: its path is known from the chunks that have passed on the bus.
 
 The next chunk repeats the last part of a chunk's path, so each chunk is used up to the start of its successor.
+
+Used by monitor/pump. No I/O. Changes its own object only; one thread. A chunk is a part of a job (docs/glossary.md).
 """
 
 from __future__ import annotations

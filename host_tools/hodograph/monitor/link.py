@@ -4,6 +4,9 @@ between.
 
 A command does not wait until a state has been read: it is sent between two objects of it, and it breaks off the
 transfer of a program. In virtual time the thread is a participant, and its waits are counted in that time.
+
+Used by monitor/session. Reads and writes objects of the controller by SDO; a participant is a process on a bus in
+virtual time.
 """
 
 from __future__ import annotations

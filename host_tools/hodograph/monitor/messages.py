@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Messages to the browsers, as JSON: rows in groups that keep each peak, with few digits, null for missing values."""
+"""Messages to the browsers, as JSON: rows in groups that keep each peak, with few digits, null for missing values. Used
+by clients, pump and server. No I/O.
+"""
 
 from __future__ import annotations
 

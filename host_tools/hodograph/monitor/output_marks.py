@@ -4,6 +4,8 @@ setpoints passed these places.
 
 The times are those of the setpoints on the bus, not of the frames of the I/O module. A feed override or a hold shifts
 them; after a stop before a place it has no time.
+
+Used by monitor/pump. No I/O.
 """
 
 from __future__ import annotations

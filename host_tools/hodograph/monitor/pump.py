@@ -2,6 +2,9 @@
 """The thread that makes messages of frames, about 25 times a second at any bus load.
 
 The content of messages depends on the time stamps of the frames only; the clock of this computer only paces them.
+
+Used by link, session and cli/monitor_command. Takes frames from its source and gives messages to functions of the
+caller.
 """
 
 from __future__ import annotations

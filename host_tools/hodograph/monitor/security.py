@@ -4,6 +4,8 @@
 Three checks. The token, compared in constant time, makes a connection one that may command. The Host header must be a
 name of this computer, so that the name of a foreign site cannot point here (DNS rebinding). The Origin header must be
 this page, so that a foreign site cannot use the server through the browser (cross-site WebSockets).
+
+Used by server, session and cli/monitor_command. Reads the name of this computer and random bits of the system.
 """
 
 from __future__ import annotations

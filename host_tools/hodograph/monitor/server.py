@@ -2,6 +2,8 @@
 """The HTTP and WebSocket server of the live page: serves the page, sends it messages, takes its commands.
 
 Runs in the asyncio loop of session.py and does not access the bus: commands go to a function of the caller.
+
+Used by monitor/session. Reads the files of the page; receives and sends on sockets.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A monitor from start to end: bus or recording, page, commands."""
+"""A monitor from start to end: bus or recording, page, commands. Used by cli/monitor_command. Serves HTTP, starts the
+threads of pump.py and link.py, and handles SIGINT and SIGTERM.
+"""
 
 from __future__ import annotations
 

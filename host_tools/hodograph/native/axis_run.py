@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Runs one simulated axis along given setpoints, without rounding of its position (sim/offline/axis_run.h). Used by
-identify/.
+identify/. No I/O.
 """
 
 from __future__ import annotations

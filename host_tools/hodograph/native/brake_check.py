@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The proof that stops keep the limits of the axes, as the controller makes it (firmware/core/brake_check.h)."""
+"""The proof that stops keep the limits of the axes, as the controller makes it (firmware/core/brake_check.h). Used by
+machine_limits. No I/O.
+"""
 
 from __future__ import annotations
 

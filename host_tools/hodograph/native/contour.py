@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Distance from the exact curve of a program (sim/offline/contour.h, docs/theory/drives.md section 14)."""
+"""Distance from the exact curve of a program (sim/offline/contour.h, docs/theory/drives.md section 14). Used by
+simulate/, monitor/derived and faults/judge. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""One simulated axis (sim/plant/drive.h, docs/theory/drives.md section 13)."""
+"""One simulated axis (sim/plant/drive.h, docs/theory/drives.md section 13). Used by native/axis_run and native/offline.
+No I/O.
+"""
 
 from __future__ import annotations
 

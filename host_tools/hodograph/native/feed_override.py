@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The controller's motion under hold, resume, override, stop and fault stop (core/feed_override.h)."""
+"""The controller's motion under hold, resume, override, stop and fault stop (core/feed_override.h). Used by
+native/stream and stream/simulation. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Finds the compiled module; all other modules of this package use `library`."""
+"""Finds the compiled module; all other modules of this package use `library`. Loads the compiled
+module; no other I/O.
+"""
 
 from __future__ import annotations
 

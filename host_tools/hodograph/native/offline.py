@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The offline simulation: controller and axes in one process, without a bus (sim/offline/offline.h)."""
+"""The offline simulation: controller and axes in one process, without a bus (sim/offline/offline.h). Used by simulate/,
+campaign/ and tune/cases. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Locates places on a chain of PH segments by arc length, and computes derivatives there, in C
-(host_tools/numerics/ph_chain.h).
+(host_tools/numerics/ph_chain.h). Used by spline/. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Opens, checks and interpolates a program image with the controller's own code (firmware/core)."""
+"""Opens, checks and interpolates a program image with the controller's own code (firmware/core). Used by most modules
+of host_tools. No I/O.
+"""
 
 from __future__ import annotations
 

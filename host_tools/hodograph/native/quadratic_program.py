@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Quadratic programs along a chain of intervals, solved in C (host_tools/numerics/quadratic_program.h)."""
+"""Quadratic programs along a chain of intervals, solved in C (host_tools/numerics/quadratic_program.h). Used by
+feed/optimal/solver. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Moves points sideways within bounds, in C (sim/offline/smoothing.h). Used by toolpath/fit/smoothing."""
+"""Moves points sideways within bounds, in C (sim/offline/smoothing.h). Used by toolpath/fit/smoothing. No I/O."""
 
 from __future__ import annotations
 

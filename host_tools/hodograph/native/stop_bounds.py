@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Bounds of the stops of a program, as the controller computes them (firmware/core/stop_check.h)."""
+"""Bounds of the stops of a program, as the controller computes them (firmware/core/stop_check.h). Used by
+program/stop_planning. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Searches stop parameters ("numbers") in C (sim/offline/stop_search.h). Used by program/stop_planning and
-native/stop_trial.
+native/stop_trial. No I/O.
 """
 
 from __future__ import annotations

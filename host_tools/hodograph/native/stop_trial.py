@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Runs random sequences of commands that end in a stop, and compares them with limits and bounds
-(sim/offline/stop_trial.h).
+(sim/offline/stop_trial.h). Used by tests only. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Runs a job in chunks with the controller's code, without a bus (sim/offline/stream.h). Used by stream/simulation and
-tests.
+tests. No I/O. Changes its own object only; one thread.
 """
 
 from __future__ import annotations

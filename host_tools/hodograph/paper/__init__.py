@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compares the paper's printed numbers with computed ones: `hodograph paper`, docs/validation/paper.md."""
+"""Compares the paper's printed numbers with computed ones: `hodograph paper`, docs/validation/paper.md. Used by
+cli/report_commands and report/. Reads the examples.
+"""
 
 from .compare import compare, plain_plan
 from .dynamics import Dynamics, Maximum, constant_feed_dynamics

@@ -3,6 +3,8 @@
 
 The paper does not fully describe the servo loop of its contour errors. They are computed in two readings: one that fits
 all printed units, and one with a loop of 1 ms (docs/validation/paper.md, "Contour error").
+
+Used by cli/report_commands and report/. Reads the examples.
 """
 
 from __future__ import annotations

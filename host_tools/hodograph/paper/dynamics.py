@@ -4,6 +4,8 @@
 With the unit tangent T, curvature kappa and its slope kappa' along the arc,
 r_ss = i kappa T and r_sss = (i kappa' - kappa^2) T; at constant feed V, a = V^2 r_ss and j = V^3 r_sss.
 kappa comes from w: N / sigma^2 with N = 2 Im(conj(w) w'), sigma = |w|^2 (docs/theory/numerics.md section 4).
+
+Used by paper/compare. No I/O.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ The paper does not define it. This is a reading of paper section 6: with points 
 constant feed, the chord speed |r_{k+1} - r_k| / dt and its first and second differences over dt. Both would be zero on
 a straight line. On a curve they are not, even for an exact interpolator: a chord is shorter than its arc by kappa^2 (V
 dt)^3 / 24, so that the chord speed follows V^3 dt^2 kappa^2 / 24 (`chord_acceleration_mm_s2`).
+
+Used by paper/compare and report/path_figures. No I/O.
 """
 
 from __future__ import annotations

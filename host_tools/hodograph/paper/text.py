@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The comparison as a text table."""
+"""The comparison as a text table. Used by cli/report_commands and report/html. No I/O."""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@
 
 Independent of the C code on purpose: both check each program. Rules that are exact in the format (joints, ranges, sums)
 are checked in exact integers.
+
+Used by the modules that make, read or send programs. No I/O.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ docs/theory/feed.md section 7.
 
 Computed in floating point, without the rounding up of the controller's integers (firmware/core/stop_check.c). A bound
 that the controller accepts is never below the one computed here, and at most about 20 us above it.
+
+Used by check, stop_planning and stop_reserve. No I/O.
 """
 
 from __future__ import annotations

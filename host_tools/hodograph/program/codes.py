@@ -2,6 +2,8 @@
 """Reasons for refusing a program: the codes of the controller, with its names and numbers.
 
 The same table as `enum program_error` in firmware/core/program_rules.h (a test compares them).
+
+Used by program/, stream/chunks, bus/sdo/upload and pipeline. No I/O.
 """
 
 from __future__ import annotations

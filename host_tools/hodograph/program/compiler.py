@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From a spline and a feed plan to a program; docs/theory/numerics.md section 8."""
+"""From a spline and a feed plan to a program; docs/theory/numerics.md section 8. Used by the modules that compile
+programs. No I/O.
+"""
 
 from __future__ import annotations
 

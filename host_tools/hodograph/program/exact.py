@@ -3,6 +3,8 @@
 
 The curve and the feed exactly as docs/reference/protocol.md 1.2 and 1.3 define them. For tests of the kernels; slow
 on purpose (about 1 ms a point).
+
+Used by tests only. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A spline as the integer segments of a program, in exact integer arithmetic; docs/theory/numerics.md section 8."""
+"""A spline as the integer segments of a program, in exact integer arithmetic; docs/theory/numerics.md section 8. Used
+by program/, stream/geometry and section_pipeline. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A program as text and as plain numbers: `hodograph inspect`."""
+"""A program as text and as plain numbers: `hodograph inspect`. Used by cli/ and stream/paths. No I/O."""
 
 from __future__ import annotations
 

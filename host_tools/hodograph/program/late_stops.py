@@ -4,6 +4,8 @@ docs/theory/toolpath-fitting.md section 8.
 
 With profile "optimal" more of the limits is left free first: around places at which stops may then begin, or
 everywhere. If that is not enough, and with the other profiles, the feed is lowered step by step. Used by pipeline.py.
+
+No I/O.
 """
 
 from __future__ import annotations

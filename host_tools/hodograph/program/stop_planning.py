@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Plans the stops of a program: stop parameters and stop time bounds; docs/theory/feed.md section 7. In this module
-"numbers" are stop parameters.
+"numbers" are stop parameters. Used by most modules of host_tools that plan a motion. No I/O.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ docs/theory/toolpath-fitting.md section 8. Used by late_stops.py.
 If a plan uses the axis limits fully all along a winding path, no brake may begin. Short stretches with a reserve, some
 tenths of a second apart, cost little and bound the stop delay. The feed override may not use the reserve
 (feed/override.py).
+
+No I/O.
 """
 
 from __future__ import annotations

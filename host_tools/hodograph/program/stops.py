@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The stop table of a program: stop parameters and stop time bounds of each feed piece; docs/reference/protocol.md
-1.4.
+"""The stop table of a program: stop parameters and stop time bounds of each feed piece; docs/reference/protocol.md 1.4.
+Used by program/, stream/, machine_limits and cli/path_commands. No I/O.
 """
 
 from __future__ import annotations

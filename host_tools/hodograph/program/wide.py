@@ -4,6 +4,8 @@
 For sums of products of q44 numbers (docs/theory/numerics.md section 8). Products are taken of halves of 26 bits, whose
 weighted sums stay within 64 bits as long as the factors are below 2^50 in magnitude. The caller ensures this; beyond it
 results are wrong.
+
+Used by program/check and program/geometry. No I/O.
 """
 
 from __future__ import annotations

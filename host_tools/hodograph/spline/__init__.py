@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths."""
+"""C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths. Used by most modules of host_tools. No
+I/O.
+"""
 
 from .build import SplineResult, from_control_polygon, line, through_points
 from .curve import PHSpline, coordinates

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Arc length of a chain of PH segments, and its inverse; docs/theory/numerics.md 4.1, 4.3."""
+"""Arc length of a chain of PH segments, and its inverse; docs/theory/numerics.md 4.1, 4.3. Used by curve, frames and
+spatial/curve. No I/O.
+"""
 
 from __future__ import annotations
 

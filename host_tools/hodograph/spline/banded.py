@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Complex tridiagonal systems, plain and cyclic, in linear time (LAPACK zgtsv)."""
+"""Complex tridiagonal systems, plain and cyclic, in linear time (LAPACK zgtsv). Used by spline/. No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The curve: a chain of PH quintic segments, evaluated exactly; docs/theory/numerics.md section 4."""
+"""The curve: a chain of PH quintic segments, evaluated exactly; docs/theory/numerics.md section 4. Used by most modules
+of host_tools. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Paths through given points: end conditions and guiding cubic spline; docs/theory/numerics.md 2.2."""
+"""Paths through given points: end conditions and guiding cubic spline; docs/theory/numerics.md 2.2. Used by spline/,
+config/path_file and schemas/path_file. No I/O.
+"""
 
 from __future__ import annotations
 

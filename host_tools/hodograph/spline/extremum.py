@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Greatest curvature of PH quintic segments, at the true extremum; docs/theory/numerics.md 4.4."""
+"""Greatest curvature of PH quintic segments, at the true extremum; docs/theory/numerics.md 4.4. Used by spline/. No
+I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/feed.md 5.6."""
+"""Derivatives of a curve by arc length, for each axis, in the plane or in space; docs/theory/feed.md 5.6. Used by most
+modules of host_tools. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 
 With uniform knots, as in the paper, each span has parameter length 1. A short span next to a long one is then passed
 slowly, and the curve overshoots. Parameter lengths equal to the chords keep the parametric speed even.
+
+Used by spline/, config/path_file and schemas/path_file. No I/O.
 """
 
 from __future__ import annotations

@@ -5,6 +5,8 @@ Where the guide nearly stops, rounding decides the branch of the continuous squa
 a - 2 pi. The two choices differ in the sign of all z after that place, and their influence decays within a few spans.
 So each sharply turning span is solved again on a window around it, with the sign changed before it or after it. The
 choice with the least bending energy is kept.
+
+No I/O.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 """Newton-Raphson on an interpolation system, in the plane or in space, and continuation where it does not converge.
 
 docs/theory/numerics.md sections 2.3 (the iteration, when it stops) and 3.4 (continuation).
+
+Used by spline/. No I/O.
 """
 
 from __future__ import annotations

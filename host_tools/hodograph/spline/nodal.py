@@ -4,6 +4,8 @@
 The guiding curve is the cubic B-spline of the control polygon (paper section 1; docs/theory/numerics.md
 section 1) or, for given through points, the uniform C2 cubic spline through them. Its hodograph is
 handed on as Bernstein coefficients (M, 3) per span.
+
+Used by spline/. No I/O.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@ loops.py, solve.py and verdict.py.
 
 The spline has the hodograph w^2 with a quadratic w; the guide curve has a plain quadratic hodograph. `Shape` handles
 both: it takes the quadratic and its power.
+
+No I/O.
 """
 
 from __future__ import annotations

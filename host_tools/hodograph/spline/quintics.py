@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Parts of quintics in Bezier form, which are the extra axes of a path, in the parameter of its segments. Pure
-functions.
+functions. Used by spline/splitting and stream/geometry. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From starting values to an accepted solution, or PlanError; docs/theory/numerics.md section 3."""
+"""From starting values to an accepted solution, or PlanError; docs/theory/numerics.md section 3. Used by spline/build.
+No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Parts of segments: halves them until they fit the program format (docs/theory/numerics.md 4.5), or cuts them at
-places. Used by spline/, stream/geometry and toolpath/fit/turning.
+places. Used by spline/, stream/geometry and toolpath/fit/turning. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Starting values: continuous square root of the guide's hodograph; docs/theory/numerics.md 3.1."""
+"""Starting values: continuous square root of the guide's hodograph; docs/theory/numerics.md 3.1. Used by spline/build.
+No I/O.
+"""
 
 from __future__ import annotations
 

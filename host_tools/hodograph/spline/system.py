@@ -8,6 +8,8 @@ linearly:
     closed  z_0 = e z_M,  z_(M+1) = e z_1,  e = +1 or -1
 
 Spans have parameter length 1, as in the paper, or lengths of their own (`knots`): docs/theory/spatial-splines.md 1.
+
+Used by spline/. No I/O.
 """
 
 from __future__ import annotations

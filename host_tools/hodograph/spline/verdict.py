@@ -3,6 +3,8 @@
 
 Used by spline/solve.py for each solution that it finds, and by spatial/quality.py. Pure functions.
 docs/theory/numerics.md 3.5.
+
+No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Compares the motion of a program with its limits; `hodograph verify`. The package shares the types of limits and
-peaks with the planner, but no computation.
+peaks with the planner, but no computation. Used by cli/verify_command. No I/O.
 """
 
 from .setpoints import BusNoise, Sampled, bus_noise, sampled

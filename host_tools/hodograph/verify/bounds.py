@@ -5,6 +5,8 @@ Between two samples at a distance h, a function with |q''| <= M is at most M h^2
 such bounds turn samples into statements about every instant; docs/theory/proofs.md 16. They come from Taylor series
 with majorants: coefficients that bound those of the true series at every instant of the cell. Sums and products of
 majorants are majorants, and so is 1 / sigma with the recursion of the quotient taken in absolute values.
+
+Used by verify/peaks. No I/O.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 """The motion of a program cut into cells: stretches of time within one feed piece and one segment.
 
 Within a cell the arc length is one polynomial in time, and the curve one polynomial in its parameter.
+
+Used by verify/. No I/O.
 """
 
 from __future__ import annotations

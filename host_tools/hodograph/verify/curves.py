@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The segments of a program in powers of their parameter xi, in the plane and in space;
-docs/reference/protocol.md 1.2."""
+"""The segments of a program in powers of their parameter xi, in the plane and in space; docs/reference/protocol.md 1.2.
+Used by verify/cells and verify/instants. No I/O.
+"""
 
 from __future__ import annotations
 

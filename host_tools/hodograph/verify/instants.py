@@ -12,6 +12,8 @@ kappa = N / sigma^2, and with kappa_s its slope along the arc
     jerk  F''' r_s + 3 F' F'' r_ss + F'^3 r_sss
 
 In space xi(t) follows from sigma(xi) xi' = F' by differentiation, and the axes from their polynomials in xi.
+
+Used by verify/. No I/O.
 """
 
 from __future__ import annotations

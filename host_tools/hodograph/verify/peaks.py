@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Greatest magnitudes of all quantities, by samples close enough for a certain bound; docs/theory/proofs.md 16."""
+"""Greatest magnitudes of all quantities, by samples close enough for a certain bound; docs/theory/proofs.md 16. Used by
+verify/verification. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@
 Arrays of coefficients are (C, n + 1): ascending powers, one polynomial in each row; real, or complex where only
 magnitudes count. A polynomial lies between its least and its greatest Bernstein coefficient (Farouki 2012, section 3),
 so the bounds here are certain up to rounding.
+
+Used by verify/. No I/O.
 """
 
 from __future__ import annotations

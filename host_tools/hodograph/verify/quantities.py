@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The limited quantities of a motion (feed, axis jerks, volts …), each as a function of the motion, with its limit in
-each cell.
+each cell. Used by verify/peaks and verify/verification. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Differences of the setpoints that each kernel makes, before they are rounded to counts: the motion that drives
-get.
+"""Differences of the setpoints that each kernel makes, before they are rounded to counts: the motion that drives get.
+Used by cli/verify_command. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Checks a program against the limits of its path file: peaks, and each place beyond a limit;
-docs/theory/proofs.md 16."""
+"""Checks a program against the limits of its path file: peaks, and each place beyond a limit; docs/theory/proofs.md 16.
+Used by cli/verify_command. No I/O.
+"""
 
 from __future__ import annotations
 

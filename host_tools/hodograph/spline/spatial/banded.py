@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Block tridiagonal systems of 3 x 3 blocks, plain and closed to a ring, in linear time (LAPACK gbsv)."""
+"""Block tridiagonal systems of 3 x 3 blocks, plain and closed to a ring, in linear time (LAPACK gbsv). Used by
+spatial/system. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The curve in space: a chain of PH quintic segments, evaluated exactly; docs/theory/spatial-splines.md 2."""
+"""The curve in space: a chain of PH quintic segments, evaluated exactly; docs/theory/spatial-splines.md 2. Used by most
+modules of host_tools. No I/O.
+"""
 
 from __future__ import annotations
 

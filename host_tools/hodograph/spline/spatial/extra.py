@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Extra axes of a path in space: C2 quintics in the parameter of its segments; docs/theory/spatial-splines.md 8."""
+"""Extra axes of a path in space: C2 quintics in the parameter of its segments; docs/theory/spatial-splines.md 8. Used
+by spatial/build, pipeline and fit/turning. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 """The frame of a guide curve: roots of its hodograph without twist between spans; docs/theory/spatial-splines.md 3.
 
 It fixes the freedom that interpolation leaves, and gives the starting values of Newton's method.
+
+Used by spatial/build. No I/O.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 """Guide curves in space: the cubic B-spline of a control polygon, or the C2 cubic spline through points.
 
 Both are linear in the points, so they are the planar ones of x + iy and of z; docs/theory/spatial-splines.md 5.
+
+Used by spatial/build. No I/O.
 """
 
 from __future__ import annotations

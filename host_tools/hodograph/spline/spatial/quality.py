@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Quality of a solution in space: turning and bending compared with the guide; docs/theory/spatial-splines.md 5."""
+"""Quality of a solution in space: turning and bending compared with the guide; docs/theory/spatial-splines.md 5. Used
+by spatial/build. No I/O.
+"""
 
 from __future__ import annotations
 

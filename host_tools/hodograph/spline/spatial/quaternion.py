@@ -3,6 +3,8 @@
 
 A quaternion A = u + v i + p j + q k is an array (…, 4) of u, v, p, q; a vector is (…, 3). A and its turns in the fibre,
 A e^(i phi), have the same image.
+
+Used by spline/spatial, program/check and fit/chain. No I/O.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@ not turn in its fibre against R_i. The two values beyond the ends follow linearl
 
     open    Z_0 = a Z_1 + b Z_2 + c     and the same, mirrored, at the end
     closed  Z_0 = Z_M e^(-i phase),  Z_(M+1) = Z_1 e^(i phase)
+
+Used by spatial/build. No I/O.
 """
 
 from __future__ import annotations
