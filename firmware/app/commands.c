@@ -156,28 +156,26 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
 }
 
-/* The permission to start without homing is valid for one attempt. */
 static enum machine_refusal attempt_start(struct controller *controller, enum command command)
 {
-    enum machine_refusal refusal = stream_is_open(&controller->stream)
-                                       ? job_refusal(controller, command)
-                                       : program_refusal(controller);
-    if (refusal == MACHINE_ACCEPTED) {
-        refusal = dispatch(controller, command);
-    }
-    controller->values.start_without_homing.allowed = 0;
-    return refusal;
+    const enum machine_refusal refusal = stream_is_open(&controller->stream)
+                                             ? job_refusal(controller, command)
+                                             : program_refusal(controller);
+    return refusal == MACHINE_ACCEPTED ? dispatch(controller, command) : refusal;
 }
 
 static enum machine_refusal execute(struct controller *controller, enum command command)
 {
-    const enum machine_refusal refusal =
+    enum machine_refusal refusal =
         begins_something(command) ? controller_refusal(controller) : MACHINE_ACCEPTED;
-    if (refusal != MACHINE_ACCEPTED) {
-        return refusal;
+    if (refusal == MACHINE_ACCEPTED) {
+        refusal = starts_program(command) ? attempt_start(controller, command)
+                                          : dispatch(controller, command);
     }
-    return starts_program(command) ? attempt_start(controller, command)
-                                   : dispatch(controller, command);
+    if (starts_program(command)) { /* the permission is valid for one attempt, also a refused one */
+        controller->values.start_without_homing.allowed = 0;
+    }
+    return refusal;
 }
 
 bool command_urgent_request(const struct can_msg *frame, uint8_t node)

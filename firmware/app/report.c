@@ -14,7 +14,7 @@ static void tell_fault(struct controller *controller, const struct fault *fault)
     emcy_producer_raise(&controller->emcy, fault->code, EMCY_REGISTER_PROFILE, detail);
     port_log(PORT_WARNING, "fault at node", fault->node);
     port_log(PORT_WARNING, fault_text(fault->code), (int32_t)fault->detail);
-    if (fault->code == FAULT_NOT_SENT) {
+    if (fault->code == FAULT_NOT_SENT && fault->node == 0u) {
         nmt_slave_error(&controller->nmt, controller->values.error_behaviour[0]);
     }
 }

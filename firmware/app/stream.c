@@ -38,12 +38,14 @@ void stream_init(struct stream *stream)
 
 int stream_begin(struct stream *stream, uint32_t size)
 {
-    uint32_t room;
+    uint32_t room = 0;
     stream_abandon(stream);
     if (size > stream->ring.size) {
         return PROGRAM_ERR_ROOM;
     }
-    stream->receiving = chunk_ring_take(&stream->ring, HEAD_SIZE + size, &room);
+    /* A chunk whose size is not stated gets all the room that 0x2060 sub 7 reports. */
+    const uint32_t least = size == 0u ? chunk_ring_room(&stream->ring) : HEAD_SIZE + size;
+    stream->receiving = least < HEAD_SIZE ? NULL : chunk_ring_take(&stream->ring, least, &room);
     if (stream->receiving == NULL) {
         return PROGRAM_ERR_ROOM;
     }

@@ -411,6 +411,17 @@ static void test_the_drives_own_code_replaces_a_vague_one_only(void)
     TEST_ASSERT_EQUAL_HEX16(FAULT_DROPPED_OUT, app_bench_read(&bench, 0x1003, 2) & 0xFFFF);
 }
 
+/* 0xFFxx of a drive is the manufacturer's own: as a fault of the controller the same number means something else. */
+static void test_a_manufacturers_code_replaces_none(void)
+{
+    run_some(100);
+    (void)cia402_device_quick_stop(&drive(0)->state);
+    app_bench_periods(&bench, 2);
+    emergency_of(2, FAULT_NOT_SENT);
+    expect_fault(FAULT_DROPPED_OUT, 2);
+    TEST_ASSERT_EQUAL_HEX16(FAULT_NOT_SENT, app_bench_read(&bench, 0x200C, 1));
+}
+
 /* Both the controller and a drive report 0x8250: the detail counts missed TPDO1s, so a drive's statusword is none. */
 static void test_a_drive_that_misses_its_setpoints_reports_no_count(void)
 {
@@ -1151,6 +1162,7 @@ int main(void)
     RUN_TEST(test_internal_limit_is_a_warning);
     RUN_TEST(test_a_drive_that_never_follows_is_not_ready);
     RUN_TEST(test_the_drives_own_code_replaces_a_vague_one_only);
+    RUN_TEST(test_a_manufacturers_code_replaces_none);
     RUN_TEST(test_a_drive_that_misses_its_setpoints_reports_no_count);
     RUN_TEST(test_enabling_begins_where_the_axis_is);
     RUN_TEST(test_after_a_lost_drive_enabling_begins_where_it_is_then);

@@ -133,6 +133,16 @@ static void test_a_refused_start_ends_the_permission(void)
     expect_not_homed(COMMAND_START);
 }
 
+static void test_a_start_while_the_controller_ends_takes_the_permission_too(void)
+{
+    switch_on();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2055, 1, 1, 1));
+    bench.controller.ending = true;
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_START));
+    TEST_ASSERT_EQUAL_INT64(MACHINE_ENDING, app_bench_read(&bench, 0x2003, 4));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2055, 1));
+}
+
 /* --- what keeps it --- */
 
 static void test_a_fault_reset_keeps_it(void)
@@ -377,6 +387,7 @@ int main(void)
     RUN_TEST(test_a_start_needs_homed_axes);
     RUN_TEST(test_unhomed_is_for_one_command);
     RUN_TEST(test_a_refused_start_ends_the_permission);
+    RUN_TEST(test_a_start_while_the_controller_ends_takes_the_permission_too);
     RUN_TEST(test_a_fault_reset_keeps_it);
     RUN_TEST(test_an_axis_that_is_pushed_while_it_is_heard_keeps_it);
     RUN_TEST(test_an_interrupted_homing_affects_only_the_axis_under_way);

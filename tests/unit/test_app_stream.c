@@ -1068,6 +1068,25 @@ static void test_a_small_ring(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_MEMORY, app_bench_chunk(&bench, bytes, SMALL_RING));
 }
 
+/* 0x2060 sub 7 reports the larger of two rooms: a chunk without a stated size must not get the other one. */
+static void test_a_chunk_of_unknown_size_gets_the_larger_room(void)
+{
+    struct stream *stream = &bench.controller.stream;
+    uint32_t size;
+    chunk_ring_clear(&stream->ring);
+    TEST_ASSERT_NOT_NULL(chunk_ring_take(&stream->ring, 1, &size));
+    chunk_ring_trim(&stream->ring, size / 2u);
+    const uint8_t *second = chunk_ring_take(&stream->ring, 1, &size);
+    TEST_ASSERT_NOT_NULL(second);
+    chunk_ring_trim(&stream->ring, size - 256u);
+    chunk_ring_free_oldest(&stream->ring, second);
+    const uint32_t free_bytes = stream_free_bytes(stream);
+    TEST_ASSERT_GREATER_THAN_UINT32(256, free_bytes);
+    TEST_ASSERT_EQUAL_INT(0, stream_begin(stream, 0));
+    TEST_ASSERT_EQUAL_UINT32(free_bytes, stream->receiving_bytes);
+    stream_abandon(stream);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -1109,5 +1128,6 @@ int main(void)
     RUN_TEST(test_a_rest_after_a_tail);
     RUN_TEST(test_override_over_a_rest);
     RUN_TEST(test_a_small_ring);
+    RUN_TEST(test_a_chunk_of_unknown_size_gets_the_larger_room);
     return UNITY_END();
 }

@@ -43,6 +43,11 @@ bool fault_is_vague(uint16_t code)
     return code == EMCY_GENERIC || code == FAULT_DROPPED_OUT || code == FAULT_NOT_FOLLOWING;
 }
 
+bool fault_is_drives(uint16_t code)
+{
+    return code != EMCY_NO_ERROR && code < EMCY_MANUFACTURER;
+}
+
 uint32_t fault_drive_detail(uint16_t code, uint16_t statusword)
 {
     return code == EMCY_RPDO_TIMEOUT ? 0u : statusword;

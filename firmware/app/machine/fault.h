@@ -42,6 +42,10 @@ const char *fault_text(uint16_t code);
  * Pure. */
 bool fault_is_vague(uint16_t code);
 
+/* Whether a drive's own emergency code may stand for a fault: not those of the manufacturer (0xFFxx), since the same
+ * numbers are faults of this controller. They stay readable in 0x200C and 0x1003. Pure. */
+bool fault_is_drives(uint16_t code);
+
 /* The detail of a fault of this code that a drive reports: its statusword. 0 for EMCY_RPDO_TIMEOUT, since the detail of
  * that code counts TPDO1s that the controller has missed. Pure. */
 uint32_t fault_drive_detail(uint16_t code, uint16_t statusword);

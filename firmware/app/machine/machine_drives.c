@@ -64,5 +64,5 @@ const struct axis *machine_late_drive(const struct machine *machine)
 
 uint16_t machine_code_of(const struct axis *axis, uint16_t code)
 {
-    return axis->error_code != EMCY_NO_ERROR && fault_is_vague(code) ? axis->error_code : code;
+    return fault_is_drives(axis->error_code) && fault_is_vague(code) ? axis->error_code : code;
 }

@@ -74,7 +74,7 @@ void machine_note_emergency(struct machine *machine, uint8_t node, uint16_t code
         axis->homed = false;
     }
     const struct fault *fault = &machine->fault;
-    if (fault->node == node && code != EMCY_NO_ERROR && fault_is_vague(fault->code)) {
+    if (fault->node == node && fault_is_drives(code) && fault_is_vague(fault->code)) {
         set_fault(machine, code, node, fault_drive_detail(code, (uint16_t)fault->detail));
     }
 }
