@@ -21,8 +21,9 @@ from commands import Command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import END_S
+from hodograph.bus.sdo import actions
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING, Controller, connect
-from hodograph.bus.sdo.objects import PROGRAM_MEMORY
+from hodograph.bus.sdo.objects import HOLD, PROGRAM_MEMORY
 from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError
 from hodograph.pipeline import load_pipeline
@@ -221,6 +222,32 @@ def test_a_goto_that_another_command_stops_is_not_said_to_have_arrived(
         assert (child.wait(LIMIT_S), child.out) == (6, ""), child.err
         assert "the move was stopped on its way, the axes rest at x " in child.err.splitlines()[-1]
     assert 0 < controller.targets(1)[0] < 100_000_000
+
+
+@pytest.mark.parametrize(
+    "command", [("goto", str(ALPHA), "--to", "100", "0"), ("start", "--follow")]
+)
+def test_a_command_ends_when_a_quick_stop_switches_the_drives_off(
+    controller: Controller, slow_file: Path, clock: VirtualClock, command: tuple[str, ...]
+) -> None:
+    if command[0] == "start":
+        assert main(["goto", str(slow_file)]) == 0
+    with running(clock, *command) as child:
+        controller.wait_for((RUNNING,), LIMIT_S)
+        clock.sleep(0.2)
+        assert main(["quick-stop"]) == 0
+        assert (child.wait(LIMIT_S), child.out) == (6, ""), child.err
+        assert "the drives were switched off on the way" in child.err.splitlines()[-1]
+
+
+def test_a_hold_ends_when_a_quick_stop_switches_the_drives_off(
+    controller: Controller, slow_file: Path
+) -> None:
+    assert main(["goto", str(slow_file)]) == 0
+    assert main(["start"]) == 0
+    controller.command(HOLD)
+    assert main(["quick-stop"]) == 0
+    assert not actions.hold_reached(controller, 5.0)
 
 
 def test_configuration_is_refused_while_moving(

@@ -13,7 +13,7 @@ from ..bus.hub import LocalHub
 from ..bus.own_bus import bus_address
 from ..bus.run import BusRun, RunSession, run_program, run_session
 from ..bus.sdo import actions
-from ..bus.sdo.controller import BOOT, DISABLE, HOLD, OFF, READY, RESUME
+from ..bus.sdo.controller import BOOT, DISABLE, HOLD, OFF, RESUME
 from ..bus.sdo.status import read_status
 from ..bustime import require_fit
 from ..errors import InputError
@@ -105,8 +105,11 @@ class Controller:
         self._node.start(from_mm=from_mm, unhomed=unhomed)
 
     def wait(self, wait_s: float = math.inf) -> None:
-        """Returns when the program has ended, or has been stopped."""
-        self._node.wait_for((READY,), wait_s)
+        """Returns when the program has ended, or has been stopped.
+
+        Raises RunError for a fault, and if the drives are off.
+        """
+        self._node.wait_for_end(wait_s)
 
     def hold(self, wait_s: float = math.inf) -> bool:
         """Feed hold: waits for the standstill on the path; False: the program had ended before."""

@@ -19,7 +19,7 @@ from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
 from .sdo.controller import Controller
-from .sdo.objects import OVERRIDE, READY
+from .sdo.objects import OVERRIDE
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
@@ -136,7 +136,7 @@ def goto(
 
     The drives have to be on (state ready). Each move replaces the loaded program. `unhomed`: also if axes with a homing
     method are not homed. Raises RefusedError: the feed override is 0. Raises RunError: another command has stopped the
-    axes.
+    axes or switched the drives off.
     """
     axes = machine.path_axes
     for axis, counts in zip(axes, end_counts, strict=False):
@@ -163,7 +163,7 @@ def goto(
     for a, b in moves:
         controller.upload(line_image(a, b, machine))
         controller.start(unhomed=unhomed)
-        controller.wait_for((READY,), math.inf, tick)
+        controller.wait_for_end(tick=tick)
         _require_arrival(controller, machine, b)
         distance_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])
     return distance_mm

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from .capture.recorder import Recorder
 from .capture.recordings import write_recording
 from .goto import goto
 from .processes import SimulatedMachine
-from .sdo.controller import DISABLE, READY, STATISTICS, Controller, connect
+from .sdo.controller import DISABLE, STATISTICS, Controller, connect
 from .sdo.follow import Follower
 from .signals import interrupts_ignored
 
@@ -227,7 +226,7 @@ def _follow(at: RunSession, progress: Progress | None) -> None:
             progress(controller.read(STATISTICS, _TICK))
         follower()
 
-    controller.wait_for((READY,), math.inf, tick)
+    controller.wait_for_end(tick=tick)
 
 
 def _await_syncs(controller: Controller, count: int) -> None:

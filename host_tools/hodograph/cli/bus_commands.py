@@ -86,7 +86,7 @@ def start(options: Namespace) -> None:
             controller.enable()
             controller.start(from_mm=options.from_mm, unhomed=options.unhomed)
             if options.follow:
-                controller.wait_for((READY,), math.inf, Follower(controller, note))
+                controller.wait_for_end(tick=Follower(controller, note))
     print("done" if options.follow else "running")
 
 

@@ -23,7 +23,7 @@ from ..bus.capture.setpoint_watch import jumps
 from ..bus.own_bus import opened_bus
 from ..bus.run import RunSession, bring_up
 from ..bus.sdo.controller import connect
-from ..bus.sdo.objects import HOMED, HOMING_METHOD, ON_PATH, STREAM
+from ..bus.sdo.objects import HOMED, HOMING_METHOD, MOVING, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
@@ -282,7 +282,7 @@ def _rests_at(entry: Entry, machine: Machine, address: BusAddress, wait_s: float
             return None
         if stream_status(controller).job != entry.job:
             return None  # another job moves there
-        if controller.state() in ON_PATH:
+        if controller.state() in MOVING:  # also while a stop brakes
             controller.stop_and_wait()
         status = stream_status(controller)
         return Place(*entry.place_at(nearest_q40(status.arc_length_mm)))

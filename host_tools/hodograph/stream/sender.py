@@ -16,9 +16,9 @@ import numpy as np
 from ..bus.capture.bus_recording import BusRecording
 from ..bus.goto import goto
 from ..bus.run import RunSession
-from ..bus.sdo.controller import READY
+from ..bus.sdo.controller import BOOT, OFF, READY
 from ..bus.sdo.follow import Follower
-from ..bus.sdo.objects import MOVING, RESUME
+from ..bus.sdo.objects import BUSY, OVERRIDE, RESUME
 from ..bus.sdo.stream_channel import (
     ENDED,
     PROGRAM_STOP,
@@ -121,6 +121,9 @@ class Sender:
     _bytes: int = 0
     _motion_s: float = 0.0
     _underruns: int = 0
+    """Of the controller's job; it counts those of each job from 0."""
+    _underruns_before: int = 0
+    """Of its finished jobs."""
     _journal_s: float = field(default=-1e9)
     _kept_s: float = field(default=-1e9)
     _underrun_s: float = field(default=-1e9)
@@ -164,7 +167,7 @@ class Sender:
             self._bytes,
             self._motion_s,
             took_s,
-            self._underruns,
+            self._underruns_before + self._underruns,
             self.plan.rests,
         )
 
@@ -234,6 +237,7 @@ class Sender:
         """Sends the chunks of a job and waits for its end."""
         controller = self.at.controller
         follower = Follower(controller, self.at.note)
+        self._underruns_before, self._underruns = self._underruns_before + self._underruns, 0
         started = all_sent = False
         sent, first_s, self._done_s = 0, 0.0, self._motion_s
         while True:
@@ -337,10 +341,11 @@ class Sender:
         if status is not None and status.free_bytes < len(data):
             return None
         place = f"{section.file}:{header.line}"
-        if header.rest is not None:
-            # Before the transfer: if this process is killed during it, the motion may reach the section.
-            self._note_place(section)
         begun_s = self.at.controller.clock.now_s()
+        # Before the transfer: if this process is killed during it, the motion may reach the end of the chunk.
+        coming = () if header.rest is None else (section,)
+        committed_q40 = header.job_start_q40 + chunk.program.length_q40
+        self._note_place(*coming, committed_q40=committed_q40)
         if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
             return None
         self._sending_s += self.at.controller.clock.now_s() - begun_s
@@ -349,7 +354,6 @@ class Sender:
         self._motion_s += new_s
         if header.rest is not None:
             self._ahead.append(section)
-        self._note_place(committed_q40=header.job_start_q40 + chunk.program.length_q40)
         return header.last
 
     def _slow_down(self) -> None:
@@ -360,6 +364,8 @@ class Sender:
         if needed * 0.01 * self._percent <= self.slow:
             return
         percent = max(int(100.0 * self.slow / needed), 1)
+        if self.at.controller.read(OVERRIDE, 1) <= percent:
+            return  # the operator has lowered it further
         self._percent = percent
         self.at.controller.override(percent)
         self.at.note(
@@ -412,11 +418,11 @@ class Sender:
         if status.state == ENDED and all_sent:
             controller.wait_for((READY,), 10.0)
             return True
-        if status.state == STOPPED:
-            controller.wait_for((READY,), 10.0)
+        if status.state == STOPPED:  # after a quick stop the drives are off
+            controller.wait_for((READY, OFF, BOOT), 10.0)
             raise RunError(
                 f"{self._section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
-        controller.wait_for((*MOVING, READY), 0.0)
+        controller.wait_for((*BUSY, READY), 0.0)
         return False

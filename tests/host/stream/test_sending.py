@@ -6,7 +6,8 @@ from __future__ import annotations
 import errno
 import json
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,10 +17,11 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
-from hodograph.bus.sdo.objects import STREAM
+from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, RUNNING, STOPPING, STREAM
 from hodograph.bus.sdo.stream_channel import (
     ABORT_NO_ROOM,
     OPEN,
+    STOPPED,
     UNDERRUN,
     StreamStatus,
     close_stream,
@@ -27,12 +29,13 @@ from hodograph.bus.sdo.stream_channel import (
     stream_status,
 )
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
-from hodograph.cli.stream_command import _free_rate, journal_file
+from hodograph.cli import stream_command
+from hodograph.cli.stream_command import _free_rate, _rests_at, journal_file
 from hodograph.config import load_machine
-from hodograph.errors import BusError, InputError, PlanError, RefusedError
+from hodograph.errors import BusError, InputError, PlanError, RefusedError, RunError
 from hodograph.stream.chunk import largest_chunk
 from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
-from hodograph.stream.plan import PlannedSection
+from hodograph.stream.plan import Place, PlannedSection
 from hodograph.stream.sender import Sender
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -370,6 +373,77 @@ def test_a_job_that_cannot_be_planned_on_runs_to_its_last_chunk() -> None:
         sender._over(_status(UNDERRUN), all_sent=False)
 
 
+def _sender_of_one_chunk(journal: Any) -> Sender:
+    chunk = SimpleNamespace(
+        header=SimpleNamespace(
+            line=12, job=JOB, sequence=5, job_start_q40=100, rest=None, last=False
+        ),
+        program=SimpleNamespace(length_q40=30),
+        with_remaining=lambda _: SimpleNamespace(encode=lambda: b"chunk"),
+    )
+    section = PlannedSection(0, Path("part.ngc"), 1, ())
+    clock = SimpleNamespace(is_virtual=False, now_s=lambda: 0.0)
+    at: Any = Stopped(SimpleNamespace(clock=clock))
+    plan: Any = SimpleNamespace(
+        item=lambda *_: (section, chunk, 1.0), reads_input=False, after_s=lambda _: None
+    )
+    machine: Any = None
+    sender = Sender(at, machine, plan, lambda *_: None, journal)
+    sender._ahead.append(section)
+    return sender
+
+
+def test_the_journal_has_the_end_of_a_chunk_before_it_is_sent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A host that is killed before the answer leaves a motion that goes on to the end of this chunk."""
+    known: dict[str, object] = {}
+
+    def killed(*_: object) -> bool:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hodograph.stream.sender.send_chunk", killed)
+    sender = _sender_of_one_chunk(SimpleNamespace(update=known.update))
+    with pytest.raises(KeyboardInterrupt):
+        sender._send_one(None)
+    assert known["committed_q40"] == 130
+
+
+def test_underruns_of_all_jobs_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller counts those of each job from 0."""
+    sender = _sender_of_one_chunk(None)
+
+    def over(_: Sender) -> None:
+        raise InterruptedError
+
+    monkeypatch.setattr(Sender, "_check_bus", over)
+    for underruns in (3, 2):
+        with pytest.raises(InterruptedError):
+            sender._stream()
+        sender._note_underruns(_status(OPEN, underruns), 0.0)
+    assert sender._underruns_before + sender._underruns == 5
+
+
+def test_a_quick_stop_ends_a_job_as_a_stop_does() -> None:
+    """The drives are off then, and the message says how the job goes on."""
+    states: list[int] = []
+
+    def wait_for(wanted: tuple[int, ...], wait_s: float) -> int:
+        states.extend(wanted)
+        return OFF
+
+    at: Any = Stopped(SimpleNamespace(wait_for=wait_for))
+    nothing: Any = None
+    sender = Sender(at, nothing, nothing, lambda *_: None)
+    sender._ahead.append(PlannedSection(0, Path("part.ngc"), 1, ()))
+    assert not sender._over(_status(OPEN), all_sent=False)
+    assert QUICK_STOPPING in states
+    states.clear()
+    with pytest.raises(RunError, match="--continue goes on"):
+        sender._over(_status(STOPPED), all_sent=False)
+    assert OFF in states
+
+
 @pytest.mark.parametrize(
     ("is_virtual", "reads_input", "waits"),
     [(True, False, True), (True, True, False), (False, False, False)],
@@ -402,10 +476,12 @@ def test_rests_for_want_of_chunks_are_said_now_and_then() -> None:
 class Overridden:
     """A controller that takes an override, and what was said."""
 
-    def __init__(self) -> None:
+    def __init__(self, percent: int = 100) -> None:
         self.percents: list[int] = []
         self.said: list[str] = []
-        self.controller = SimpleNamespace(override=self.percents.append)
+        self.controller = SimpleNamespace(
+            override=self.percents.append, read=lambda *_: [percent, *self.percents][-1]
+        )
         self.note = self.said.append
 
 
@@ -433,6 +509,29 @@ def test_feed_is_lowered_to_what_the_bus_carries(
     assert at.percents == percents
     assert len(at.said) == len(percents)
     assert all("the bus has 5.0 for it: feed override set to" in text for text in at.said)
+
+
+@pytest.mark.parametrize("operators", [0, 10])
+def test_an_override_that_the_operator_has_lowered_is_not_raised(operators: int) -> None:
+    """At 0 % the axes stand: they must not move again by themselves."""
+    at = Overridden(operators)
+    plan: Any = SimpleNamespace(greatest_rate=lambda: 20_000.0)
+    known: Any = at
+    nothing: Any = None
+    Sender(known, nothing, plan, lambda *_: None, slow=5_000.0)._slow_down()
+    assert (at.percents, at.said) == ([], [])
+
+
+def test_an_override_that_the_operator_raises_again_is_lowered() -> None:
+    at = Overridden(10)
+    plan: Any = SimpleNamespace(greatest_rate=lambda: 20_000.0)
+    known: Any = at
+    nothing: Any = None
+    sender = Sender(known, nothing, plan, lambda *_: None, slow=5_000.0)
+    sender._slow_down()
+    at.controller.read = lambda *_: 100
+    sender._slow_down()
+    assert at.percents == [25]
 
 
 @pytest.mark.parametrize(
@@ -471,3 +570,34 @@ def test_the_free_part_of_a_bus() -> None:
     rate = _free_rate(machine, parse_address("socketcan:can0"))
     assert rate is not None
     assert 10_000 < rate < 30_000
+
+
+@pytest.mark.parametrize("state", [RUNNING, STOPPING])
+def test_a_job_continues_where_the_axes_rest_and_not_where_they_brake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: int
+) -> None:
+    part = tmp_path / "part.ngc"
+    part.write_text("G1 X1 F100\n")
+    waits: list[float] = []
+
+    class Braking:
+        def answers(self, wait_s: float) -> bool:
+            return True
+
+        def state(self) -> int:
+            return state
+
+        def stop_and_wait(self) -> None:
+            waits.append(1.0)
+
+        def read(self, index: int, sub: int) -> int:
+            return {3: 100, 11: (3 if waits else 2) << 40}.get(sub, 0)
+
+    @contextmanager
+    def connected(*_: object) -> Iterator[Braking]:
+        yield Braking()
+
+    monkeypatch.setattr(stream_command, "connect", connected)
+    machine = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
+    place = _rests_at(_entry(part), machine, parse_address("socketcan:vcan0"), 1.0)
+    assert place == Place(0, 3 << 40)

@@ -32,7 +32,7 @@ BOOT_S = 10.0
 
 def hold_reached(controller: Controller, wait_s: float = math.inf) -> bool:
     """Waits for the standstill that HOLD commanded; False: the program ended before."""
-    return controller.wait_for((HELD, READY), wait_s) == HELD
+    return controller.wait_for((HELD, READY, OFF, BOOT), wait_s) == HELD
 
 
 def home(

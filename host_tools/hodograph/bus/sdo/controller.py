@@ -7,6 +7,7 @@ Each failure is a BusError (no answer, or a wrong one) or a RefusedError (the co
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -236,6 +237,19 @@ class Controller(Node):
             if tick is not None:
                 tick()
             self.clock.sleep(POLL_S)
+
+    def wait_for_end(
+        self, wait_s: float = math.inf, tick: Callable[[], None] | None = None
+    ) -> None:
+        """Waits until a motion that was started is over: returns in state ready. `wait_s` and `tick` as for `wait_for`.
+
+        Raises RunError: a fault, or the drives are off. Raises BusError: the motion is not over in time.
+        """
+        if self.wait_for((READY, OFF, BOOT), wait_s, tick) != READY:
+            raise RunError(
+                f"{self.who()}: the drives were switched off on the way, by a quick stop of another command or a "
+                "restart of the controller: hodograph status, then hodograph goto"
+            )
 
     def _waiting_for(self, state: int) -> str:
         if state == BOOT and (trouble := self.boot_trouble()) is not None:
