@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Hodograph: jerk-limited motion on Pythagorean-hodograph splines over CAN servo drives.
+"""Hodograph: jerk-limited motion on Pythagorean-hodograph splines over CAN servo drives. Used by all programs that
+import hodograph. Importing it does no I/O.
 
     import hodograph as hg
 

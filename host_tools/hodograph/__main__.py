@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`python -m hodograph` is the `hodograph` command."""
+"""`python -m hodograph` is the `hodograph` command. Started by the user; does what cli/main does, and ends the process
+with its exit status.
+"""
 
 import sys
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A DBC of a machine's bus for cantools, SavvyCAN and others, from the EDS of its drives.
+"""A DBC of a machine's bus for cantools, SavvyCAN and others, from the EDS of its drives. Used by cli/dbc_command.
+Reads the EDS file; no other I/O.
 
 SYNC, NMT commands, EMCY, heartbeats and every PDO that the controller maps. Positions are in mm, voltages in V, torque
 offsets in per cent through the signals' factors. SDO is left out: DBC cannot express bytes whose meaning depends on the

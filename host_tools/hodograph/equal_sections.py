@@ -5,7 +5,7 @@ Holes of one depth are equal sections, and so are equal moves on a grid. Two sec
 distances from the first point, are the same after rounding to 2^-40 mm, and so are feeds, tolerance and angles. The
 curve and the integers of the program are then those of the other section, shifted. Only two rules of a program depend
 on its place: the range of its points and the travel of the axes. Both are checked again. Used by job.py and
-section_pipeline.py.
+section_pipeline.py. No I/O.
 """
 
 from __future__ import annotations

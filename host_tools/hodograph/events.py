@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8)."""
+"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8). Used by all modules that
+handle outputs of a program. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Lengths as the integers of programs and of the controller's objects: multiples of 2^-40 mm (of a rotary axis,
-2^-40 degrees). Names of such integers end in `_q40`. Any module may use this one; docs/reference/protocol.md 1.2.
+"""Lengths as the integers of programs and of the controller's objects: multiples of 2^-40 mm (of a rotary axis, 2^-40
+degrees); docs/reference/protocol.md 1.2. Names of such integers end in `_q40`. Used by most modules of host_tools. No
+I/O.
 """
 
 from __future__ import annotations

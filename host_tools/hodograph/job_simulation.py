@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The offline simulation of a job: plans, compiles and runs its sections without a bus, and writes the run as a table.
+Used by api/job, cli/, job_run and report/. Writes the file that it is given.
 
-For the commands `simulate` and `report`; job_run.py uses `JobMotion` for the analysed recordings of a run on the bus.
+job_run.py uses `JobMotion` for the analysed recordings of a run on the bus.
 """
 
 from __future__ import annotations

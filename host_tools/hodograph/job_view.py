@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What a browser draws of a job: the programmed path, and the curves with feed and source line at each place.
 
-Used by report/toolpath_report and cli/monitor_command.
+Used by report/toolpath_report and cli/monitor_command. Reads lines of the G-code file.
 """
 
 from __future__ import annotations

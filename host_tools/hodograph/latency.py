@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """How late the ticks of a controller are on this computer, from the time stamps of its SYNC frames; `hodograph
-latency`.
+latency`. Used by cli/latency_command. Starts a hub and a controller or uses a bus, receives frames, and waits in real
+time.
 
 On SocketCAN the Linux kernel stamps the frames. On a local bus the hub does, so that its own wake-up latency is
 included.

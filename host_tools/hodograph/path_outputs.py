@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outputs that a path file switches on its path, as events of a program. Used by pipeline.py and stream/."""
+"""Outputs that a path file switches on its path, as events of a program. Used by pipeline.py and stream/. No I/O."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From a path file to an accepted program: spline, plan, program, each computed once, on request. Commands, API,
-simulation and stream use it.
+"""From a path file to an accepted program: spline, plan, program, each computed once, on request. Used by all modules
+that need the program of a path file. Reads the path file and the files that it names.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Machines on a bus: a local bus, and the controller as an object."""
+"""Machines on a bus: a local bus, and the controller as an object. Used by programs of users. Starts processes, reads
+and writes objects of the controller by SDO, receives frames, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Toolpaths of other programs: a job of several sections, planned and simulated."""
+"""Toolpaths of other programs: a job of several sections, planned and simulated. Used by api/bus, and by programs of
+users. Reads toolpath files.
+"""
 
 from __future__ import annotations
 

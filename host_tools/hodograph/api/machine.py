@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The machine that programs are made for."""
+"""The machine that programs are made for. Used by api/, and by programs of users. Reads machine files and the drive
+files that they name.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Paths, limits, and plans of the feed along a path."""
+"""Paths, limits, and plans of the feed along a path. Used by api/job, and by programs of users. Reads path files and
+the machine files that they name.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Programs of a controller, and their runs with simulated drives or on a bus."""
+"""Programs of a controller, and their runs with simulated drives or on a bus. Used by api/, and by programs of users.
+Reads and writes files of program images.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Motion and bus load from the frames of a run. Used by bus/run, cli/replay_command and identify/stretches."""
+"""Motion and bus load from the frames of a run. Used by bus/run, cli/replay_command and identify/stretches. Reads the
+EDS of the drives, for the bus load; no other I/O.
+"""
 
 from __future__ import annotations
 

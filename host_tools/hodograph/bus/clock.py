@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The time of a bus: that of this computer, or the virtual time of a local bus (docs/reference/virtual-time.md).
+"""The time of a bus: that of this computer, or the virtual time of a local bus (docs/reference/virtual-time.md). Used
+by bus/, cli/, faults/ and monitor/. Speaks to the hub, waits, and starts, signals and ends processes.
 
 Time-outs and pauses in communication with nodes are counted by the clock of the connection. In virtual time the hub
-grants the time: it stands still while a participant computes, and advances while all wait. One thread of a process is
-one participant; all its connections to a hub share it.
+grants the time: it stands still while a participant (a process on the bus) computes, and advances while all wait. One
+thread of a process is one participant; all its connections to a hub share it.
 """
 
 from __future__ import annotations

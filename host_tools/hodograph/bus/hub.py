@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Starts a hodograph-hub for local buses (docs/reference/virtual-time.md), and ends it.
-
-For commands that serve a bus of their own (`own_bus`), `faults`, `hodograph demo` and `local_bus` of the API.
+"""Starts a hodograph-hub for local buses (docs/reference/virtual-time.md), and ends it. Used by all commands and
+functions of the API that serve a local bus. Starts and ends a process; makes a temporary folder.
 """
 
 from __future__ import annotations

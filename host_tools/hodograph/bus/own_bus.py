@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The bus of commands without --bus.
+"""The bus of commands without --bus. Used by api/bus and cli/. Reads the environment, makes the folder of the bus, and
+starts a hub.
 
 It is $HODOGRAPH_BUS, else vcan0 if the Linux kernel has it, else the local bus of this user. `hodograph run` and
 `hodograph rig` serve the latter while they run, at a fixed path at which `hodograph status` and other commands find it.

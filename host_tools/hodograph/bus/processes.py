@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The simulated machine as processes: controller and drives on a vcan interface or a local bus."""
+"""The simulated machine as processes: controller and drives on a vcan interface or a local bus. Used by bus/, cli/,
+faults/ and latency. Starts, signals and ends processes; their output goes to temporary files.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Ignores Ctrl-C, SIGTERM and SIGHUP while commands stop the axes. Main thread."""
+"""Ignores Ctrl-C, SIGTERM and SIGHUP while commands stop the axes. Main thread; without effect in others. Used by
+bus/run, cli/bus_commands and stream/sender. Changes signal handlers of the process and restores them.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The status of a controller as text: rows of name and value, or one line.
+"""The status of a controller as text: rows of name and value, or one line. Used by cli/status_command. No I/O;
+`sdo/status` reads the values.
 
-For `hodograph status`, `status --watch` and the live page. Pure; `sdo/status` reads the values.
+For `hodograph status` and `status --watch`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Time on the bus: length of frames, worst-case response, load, whether a machine's tick fits
-(docs/reference/bus-time.md).
+(docs/reference/bus-time.md). Used by api/bus, bus/, cli/ and dbc. Reads the EDS of drives; no other I/O.
 
 Modules are loaded when their names are first used: the length of a frame needs numpy only, the rest the machine file.
 """

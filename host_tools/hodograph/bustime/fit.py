@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Decides whether the frames of a machine fit its period, and which period, bit rate or number of drives would fit.
-Used by cli/, api/bus and bus/analysis.
+Used by cli/, api/bus and bus/analysis. Reads the EDS of the drives; no other I/O.
 """
 
 from __future__ import annotations

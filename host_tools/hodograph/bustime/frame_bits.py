@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Length of CAN frames in bits (ISO 11898-1), stuff bits included; docs/reference/bus-time.md sections 1 and 2.1.
+"""Length of CAN frames in bits (ISO 11898-1), stuff bits included; docs/reference/bus-time.md sections 1 and 2.1. Used
+by bus/capture/ and bustime/. No I/O.
 
 From the start bit to the last bit of the CRC a complementary bit follows every five equal bits; delimiters,
 acknowledgement, end of frame and the three bits of intermission are never stuffed. A length here counts them all,

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Worst-case bus time of the periodic frames of a machine; docs/reference/bus-time.md section 2."""
+"""Worst-case bus time of the periodic frames of a machine; docs/reference/bus-time.md section 2. Used by bustime/fit
+and bustime/recording. No I/O.
+"""
 
 from __future__ import annotations
 

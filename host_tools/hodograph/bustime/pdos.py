@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The PDOs of a drive as the controller maps them (docs/reference/protocol.md section 2); names and types
-from its EDS."""
+"""The PDOs of a drive as the controller maps them (docs/reference/protocol.md section 2); names and types from its EDS.
+Used by bustime/fit, bustime/traffic and dbc. Reads the EDS file.
+"""
 
 from __future__ import annotations
 

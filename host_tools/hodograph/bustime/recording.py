@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The load of recorded traffic from its counted bits, compared with the load by the model.
+"""The load of recorded traffic from its counted bits, compared with the load by the model. Used by bus/analysis. No
+I/O.
 
 Time on the bus is the number of SYNCs times the period. So the frames of ticks give the same load in a run at full pace
 as in real time. Heartbeats and SDO follow the wall clock.

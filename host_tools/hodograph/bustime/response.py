@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Worst-case response times on CAN: fixed priorities, no preemption; docs/reference/bus-time.md section 2.
+"""Worst-case response times on CAN: fixed priorities, no preemption; docs/reference/bus-time.md section 2. Used by
+bustime/model. No I/O.
 
 R. I. Davis, A. Burns, R. J. Bril, J. J. Lukkien, "Controller Area Network (CAN) schedulability analysis: refuted,
 revisited and revised", Real-Time Systems 35 (2007), equations 7 to 13. All times are integers of one unit of the

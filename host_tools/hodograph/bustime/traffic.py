@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The frames of a machine in steady motion, with their senders and periods (docs/reference/protocol.md section 2)."""
+"""The frames of a machine in steady motion, with their senders and periods (docs/reference/protocol.md section 2). Used
+by bustime/fit, bustime/model and bustime/recording. Reads the EDS of the drives; no other I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Campaigns: many simulated runs described by one file, with one row of a table for each.
+"""Campaigns: many simulated runs described by one file, with one row of a table for each. Used by cli/campaign_command
+and schemas/campaign_file. Reads and writes files, and starts processes.
 
     definition  the campaign file, checked          programs   one image for each path, profile and feed
     variation   figures that differ from run to run  execute    a batch of runs, on whatever worker

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The campaign file: which runs to make. Keys and their meaning: docs/guides/campaigns.md."""
+"""The campaign file: which runs to make. Keys and their meaning: docs/guides/campaigns.md. Used by campaign/,
+cli/campaign_command and schemas/campaign_file. Reads the campaign file, the files that it names, and the compiled
+module.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Compiles the program of a campaign and makes a batch of its runs. Called by both engines: a worker of Dask, and the
-process itself.
+"""Compiles the program of a campaign and makes a batch of its runs. Used by campaign/results, campaign/runner and
+campaign/summary. Runs in a worker of Dask or in the process itself. No I/O.
 """
 
 from __future__ import annotations

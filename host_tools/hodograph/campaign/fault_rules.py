@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Faults of a campaign: the rules of docs/reference/protocol.md section 4 that act on one axis alone.
+"""Faults of a campaign: the rules of docs/reference/protocol.md section 4 that act on one axis alone. Used by
+campaign/definition and campaign/run_settings. No I/O.
 
 Rules that need frames, a bus or a controller that supervises are for `hodograph faults`.
 """

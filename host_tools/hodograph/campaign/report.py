@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The report of a campaign: one self-contained HTML file, and its figures as PNG files."""
+"""The report of a campaign: one self-contained HTML file, and its figures as PNG files. Used by cli/campaign_command.
+Writes these files.
+"""
 
 from __future__ import annotations
 

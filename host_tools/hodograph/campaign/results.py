@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Results of runs: in arrays by number (100 bytes for each run), as a table (CSV, RFC 4180), and in a journal from
-which a campaign can continue.
+which a campaign can continue. Used by campaign/ and cli/campaign_command. Makes the folder; reads, writes and locks the
+journal.
 
 Lines of the journal are only ever added. A line that was cut off (the process was killed in the middle of it) is
 dropped when the file is opened again. The first line names the campaign that it belongs to.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The settings of a run from its number: all combinations, in the order of the campaign file's sections.
+"""The settings of a run from its number: all combinations, in the order of the campaign file's sections. Used by the
+other modules of campaign. No I/O.
 
 Of path, profile, feed, gains, fault, grid and sample the last changes fastest. So the runs of a program are
 consecutive, and among them those of a group, which differ in grid and sample only.

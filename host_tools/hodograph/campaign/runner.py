@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Executes a campaign and makes its complete table, with one of three engines: this process, the cores of this
-computer, or a cluster (the last two by Dask).
+computer, or a cluster (the last two by Dask). Used by cli/campaign_command. Starts processes or connects to a cluster,
+writes the journal, and changes the handler of Ctrl-C while it runs.
 
 Dask is an optional dependency and takes half a second to load, so it is loaded only here and only if needed.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Summary of a campaign: one line for each group of runs, which differ in grid and sample only."""
+"""Summary of a campaign: one line for each group of runs, which differ in grid and sample only. Used by campaign/report
+and cli/campaign_command. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Figures of a drive that differ from run to run (tables [vary.FIGURE]): grids, which are tried in full, and random
-draws.
+draws. Used by campaign/definition, campaign/run_settings and schemas/campaign_file. No I/O.
 
 A draw is a pure function of seed, sample, figure and axis. It does not depend on the other variations, nor on the order
 or the worker of runs. Sample k is the same machine on all paths and with all gains.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands about configuration and drives: configure, home, quick-stop, reset. Light on imports, as bus_commands."""
+"""Commands about configuration and drives: configure, home, quick-stop, reset. Light on imports, as bus_commands.
+Started by cli/main. Reads and writes objects of the controller by SDO, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

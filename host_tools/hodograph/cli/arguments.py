@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The arguments of all commands, in the order of `hodograph --help`. Read by parser.py."""
+"""The arguments of all commands, in the order of `hodograph --help`. Used by cli/parser. No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The arguments of the commands on a bus: moving, operating and watching a machine. Read by arguments.py."""
+"""The arguments of the commands on a bus: moving, operating and watching a machine. Used by cli/arguments. No I/O."""
 
 from __future__ import annotations
 

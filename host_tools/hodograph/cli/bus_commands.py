@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Commands that only need a controller: start, stop, hold, resume, override. Few imports, so that they are quick."""
+"""Commands that only need a controller: start, stop, hold, resume, override. Few imports, so that they are quick.
+Started by cli/main. Used by cli/action_commands and cli/motion_commands. Reads and writes objects of the controller by
+SDO, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Opens the controller of a machine on a bus, and waits for the operator at program stops. For `run` and `stream`."""
+"""Opens the controller of a machine on a bus, and waits for the operator at program stops. Used by cli/run_command and
+cli/stream_command. On a virtual bus it may start a simulated machine; it reads stdin, and prints to stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph campaign: many simulated runs, one table."""
+"""hodograph campaign: many simulated runs, one table. Started by cli/main. Reads the campaign file, starts processes,
+writes files, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

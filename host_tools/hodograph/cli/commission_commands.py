@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that read drives without a controller: scan, check."""
+"""Commands that read drives without a controller: scan, check. Started by cli/main. Reads objects of drives by SDO, may
+give drives node numbers and write a machine file, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

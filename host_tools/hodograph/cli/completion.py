@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph completion: the script with which a shell completes commands, options and files."""
+"""hodograph completion: the script with which a shell completes commands, options and files. Started by cli/main.
+Prints to stdout.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The command that describes the bus to other tools: dbc."""
+"""The command that describes the bus to other tools: dbc. Started by cli/main. Reads machine and EDS files, writes the
+DBC file, and prints to stdout.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph demo: path, program, run and report of one example that the package contains."""
+"""hodograph demo: path, program, run and report of one example that the package contains. Started by cli/main. Starts
+processes, opens a browser, writes the report, prints to stdout and stderr, and reads stdin.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph faults: runs fault scenarios and prints their verdicts."""
+"""hodograph faults: runs fault scenarios and prints their verdicts. Started by cli/main. Starts processes, and prints
+to stdout and stderr.
+"""
 
 from __future__ import annotations
 

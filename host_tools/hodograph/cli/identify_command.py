@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph identify: plants from a recorded run."""
+"""hodograph identify: plants from a recorded run. Started by cli/main. Reads the recording and the machine file, may
+write machine and drive files, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

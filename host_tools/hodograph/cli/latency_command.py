@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph latency: how late ticks are on this computer."""
+"""hodograph latency: how late ticks are on this computer. Started by cli/main. Starts a controller or uses one on a
+bus, receives frames, and prints to stdout.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Entry point: from the command line to an exit status; a traceback is printed only on request."""
+"""Entry point: from the command line to an exit status; a traceback is printed only on request. Started by the shell
+and by __main__. Changes signal handlers of the process, and prints errors to stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph monitor: the live page, on a bus or from a recording."""
+"""hodograph monitor: the live page, on a bus or from a recording. Started by cli/main. Reads files, uses the bus,
+serves HTTP, and prints to stderr.
+"""
 
 from __future__ import annotations
 

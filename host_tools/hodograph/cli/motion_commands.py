@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Commands that plan and then use a controller: upload, goto, rig; and the text for the result of a run."""
+"""Commands that plan and then use a controller: upload, goto, rig; and the text for the result of a run. Started by
+cli/main. Used by cli/action_commands, cli/demo_command, cli/replay_command and cli/run_command. Reads files, starts
+processes, reads and writes objects of the controller by SDO, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The arguments of the commands that need no bus: first files, paths and programs, simulation, tuning. Read by
-arguments.py.
+"""The arguments of the commands that need no bus: first files, paths and programs, simulation, tuning. Used by
+cli/arguments. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Options of several commands, and converters of values on the command line, whose messages name the error."""
+"""Options of several commands, and converters of values on the command line, whose messages name the error. Used by
+cli/bus_arguments and cli/offline_arguments. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Output of commands: results on stdout, notes and progress on stderr."""
+"""Output of commands: results on stdout, notes and progress on stderr. Used by all commands. Writes files, too."""
 
 from __future__ import annotations
 

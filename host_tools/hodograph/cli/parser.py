@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The parser of the command line: one sub-command for each task, usage errors as InputError."""
+"""The parser of the command line: one sub-command for each task, usage errors as InputError. Used by cli/main and
+cli/completion. `--help` prints and ends the process; no other I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that need no bus: spline, feed, compile, inspect, simulate."""
+"""Commands that need no bus: spline, feed, compile, inspect, simulate. Started by cli/main; other commands use its
+functions. Reads path and machine files, writes images and tables, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

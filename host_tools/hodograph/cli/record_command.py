@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph record: records the bus into a file, with the setpoint step check."""
+"""hodograph record: records the bus into a file, with the setpoint step check. Started by cli/main. Receives frames,
+reads objects of the controller by SDO, writes the file, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph replay: analyses a recorded run of a path file or of a program image."""
+"""hodograph replay: analyses a recorded run of a path file or of a program image. Started by cli/main. Reads these
+files, may write a table and a report, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that write or print results: report, paper."""
+"""Commands that write or print results: report, paper. Started by cli/main. Reads path files or a toolpath, writes the
+report, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

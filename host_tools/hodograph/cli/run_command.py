@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph run: path files and toolpaths on the bus."""
+"""hodograph run: path files and toolpaths on the bus. Started by cli/main. Reads files, may start processes, moves the
+axes, writes recordings, tables and reports, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

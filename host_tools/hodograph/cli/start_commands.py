@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph init and schema: initial files, and the schemas of all input files."""
+"""hodograph init and schema: initial files, and the schemas of all input files. Started by cli/main. Reads templates,
+writes files, and prints to stdout.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph status: once, or repeatedly with --watch."""
+"""hodograph status: once, or repeatedly with --watch. Started by cli/main. Reads objects of the controller by SDO,
+receives frames, and prints to stdout.
+"""
 
 from __future__ import annotations
 

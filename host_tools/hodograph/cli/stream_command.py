@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""hodograph stream: toolpaths of any length, and lists of paths, through a controller with little memory."""
+"""hodograph stream: toolpaths of any length, and lists of paths, through a controller with little memory. Started by
+cli/main. Used by cli/run_command. Reads files, may start processes, moves the axes, writes the journal and a recording,
+and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

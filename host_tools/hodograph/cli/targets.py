@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The controller of a command: node, bit rate and names of axes, from `--machine`, `--node` or defaults."""
+"""The controller of a command: node, bit rate and names of axes, from `--machine`, `--node` or defaults. Used by all
+commands that take a node or a machine. Reads the machine file.
+"""
 
 from __future__ import annotations
 

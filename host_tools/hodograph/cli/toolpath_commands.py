@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands on toolpaths of other programs: import, and simulate of such a file."""
+"""Commands on toolpaths of other programs: import, and simulate of such a file. Started by cli/main; other commands use
+its functions. Reads toolpath and machine files, writes tables and TOML files, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands about servo loops: tune."""
+"""Commands about servo loops: tune. Started by cli/main. Reads machine and path files, may write machine and drive
+files and a report, and prints to stdout and stderr.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph verify: compares a program with the limits of its path file."""
+"""hodograph verify: compares a program with the limits of its path file. Started by cli/main. Reads files, and prints
+to stdout and stderr.
+"""
 
 from __future__ import annotations
 

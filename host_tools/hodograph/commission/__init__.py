@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Commissioning: finds the drives on a bus, reads their properties, and checks whether they can do what a machine
-needs.
+needs. Used by cli/commission_commands. Reads objects by SDO; sends LSS frames.
 
 Only `assign` writes to a drive: it gives a drive its node number.
 """

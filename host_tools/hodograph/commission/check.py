@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Whether a drive can do what an axis of a machine needs, object by object.
+"""Whether a drive can do what an axis of a machine needs, object by object. Used by cli/commission_commands.
 
 The objects are those that the controller reads and writes before it switches a drive on (firmware/app/drives), in the
 same order. Objects that the controller writes need not be set. If the controller writes an object only to drives that
-have it, its absence is a note with the lost function. The check only reads the drive.
+have it, its absence is a note with the lost function. The check reads the drive by SDO, and writes nothing.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drive properties, as a node reports them: identity, modes, scaling, limits. For `hodograph scan` and `check`."""
+"""Drive properties, as a node reports them: identity, modes, scaling, limits. Used by cli/commission_commands,
+commission/check and commission/machine_text. Reads objects of the drive by SDO.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Writes a machine file for the drives that were found, with comments on their reports and on values that remain to be
-set.
+"""The text of a machine file for the drives that were found, with comments on their reports and on values that remain
+to be set. Used by cli/commission_commands. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Finds the nodes on a bus and reads their objects by SDO, where no controller sends SYNC. For `scan` and `check`."""
+"""Finds the nodes on a bus and reads their objects by SDO, where no controller sends SYNC. Used by
+cli/commission_commands and commission/. Sends, receives, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reads the input files (TOML): path, machine and drive files as checked, frozen dataclasses."""
+"""Reads the input files (TOML): path, machine and drive files as checked, frozen dataclasses. Used by most modules of
+host_tools. Reads the files that it is given, and the files that they name.
+"""
 
 from .axis_table import Axis, Feedforward, Homing, Scaling
 from .drive_file import Drive, load_drive

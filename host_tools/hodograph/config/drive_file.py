@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drive files: plant, PDFF gains and encoder of one simulated axis (paper section 5)."""
+"""Drive files: plant, PDFF gains and encoder of one simulated axis (paper section 5). Used by all modules that need the
+plant of an axis. Reads the file that it is given.
+"""
 
 from __future__ import annotations
 

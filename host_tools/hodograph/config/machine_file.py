@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Machine files: bus, controller limits, work offset, axes and their drives."""
+"""Machine files: bus, controller limits, work offset, axes and their drives. Used by most modules of host_tools. Reads
+the file that it is given, and the drive files that it names.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs: the channels of an I/O module in a machine file, and the places at which a path file switches them."""
+"""Outputs: the channels of an I/O module in a machine file, and the places at which a path file switches them. Used by
+all modules that handle outputs. No I/O.
+"""
 
 from __future__ import annotations
 

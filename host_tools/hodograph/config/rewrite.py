@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Writes figures into machine and drive files; all other text stays, also comments and order. Used by cli/tune_command
-and cli/identify_command.
+"""The texts of machine and drive files with other figures; all other text stays, also comments and order. Used by
+cli/tune_command and cli/identify_command. Reads these files, and writes none.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Files that the package carries: by links controller.eds, drive.eds and examples/; what `hodograph init` writes."""
+"""Files that the package carries: by links controller.eds, drive.eds and examples/; what `hodograph init` writes. Used
+by all modules that need an EDS or an example. Reads EDS files, and keeps them in memory.
+"""
 
 from __future__ import annotations
 

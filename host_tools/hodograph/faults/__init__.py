@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Fault scenarios: injects faults into simulated machines on two virtual buses, and checks the reaction.
+"""Fault scenarios: injects faults into simulated machines on two virtual buses, and checks the reaction. Used by
+campaign/, cli/faults_command and schemas/campaign_file. Reads scenario files, starts processes, and uses the buses.
 
 scenario       keys of a scenario file, and the fault rules that a seed makes of it
 bench          controller, injector and drives as processes

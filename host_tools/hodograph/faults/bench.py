@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The test bench of fault cases as processes: controller on one bus, drives on another, the injector between them."""
+"""The test bench of fault cases as processes: controller on one bus, drives on another, the injector between them. Used
+by faults/case_runner, faults/disturb and faults/uploads. Starts and ends processes; writes the fault rules into a
+temporary folder.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The case record: evidence about one fault case from the recordings of the two buses. Read by judge.py."""
+"""The case record: evidence about one fault case from the recordings of the two buses. Used by faults/case_run,
+faults/case_runner and faults/judge. No I/O.
+"""
 
 from __future__ import annotations
 

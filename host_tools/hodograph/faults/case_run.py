@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The machine, program and notes of one fault case while it runs; the input of the judge."""
+"""The machine, program and notes of one fault case while it runs; the input of the judge. Used by faults/case_runner,
+faults/disturb, faults/judge and faults/uploads. Reads the path file, and keeps its program in memory.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Verdicts as a table: one row for each scenario, with the worst of its seeds."""
+"""Verdicts as a table: one row for each scenario, with the worst of its seeds. Used by cli/faults_command. No I/O."""
 
 from __future__ import annotations
 

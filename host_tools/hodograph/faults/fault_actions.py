@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Actions of the host in a fault case: kills processes, breaks off uploads, reads drives without a controller."""
+"""Actions of the host in a fault case: kills processes, breaks off uploads, reads drives without a controller. Used by
+faults/disturb and faults/uploads. Starts processes, sends by SDO, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Violations in a case's record, and the figures of the result table."""
+"""Violations in a case's record, and the figures of the result table. Used by faults/case_runner and faults/case_table.
+No I/O.
+"""
 
 from __future__ import annotations
 

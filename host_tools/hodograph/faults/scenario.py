@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Scenario files: a fault with random places and strengths, and the expected reaction.
+"""Scenario files: a fault with random places and strengths, and the expected reaction. Used by campaign/,
+cli/faults_command, faults/ and schemas/campaign_file. Reads the files that it is given.
 
 text = "what happens"
 path = "path.toml"                  # the program, and by it the machine; relative to the file

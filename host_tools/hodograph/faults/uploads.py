@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Cases in which an upload breaks off: the old program has to stay active."""
+"""Cases in which an upload breaks off: the old program has to stay active. Used by faults/disturb. Starts and kills a
+process, reads and writes objects by SDO, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

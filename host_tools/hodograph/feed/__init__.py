@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Plans the feed along a path inside limits: profiles, plans, and the feed pieces of a program.
+"""Plans the feed along a path inside limits: profiles, plans, and the feed pieces of a program. Used by all modules
+that plan a feed or handle a plan. No I/O.
 
-`feed/optimal` plans for least time. This package reads no files and does not use machine files: limits come as
-`Limits`, `ControllerLimits` and `AxisLimits`.
+`feed/optimal` plans for least time. This package does not use machine files: limits come as `Limits`,
+`ControllerLimits` and `AxisLimits`.
 """
 
 from .limits import (

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it.
+"""Path kinematics: velocity, acceleration and jerk of the axes that follow from a curve and a motion along it. Used by
+api/path, feed/ and stream/windows. No I/O.
 
 `spline.frames` has the derivatives of a curve by arc length, `axis_motion` the chain rule; docs/theory/feed.md 5.6.
 Arrays of all A axes have the axis as first index. `sample` applies them to feed pieces, in cells (one piece on one

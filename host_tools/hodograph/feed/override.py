@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Override headroom: the part of the limits that a changing feed override may use, and the override bounds of each feed
-piece by override level; docs/theory/feed.md section 7. Used by feed/plan and stream/windows.
+piece by override level; docs/theory/feed.md section 7. Used by feed/plan and stream/windows. No I/O.
 
 With program time at the override lambda an axis moves with
 

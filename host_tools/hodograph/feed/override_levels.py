@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Override levels, and the codes of override bounds; docs/reference/protocol.md 1.3 and 1.4.
+"""Override levels, and the codes of override bounds; docs/reference/protocol.md 1.3 and 1.4. Used by feed/ and
+program/. No I/O.
 
 Each override of `LEVEL_OVERRIDES` ends a level with its own bounds of override rate and override acceleration: at an
 override below 1 the motion uses less of the limits of acceleration and jerk. The last level, `FULL`, is that of all

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces of the program format (docs/reference/protocol.md 1.3) as arrays; docs/theory/feed.md section 6."""
+"""Feed pieces of the program format (docs/reference/protocol.md 1.3) as arrays; docs/theory/feed.md section 6. Used by
+feed/, program/, section_pipeline and stream/. No I/O.
+"""
 
 from __future__ import annotations
 

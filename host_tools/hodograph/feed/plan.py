@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A feed plan: the feed along a whole path, with what was requested. Frozen data; docs/theory/feed.md 5 and 6."""
+"""A feed plan: the feed along a whole path, with what was requested. Frozen data; docs/theory/feed.md 5 and 6. Used by
+all modules that make a feed plan or handle one. No I/O.
+"""
 
 from __future__ import annotations
 

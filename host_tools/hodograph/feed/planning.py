@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Planning a feed with ramps inside limits: for a path's length, and for the path itself; docs/theory/feed.md 5.4
-and 5.5. Profile "optimal" has a planner of its own (feed.optimal)."""
+"""Planning a feed with ramps inside limits: for a path's length, and for the path itself; docs/theory/feed.md 5.4 and
+5.5. Profile "optimal" has a planner of its own (feed.optimal). Used by bus/goto, paper/compare, pipeline and
+program/compiler. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Feed ramps from rest to a feed, as functions of time; docs/theory/feed.md section 5.
+"""Feed ramps from rest to a feed, as functions of time; docs/theory/feed.md section 5. Used by feed/, paper/compare and
+report/feed_figures. No I/O.
 
 A `Ramp` is a polynomial (quintic: paper (17); minimax: least peak jerk) and, for profile "exponential", the part that
 paper (18) adds:

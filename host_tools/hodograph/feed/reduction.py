@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Feed reduction: the highest constant feed that the path, the limits and the format allow; docs/theory/feed.md
-5.5."""
+"""Feed reduction: the highest constant feed that the path, the limits and the format allow; docs/theory/feed.md 5.5.
+Used by feed/planning. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The requested feed: section [feed] of a path file as frozen data, with the ranges of its values.
+"""The requested feed: section [feed] of a path file as frozen data, with the ranges of its values. Used by all modules
+that plan a feed. No I/O.
 
-Made by config/path_file.py, read by the planners in this package. Only checks are made here.
+Made by config/path_file.py, read by the planners in this package.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The profile with two ramps and a constant feed between them: exact arc length over time, and its integer feed pieces;
-docs/theory/feed.md 5.1 and section 6."""
+docs/theory/feed.md 5.1 and section 6. Used by feed/planning. No I/O.
+"""
 
 from __future__ import annotations
 

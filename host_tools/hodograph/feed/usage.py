@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Limit usage: the peaks of feed pieces, and the limits along a path that a plan has to keep;
-docs/theory/feed.md 5.5."""
+"""Limit usage: the peaks of feed pieces, and the limits along a path that a plan has to keep; docs/theory/feed.md 5.5.
+Used by feed/planning. No I/O.
+"""
 
 from __future__ import annotations
 

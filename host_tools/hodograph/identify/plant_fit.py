@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Least squares for the plant of one axis: docs/theory/drives.md section 18.
+"""Least squares for the plant of one axis: docs/theory/drives.md section 18. Used by cli/identify_command. No I/O.
 
 The drive's loop, with the gains of the drive file, is simulated with the recorded setpoints and offsets. Gain, time
 constant and Coulomb friction are fitted so that positions and volts are those reported.

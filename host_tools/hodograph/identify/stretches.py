@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The motions in a recording: setpoints and reported positions of an axis, from standstill to standstill or to the
-first missing frame.
+first missing frame. Used by cli/identify_command and identify/plant_fit. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A recording of any length: frames go to a file as they come, with the setpoint step check. For `hodograph record`,
-`stream` and `run`.
+"""A recording of any length: frames go to a file as they come, with the setpoint step check. Used by
+cli/record_command, cli/stream_command and stream/sender. Receives frames, and writes the file.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """From recorded frames to ticks: setpoints and answers by SYNC. Also decodes offsets and outputs, and counts unhomed
-starts.
+starts. Used by bus/, faults/case_record, identify/stretches and monitor/. No I/O.
 
 Order on the bus (docs/reference/protocol.md section 2): SYNC j, then the setpoints of tick j. The drives answer SYNC j
 with TPDO1 and TPDO2. An answer may come before or after the setpoints of tick j; on a slow host even after SYNC j+1.

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Receives frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock.
+"""Receives frames from the socket of a bus in batches: recvmmsg, outside Python's interpreter lock. Used by
+capture/recorder and monitor/source. Opens the socket and receives; sends no frames.
 
-For `recorder` and the live page. One system call takes up to about a thousand frames. The frames stay raw structures of
-linux/can.h, which numpy reads. Each frame has the time at which the Linux kernel received it (SO_TIMESTAMP) and the
-number of frames that it dropped for this socket (SO_RXQ_OVFL). A local bus sends the time with each frame.
+One system call takes up to about a thousand frames. The frames stay raw structures of linux/can.h, which numpy reads.
+Each frame has the time at which the Linux kernel received it (SO_TIMESTAMP) and the number of frames that it dropped
+for this socket (SO_RXQ_OVFL). A local bus sends the time with each frame.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of a bus as numpy arrays."""
+"""Frames of a bus as numpy arrays. Used by all modules that handle captured frames. No I/O."""
 
 from __future__ import annotations
 

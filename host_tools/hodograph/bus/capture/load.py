@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Measures the load of a bus from captured frames (docs/reference/bus-time.md section 3).
+"""Measures the load of a bus from captured frames (docs/reference/bus-time.md section 3). Used by bus/status_text,
+cli/status_command and monitor/pump. Receives frames, and waits in the time of the bus; sends none.
 
 The load is the bits of all frames, with their computed stuff bits, divided by the bit rate and the time. Shown by
-`hodograph status`, `hodograph run` and the live page. Receives only, never sends.
+`hodograph status` and the live page.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Records each frame of a bus, fast enough for a full bus.
+"""Records each frame of a bus, fast enough for a full bus. Used by bus/, faults/ and latency. A thread receives;
+nothing is sent.
 
-A thread takes frames in batches (frame_batch). On a local bus it is no participant in virtual time. A call returns all
-frames that were sent up to the present instant of the caller.
+A thread takes frames in batches (frame_batch). On a local bus it is no participant in virtual time (docs/glossary.md).
+A call returns all frames that were sent up to the present instant of the caller.
 """
 
 from __future__ import annotations

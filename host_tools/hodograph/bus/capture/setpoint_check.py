@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The setpoint step check: each setpoint step in a recording has to keep the controller's limits.
+"""The setpoint step check: each setpoint step in a recording has to keep the controller's limits. Used by all modules
+that record or analyse setpoints. No I/O.
 
 It checks the targets that a drive executes: a target after another one, both sent with controlword bits 0 to 3 set, to
 a drive that has reported Operation enabled. (Before that, targets follow the axis. During homing, with controlword bit

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The setpoint step check for frames as they come, in windows that overlap."""
+"""The setpoint step check for frames as they come, in parts that overlap. Used by bus/capture/bus_recording,
+cli/record_command, cli/stream_command and monitor/pump. No I/O; changes its own object only.
+"""
 
 from __future__ import annotations
 

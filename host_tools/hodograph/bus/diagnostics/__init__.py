@@ -1,2 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""Diagnostics texts: states, faults and refusals in words, with remedies. Pure functions."""
+"""Diagnostics texts: states, faults and refusals in words, with remedies. Used by bus/, faults/ and monitor/.
+No I/O.
+"""

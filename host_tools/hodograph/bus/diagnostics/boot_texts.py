@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Texts for the reason why the configuration of the drives does not end (object 0x2025)."""
+"""Texts for the reason why the configuration of the drives does not end (object 0x2025). Used by sdo/controller and
+sdo/status. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Names of the states of a CiA 402 drive, and texts for the bits of its statusword."""
+"""Names of the states of a CiA 402 drive, and texts for the bits of its statusword. Used by bus/diagnostics/ and
+sdo/status. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Texts of emergency error codes (CiA 301 table 26, CiA 402-2, and 0xFFxx of this project): the fault and its remedy.
-After the remedy, `hodograph reset` resets the fault.
+After the remedy, `hodograph reset` resets the fault. Used by diagnostics/texts. No I/O.
 
 Single codes come before the classes that contain them. The codes that the controller (firmware/app/machine/fault.h)
 and the simulated drives (firmware/canopen/emcy.h) can raise are all single codes here.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3)."""
+"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3). Used by bus/, faults/ and
+monitor/. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that take a while: sends one (hold, home, quick stop, reset) and waits until the machine is in the
-state that it leads to.
+"""Commands that take a while: sends one (hold, home, quick stop, reset) and waits until the machine is in the state
+that it leads to. Used by api/bus, cli/action_commands and cli/bus_commands. Reads and writes objects of the controller
+by SDO.
 """
 
 from __future__ import annotations

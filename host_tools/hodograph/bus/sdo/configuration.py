@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The object values that configure a controller for a machine file (docs/reference/protocol.md section 3).
+"""The object values that configure a controller for a machine file (docs/reference/protocol.md section 3). Used by
+sdo/controller, sdo/status and cli/record_command.
 
-`sdo/controller` writes them. Pure functions, except those that read the present values.
+`sdo/controller` writes them. `configured_limits` and its like read the present values by SDO; no other I/O.
 """
 
 from __future__ import annotations

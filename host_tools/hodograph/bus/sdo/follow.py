@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Waits until a program has ended, and prints each reason for which it does not move once. Used by bus/run,
-stream/sender and cli/.
+"""Notes why a running program does not move, each reason once, while a command waits for its end. Used by bus/run,
+stream/sender and cli/. Reads objects of the controller by SDO.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Opens a bus by python-can and canopen; their errors become BusError."""
+"""Opens a bus by python-can and canopen; their errors become BusError. Used by sdo/controller, commission/,
+faults/fault_actions and monitor/link. Sends and receives frames, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

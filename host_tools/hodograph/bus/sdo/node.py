@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""SDO access to one node: reads and writes objects under the channel lock, with errors as diagnostics texts."""
+"""SDO access to one node: reads and writes objects under the channel lock, with errors as diagnostics texts. Used by
+sdo/configuration, sdo/controller, sdo/stream_channel and sdo/upload. Sends, receives, and waits in the time of the bus.
+"""
 
 from __future__ import annotations
 

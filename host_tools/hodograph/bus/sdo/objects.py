@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Objects, commands and states of the controller (docs/reference/protocol.md section 3) by name."""
+"""Objects, commands and states of the controller (docs/reference/protocol.md section 3) by name. Used by all modules
+that read or write objects of the controller. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The controller's state, gathered over SDO into one typed snapshot.
+"""The controller's state, gathered over SDO into one typed snapshot. Used by api/bus, bus/status_text, cli/ and
+monitor/link. Reads objects, and writes none.
 
 `Status.json()` has the keys that tools may rely on (docs/reference/cli.md). A snapshot of two axes needs about 60 short
 SDO transfers, a few milliseconds on an idle machine. Values that belong together are read under one channel lock.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Profile `optimal`: the fastest feed along a whole path inside limits of path, axes and drives.
+"""Profile `optimal`: the fastest feed along a whole path inside limits of path, axes and drives. Used by pipeline,
+stream/tails and stream/windows. No I/O.
 
 A plan begins with `plan_optimal`. In order: plan_limits (all limits), feasible (whether they allow any feed), knots
 (first estimate, and knots), grid (the unknown feed^2 as a piecewise cubic), constraints (limited quantities), rows and

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A brake to rest along a path without a quadratic program: one polynomial of degree 4 in time; docs/theory/feed.md
-5.6.
+5.6. Used by stream/tails. No I/O.
 
 With u = t / T the feed is (1 - u)^2 (v (1 + 2 u) + a T u): it begins with the feed v and the acceleration a, and both
 are 0 at its end. Its distance T (v / 2 + a T / 12) gives T. Such a brake takes about a fifth longer than the fastest

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/feed.md 5.6.
+"""The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/feed.md 5.6. Used by
+optimal/rows and optimal/window. No I/O.
 
 With the position r of an axis in mm as a function of the grid's parameter x (grid.py), its derivatives R1, R2, R3, and
 p = (dx/dt)^2:

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Finds infeasible limits: which ones, where, and the values that would suffice; docs/theory/feed.md 5.6.
+"""Finds infeasible limits: which ones, where, and the values that would suffice; docs/theory/feed.md 5.6. Used by
+optimal/planner and stream/windows. No I/O.
 
 Each path without corners can be run inside any limits, if slowly enough. A program needs at least LEAST_FEED_MM_S at
 each place, and has a longest time. The feed that a limit allows is computed for constant feed; for acceleration and

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""q = feed^2 over arc length, a C1 piecewise cubic, graded next to rest; docs/theory/feed.md 5.6.
+"""q = feed^2 over arc length, a C1 piecewise cubic, graded next to rest; docs/theory/feed.md 5.6. Used by
+optimal/constraints and optimal/window. No I/O.
 
 On interval i, q(s) = sigma'(x)^2 p(x), s = sigma(x), p a cubic. Inside the path sigma is the identity. Next to rest at
 s = a it is a + x^3 (or its mirror), since q is proportional to s^(4/3) there: in x, p is smooth and F''' = 6 p^(3/2).

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The first estimate of the feed, and the knots that follow from it; docs/theory/feed.md 5.6."""
+"""The first estimate of the feed, and the knots that follow from it; docs/theory/feed.md 5.6. Used by optimal/sequence,
+optimal/window and stream/windows. No I/O.
+"""
 
 from __future__ import annotations
 

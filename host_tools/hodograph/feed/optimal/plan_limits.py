@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""All limits of a feed along a path as one object, with reserves subtracted; docs/theory/feed.md 5.6. `gather`
-makes it from path file, machine and drives; the planner reads it.
+"""All limits of a feed along a path as one object, with reserves subtracted; docs/theory/feed.md 5.6. `gather` makes it
+from path file, machine and drives; the planner reads it. Used by feed/optimal/ and stream/. No I/O.
 """
 
 from __future__ import annotations

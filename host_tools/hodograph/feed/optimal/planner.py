@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The profile `optimal`: least time along a path inside all its limits; docs/theory/feed.md 5.6."""
+"""The profile `optimal`: least time along a path inside all its limits; docs/theory/feed.md 5.6. Used by pipeline. No
+I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Limits as linear inequalities about a feed near the last one; docs/theory/feed.md 5.6.
+"""Limits as linear inequalities about a feed near the last one; docs/theory/feed.md 5.6. Used by optimal/solver and
+optimal/window. No I/O.
 
 A jerk is sqrt(p) times a linear function of the unknowns: |linear| <= limit / sqrt(p). The right side is convex in p,
 so its tangent at the last p is below it: a feed that keeps the tangent keeps the limit.

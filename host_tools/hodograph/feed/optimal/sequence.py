@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The sequence of planning windows over a whole path; docs/theory/feed.md 5.6.
+"""The sequence of planning windows (parts that are planned at once) over a whole path; docs/theory/feed.md 5.6. Used by
+optimal/planner, stream/tails and stream/windows. No I/O.
 
 With windows, time and memory are proportional to length. Each window is planned to rest at its own end, so a motion to
 rest inside all limits always exists. Only the first part of a window is kept, which the stop at the end does not

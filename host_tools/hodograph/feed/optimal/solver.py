@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Scales a quadratic program of the planner and solves it in C; docs/theory/feed.md 5.6."""
+"""Scales a quadratic program of the planner and solves it in C; docs/theory/feed.md 5.6. Used by optimal/window. No
+I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The track: arc length over time in polynomials of degree 7, and its peaks; docs/theory/feed.md 5.6.
+"""The track: arc length over time in polynomials of degree 7, and its peaks; docs/theory/feed.md 5.6. Used by
+feed/optimal/ and stream/. No I/O.
 
 Each interval becomes a piece with the exact F, F', F'' and F''' at both ends (two-point Hermite): C2, and
 F''' jumps only where the plan's does.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The fastest feed over one window of a path, from a given state to rest; docs/theory/feed.md 5.6."""
+"""The fastest feed over one planning window (a part of a path), from a given state to rest; docs/theory/feed.md 5.6.
+Used by feed/optimal/ and stream/. No I/O.
+"""
 
 from __future__ import annotations
 

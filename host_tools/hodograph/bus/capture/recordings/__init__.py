@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Recordings of a bus as files: candump (.log), Vector ASC (.asc) and BLF (.blf).
+"""Recordings of a bus as files: candump (.log), Vector ASC (.asc) and BLF (.blf). Used by bus/, cli/ and
+monitor/source. Reads and writes the files that it is given.
 
 The arrays are those of `Recorder.frames()` (`RECORD_DTYPE`): identifier with the flags of linux/can.h, length, data,
 time in microseconds since 1970. What is written comes back exactly and in order, with these exceptions: an ASC file

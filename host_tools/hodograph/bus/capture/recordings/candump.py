@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The log format of can-utils (`candump -L`, `candump -l`), a block of lines at a time.
+"""The log format of can-utils (`candump -L`, `candump -l`), a block of lines at a time. Used by recordings/files. Reads
+the file that it is given.
 
     (1436509052.249713) vcan0 182#270653C8DD01
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Chooses the channel of a recording that holds several buses (`--channel`). Used by recordings/candump and
-recordings/vector.
+recordings/vector. No I/O.
 """
 
 from __future__ import annotations

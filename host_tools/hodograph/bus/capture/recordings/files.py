@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reading and writing recordings. The file's name gives the format."""
+"""Reading and writing recordings. The file's name gives the format. Used by bus/, cli/ and monitor/source. Reads and
+writes the files that it is given.
+"""
 
 from __future__ import annotations
 

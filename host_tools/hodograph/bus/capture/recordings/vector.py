@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Vector's ASC and BLF, by python-can's readers and writers, which handle one message at a time."""
+"""Vector's ASC and BLF, by python-can's readers and writers, which handle one message at a time. Used by
+recordings/files. Reads and writes the files that it is given.
+"""
 
 from __future__ import annotations
 
