@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Traces: CSV files with one row for each tick; `hodograph simulate --trace`."""
+"""Traces: CSV files with one row for each tick (option `--trace`). Used by cli/. Writes the file that it is given."""
 
 from __future__ import annotations
 
