@@ -33,7 +33,9 @@ Int = NDArray[np.int64]
 Curve = PHSpline | SpatialPHSpline
 
 SEGMENT_S = 0.1
-"""A segment is halved until it takes about this time at its feed, since tails end at ends of segments."""
+"""A segment is halved until it takes about this time at its feed, since tails (brakes of chunks) end at ends of
+segments.
+"""
 
 _LEAST_HALVED_MM = 0.25
 _SPEED_RATIO = 2.0

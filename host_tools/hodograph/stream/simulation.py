@@ -23,7 +23,7 @@ from ..program.stops import no_stops
 from .chunk import Chunk
 
 _SLICE_TICKS = 50
-"""Less than a takeover may be late (LATENESS_S), at the shortest period."""
+"""Less than a takeover (docs/glossary.md) may be late (LATENESS_S), at the shortest period."""
 
 
 @dataclass(frozen=True)
