@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of the feed: plain and modified ramp (paper figures 2 and 4), pattern search (figure 3)."""
+"""Figures of the feed: plain and modified ramp (paper figures 2 and 4), pattern search (figure 3). Used by report/html.
+Returns PNG bytes; the pipeline may read its machine file.
+"""
 
 from __future__ import annotations
 

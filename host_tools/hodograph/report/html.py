@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The report of runs: one self-contained HTML file, and its figures as PNG files."""
+"""The report of runs: one self-contained HTML file, and its figures as PNG files. Used by cli/. Writes these files;
+reads the paper's examples where it compares a path with the paper.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Marks of outputs in figures: places on a path in the plane or in space, and times in a run."""
+"""Marks of outputs in figures: places on a path in the plane or in space, and times in a run. Used by
+report/path_figures, report/run_figures and report/space_figures. Draws into the Matplotlib axes that it is given; the
+pipeline may read its machine file.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""One page: a self-contained HTML file, and its figures as PNG files next to it."""
+"""One page: a self-contained HTML file, and its figures as PNG files next to it. Used by report/ and campaign/report.
+Reads a template of its package, makes the folder of the page, and writes the files.
+"""
 
 from __future__ import annotations
 

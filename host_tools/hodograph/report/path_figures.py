@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of the path: polygon, nodes and curve (paper figure 1), curvature, and differences of chord speed at
-constant feed (figure 5)."""
+"""Figures of the path: polygon, nodes and curve (paper figure 1), curvature, and differences of chord speed at constant
+feed (figure 5). Used by report/html. Returns PNG bytes; the pipeline may read its machine file.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a run (paper figure 7): path with the worst place enlarged, contour error, drives."""
+"""Figures of a run (paper figure 7): path with the worst place enlarged, contour error, drives. Used by report/html and
+report/space_figures. Returns PNG bytes; the pipeline may read its machine file.
+"""
 
 from __future__ import annotations
 

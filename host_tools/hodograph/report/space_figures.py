@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a path in space: the curve with its given points, a run from four sides, and the axes after x, y, z."""
+"""Figures of a path in space: the curve with its given points, a run from four sides, and the axes after x, y, z. Used
+by report/html. Returns PNG bytes; the pipeline may read its machine file.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Colours, fonts and sizes of all figures, and their PNG bytes."""
+"""Colours, fonts and sizes of all figures, and their PNG bytes. Used by report/ and campaign/report. Sets the backend
+of Matplotlib, and its settings inside `styled`, for the whole process; one thread.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of a toolpath: the path with the feed as colour, corners with their tolerance, the feed over time."""
+"""Figures of a toolpath: the path with the feed as colour, corners with their tolerance, the feed over time. Used by
+report/toolpath_report. Returns PNG bytes; no I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The report of a toolpath. Its view of the path names the source line under the cursor."""
+"""The report of a toolpath. Its view of the path names the source line under the cursor. Used by cli/report_commands.
+Reads lines of the G-code file; writes an HTML file and its figures as PNG files.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The report of a tuning: frequency and step responses of the loops, contour error along the paths; one HTML file and
-its figures as PNG files."""
+its figures as PNG files. Used by cli/tune_command. Simulates the paths, and writes these files.
+"""
 
 from __future__ import annotations
 

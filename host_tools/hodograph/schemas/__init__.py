@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""JSON schemas (draft 7) of the input files, for editors and other tools: `hodograph schema`.
+"""JSON schemas (draft 7) of the input files, for editors and other tools: `hodograph schema`. Used by
+cli/start_commands. No I/O.
 
 A schema describes what one file may hold by itself: keys, types, ranges, and which keys go together. The readers in
 config/, faults/ and campaign/ decide (docs/reference/files.md): they also compare numbers with one another and read the

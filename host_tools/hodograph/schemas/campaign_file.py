@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The JSON schemas of campaign files and fault scenarios."""
+"""The JSON schemas of campaign files and fault scenarios. Used by `schema` of this package. No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The JSON schemas of machine files and drive files."""
+"""The JSON schemas of machine files and drive files. Used by `schema` of this package. No I/O."""
 
 from __future__ import annotations
 

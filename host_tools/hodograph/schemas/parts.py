@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Parts of JSON schemas: each function makes the schema of one kind of value, with its description.
+"""Parts of JSON schemas: each function makes the schema of one kind of value, with its description. Used by schemas/.
+No I/O.
 
 Two are different. `described` completes a schema that it gets, and writes the default into it. `only_with` makes a
-condition, without a description. The others are pure.
+condition, without a description. All but `described` are pure.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The JSON schema of path files, and of the outputs in machine files."""
+"""The JSON schema of path files, and of the outputs in machine files. Used by schemas/machine_file and `schema` of this
+package. No I/O.
+"""
 
 from __future__ import annotations
 

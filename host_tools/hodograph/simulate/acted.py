@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Time and place at which each output of the path switched in a run, simulated or on a bus. For `outputs` of `--json`,
-and marks in figures.
+"""Time and place at which each output of the path switched in a run, simulated or on a bus; for `outputs` of `--json`,
+and for marks in figures. Used by simulate/motion. No I/O.
 """
 
 from __future__ import annotations

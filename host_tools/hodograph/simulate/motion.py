@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima."""
+"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima. Used by all modules that make the
+result of a run or show it. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run from a recording of the bus; for `hodograph run`, `replay` and tests."""
+"""The result of a run from a recording of the bus, for `hodograph run` and `replay`. Used by bus/analysis. No I/O; its
+arguments are the recorded setpoints and reports.
+"""
 
 from __future__ import annotations
 

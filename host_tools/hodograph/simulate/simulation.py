@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs a program without a bus: the controller's kernel and the simulated axes in this process, without waiting.
-
-Reads and writes no file. For commands, the report, tuning and the API.
+"""Runs a program without a bus: the controller's kernel and the simulated axes in this process, without waiting. Used
+by all modules that simulate a run. No I/O.
 """
 
 from __future__ import annotations

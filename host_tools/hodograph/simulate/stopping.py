@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs that are stopped in motion, without a bus: feed hold, stop and fault stop. For `hodograph simulate` and
-benchmarks.
+"""Runs that are stopped in motion, without a bus: feed hold, stop and fault stop. Used by cli/path_commands and
+benchmarks. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Traces: CSV files with one row for each tick; `hodograph simulate --trace`."""
+"""Traces: CSV files with one row for each tick (option `--trace`). Used by cli/. Writes the file that it is given."""
 
 from __future__ import annotations
 
@@ -34,9 +34,8 @@ _CHUNK = 65536
 def write_trace(motion: Motion, file: Path) -> None:
     """Write the program's ticks of a run whose rows were kept; floats in full precision.
 
-    t_s is tick * period; rows are aligned as in docs/reference/protocol.md section 2. Raises InputError when
-    the file cannot
-    be written.
+    t_s is tick * period; rows are aligned as in docs/reference/protocol.md section 2. Raises InputError when the
+    file cannot be written.
     """
     outputs = motion.output_columns
     columns = [

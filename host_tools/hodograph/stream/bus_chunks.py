@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The path of a streamed job for the live page, from captured SDO block downloads to object 0x2060 sub 1.
+"""The path of a streamed job for the live page, from its chunks (parts of the job): captured SDO block downloads to
+object 0x2060 sub 1. Used by monitor/. No I/O. Changes its own objects only; one thread.
 
 In a block download (CiA 301) the client announces the transfer and sends segments of 7 bytes in blocks. The server
 reports for each block how many segments came in order. At the end the client gives the number of unused bytes.

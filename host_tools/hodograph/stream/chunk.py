@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""A chunk of a stream: a header and a whole program image, to and from bytes; docs/reference/protocol.md 1.7.
+"""A chunk (a part of a job): a header and a whole program image, to and from bytes; docs/reference/protocol.md 1.7.
+Used by stream/, monitor/ and cli/stream_command. No I/O.
 
-Every chunk ends at rest. Its last pieces are a tail that brakes along the path; the next chunk repeats the pieces
-before the tail with the same numbers and goes on from their end, the joint.
+Every chunk ends at rest. Where the path continues in motion, the last pieces of a chunk are a tail that brakes along
+the path; the next chunk repeats the pieces before the tail with the same numbers and goes on from their end, the joint.
+A chunk that begins at rest repeats nothing.
 """
 
 from __future__ import annotations

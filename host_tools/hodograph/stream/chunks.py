@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A section as a sequence of chunks: each piece is planned once and has the same bits in all chunks that contain it;
-docs/reference/protocol.md 1.7. Used by plan.py, by paths.py for path files, and by cli/stream_command.
+"""A section as a sequence of chunks (parts of a job): each piece is planned once and has the same bits in all chunks
+that contain it; docs/reference/protocol.md 1.7. Used by plan.py, paths.py and cli/stream_command. Takes blocks of the
+path from an iterator that may read the toolpath; no other I/O.
 """
 
 from __future__ import annotations

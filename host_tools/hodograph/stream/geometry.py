@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The part of a section's path that is in memory: integer segments as in a program image, and their curve.
+"""The part of a section's path that is in memory: integer segments as in a program image, and their curve. Used by
+stream/ and monitor/job_path. Passes on blocks from an iterator that may read the toolpath; no other I/O.
 
 Blocks of segments are added at its end as they are fitted and removed from its start as they are passed. A segment
-never changes: chunks that were sent have its bits.
+never changes: chunks (parts of the job) that were sent have its bits.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ Int = NDArray[np.int64]
 Curve = PHSpline | SpatialPHSpline
 
 SEGMENT_S = 0.1
-"""A segment is halved until it takes about this time at its feed, since tails end at ends of segments."""
+"""A segment is halved until it takes about this time at its feed, since tails (brakes of chunks) end at ends of
+segments.
+"""
 
 _LEAST_HALVED_MM = 0.25
 _SPEED_RATIO = 2.0

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The journal of a streamed job: what `hodograph stream --continue` needs to find the place where the machine rests.
+Used by stream/ and cli/stream_command. Reads, replaces and locks the file that it is given, and checks size and time of
+the job's files.
 
-A JSON document that is replaced atomically: after a loss of power the old or the new one is there. Written by
-sender.py.
+A JSON document that is replaced atomically: after a loss of power the old or the new one is there.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Checks before any motion that a machine has the outputs and the rotary axes that a job uses. Used by
-cli/stream_command.
+cli/stream_command. Reads the files of the job.
 
 A toolpath is read part by part while the machine moves, so a missing output or axis would be found in motion. A scan of
 the G-code text costs far less than reading it, but understands plain numbers only. If the scan finds an expression, an

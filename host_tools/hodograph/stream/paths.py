@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Path files with several paths as one job: each path becomes one chunk, with a rest before it. Used by plan.py."""
+"""Path files with several paths as one job: each path becomes one chunk (part of the job), and the axes rest between
+them. Used by plan.py. Reads the path file, and the files that it names.
+"""
 
 from __future__ import annotations
 

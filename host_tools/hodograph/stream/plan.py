@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The plan of a job: a thread makes its chunks ahead of the sender and keeps them on the disk, not in memory. Used by
-cli/stream_command, resuming.py and sender.py.
+"""The plan of a job: a thread makes its chunks (parts) ahead of the sender and keeps them on the disk, not in memory.
+Used by cli/stream_command, resuming.py and sender.py. Reads the files of the job. Starts a thread and, for each
+toolpath file, a process that reads it.
 """
 
 from __future__ import annotations

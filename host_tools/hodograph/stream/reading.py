@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Toolpaths of any length as sections, read and fitted part by part; the first stage of streaming.
+"""Toolpaths of any length as sections, read and fitted part by part; the first stage of streaming. Used by stream/plan,
+stream/reading_process and stream/resuming. Reads the toolpath file or stdin.
 
-A section with more chords than a fitting window is cut in the middle of chords where the path is nearly straight. At a
-cut the curves of both parts have the direction of the chord and curvature 0, so they join C2.
+A section with more chords than are fitted at once (a fitting window) is cut in the middle of chords where the path is
+nearly straight. At a cut the curves of both parts have the direction of the chord and curvature 0, so they join C2.
 """
 
 from __future__ import annotations

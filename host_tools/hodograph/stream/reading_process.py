@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Reads and fits a toolpath in a process of its own, so that the feed is planned on another core meanwhile.
+"""Reads and fits a toolpath in a process of its own, so that the feed is planned on another core meanwhile. Used by
+stream/plan. Starts a process that reads the file, and kills it in the end; stdin is read in the calling process.
 
 What comes out is what StreamReader gives, in the same order and with the same bits. The process is a copy of this one
 (fork): it begins at once, and holds nothing of its own before it reads. It ends with its reader: the system kills it
-when the thread that began it ends, and its next write fails when the pipe between the two is closed. It is one part of
-the path ahead at most.
+when the thread that began it ends, and its next write fails when the pipe between the two is closed. It is ahead by
+what the pipe holds, and by one part of the path.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Where `stream --continue` resumes a job that the controller has lost: the place of its path nearest to the axes."""
+"""Where `stream --continue` resumes a job that the controller has lost: the place of its path nearest to the axes. Used
+by cli/stream_command. Reads the files of the job.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sends a planned job to the controller: uploads chunks in order as the ring has room, starts the motion, executes
-commands at rest, and waits for the end. Used by cli/stream_command.
+"""Sends a planned job to the controller: uploads chunks (parts of the job) in order as its ring buffer has room, starts
+the motion, executes commands at rest, and waits for the end. Used by cli/stream_command. Reads and writes objects of
+the controller by SDO, moves the axes, writes the journal and the recording, and waits in the time of the bus.
 """
 
 from __future__ import annotations

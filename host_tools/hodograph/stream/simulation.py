@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A stream without a bus: chunks one after the other through the controller's core, and their pieces as one program."""
+"""A stream without a bus: chunks (parts of a job) one after the other through the controller's core, and their pieces
+as one program. Used by cli/stream_command. Takes the chunks from an iterator that may wait for them; no other I/O.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,7 @@ from ..program.stops import no_stops
 from .chunk import Chunk
 
 _SLICE_TICKS = 50
-"""Less than a takeover may be late (LATENESS_S), at the shortest period."""
+"""Less than a takeover (docs/glossary.md) may be late (LATENESS_S), at the shortest period."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which pieces of a chunk get stop parameters, searched on the path that its window knows; docs/theory/feed.md
-section 7. Used by chunks.py.
+"""Which pieces of a chunk get stop parameters, searched on the path that its planning window knows (docs/glossary.md);
+docs/theory/feed.md section 7. Used by chunks.py. No I/O.
 
 Stop codes of M pieces have the shape (M, 2, 3), as in ../program/stops.py.
 """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Keeps planned chunks on disk until they are sent, in temporary files of bounded size that are removed as they are
-read. Used by plan.py.
+"""Keeps planned chunks (parts of a job) on disk until they are sent, in temporary files of bounded size that are
+removed as they are read. Used by plan.py. Writes and reads files without a name in the folder for temporary files.
 """
 
 from __future__ import annotations

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""The feed of a section in planning windows; docs/theory/feed.md 5.6. Used by chunks.py, stop_search.py and tails.py.
+"""The feed of a section in planning windows (docs/glossary.md); docs/theory/feed.md 5.6. Used by chunks.py,
+stop_search.py and tails.py. Takes blocks of the path from an iterator that may read the toolpath; no other I/O.
 
-A window begins in motion, where the kept part of the last window ends, and is planned to rest at its own end. Kept
-pieces never change again. A chunk ends with a tail: a fast brake from its last joint to rest at the end of a segment.
+A window begins where the kept part of the last window ends, in motion or at rest, and is planned to rest at its own
+end. Kept pieces that are in a chunk never change again. A chunk ends with a tail, a fast brake from its last joint to
+rest at the end of a segment, unless the path rests at that joint.
 """
 
 from __future__ import annotations

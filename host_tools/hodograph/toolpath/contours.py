@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Contours of a drawing: lines, arcs and splines that follow each other, kept in little memory.
+"""Contours of a drawing: lines, arcs and splines that follow each other, kept in little memory. Used by toolpath/. No
+I/O.
 
 A reader of drawings calls `move_to` and then the methods that draw, in the coordinates of the drawing; the affine map
 `Contours.affine` takes them to mm. Contours may then be read in any order and direction (`steps`).

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Drawings as toolpaths: the common part of the readers of DXF and SVG.
+"""Drawings as toolpaths: the common part of the readers of DXF and SVG. Used by toolpath/dxf, toolpath/svg and
+toolpath/files. No I/O.
 
 A reader fills a `Drawing`: contours in groups (layer and colour), and notes of what it left out. `commands` then joins
 the contours, orders them, and gives the moves: rapid to each contour, and along it at the feed of its group.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads drawings in DXF (ASCII, R12 and newer) as toolpaths. docs/reference/drawings.md lists what is read.
+"""Reads drawings in DXF (ASCII, R12 and newer) as toolpaths. docs/reference/drawings.md lists what is read. Used by
+toolpath/files. Reads the file that it is given.
 
     for command in read_dxf(Path("part.dxf"), DrawingOptions(feed_mm_s=20.0)):
         ...

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Curves of DXF entities: `CURVES` has the function that draws each kind. It draws in the coordinates of the contours.
+Used by toolpath/dxf. No I/O; changes the contours that it is given.
 
 Raises ShapeError: a value is missing or has no meaning.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tags of a DXF file: group code and value, a line each, one after the other; and the records that they form."""
+"""Tags of a DXF file: group code and value, a line each, one after the other; and the records that they form. Used by
+toolpath/dxf and toolpath/dxf_curves. Reads the open file that it is given.
+"""
 
 from __future__ import annotations
 

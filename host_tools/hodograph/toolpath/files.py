@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads toolpath files of every kind, distinguished by the endings of their names.
+"""Reads toolpath files of every kind, distinguished by the endings of their names. Used by all modules that read a
+toolpath file. Reads the file that it is given, or stdin.
 
 for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
     ...

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Joins the contours of a drawing, and chooses their order, direction and start for short rapid moves between them.
+Used by toolpath/drawing. No I/O.
 
 `join` makes chains of contours whose ends meet. `arrange` orders the chains: it begins with the nearest one next. Then
 it reverses a part of the sequence (2-opt) or moves one chain elsewhere (or-opt) while that shortens the rapid moves,
-within a bound of work. A closed chain may begin at the start of each of its steps, or at 16 points of a circle. Used by
-`drawing`.
+within a bound of work. A closed chain may begin at the start of each of its steps, or at 16 points of a circle.
 
 The work is bounded by counts, not by time: the same drawing gives the same sequence on every computer.
 """

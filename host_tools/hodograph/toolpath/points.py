@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads points, one in a line, as a toolpath. docs/reference/points.md describes the file.
+"""Reads points, one in a line, as a toolpath. docs/reference/points.md describes the file. Used by toolpath/files.
+Takes the lines from an iterator that may read the file; no other I/O.
 
     with open("part.csv", encoding="utf-8", errors="surrogateescape") as lines:
         for command in read_points(lines, "part.csv", PointOptions(feed_mm_s=20.0)):

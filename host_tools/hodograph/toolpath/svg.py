@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads drawings in SVG 1.1 as toolpaths. docs/reference/drawings.md lists what is read.
+"""Reads drawings in SVG 1.1 as toolpaths. docs/reference/drawings.md lists what is read. Used by toolpath/files. Reads
+the file that it is given two or three times.
 
     for command in read_svg(Path("part.svg"), DrawingOptions(feed_mm_s=20.0)):
         ...

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Values of SVG attributes: path data, transforms, lengths, lists of points, style declarations and style sheets.
+"""Values of SVG attributes: path data, transforms, lengths, lists of points, style declarations and style sheets. Used
+by toolpath/svg. No I/O; changes the contours that it is given.
 
 Each function raises ShapeError for text that the grammar of SVG 1.1 does not allow. Renderers draw a broken path up to
 its first error without a message; a part machined in this way would be wrong.
