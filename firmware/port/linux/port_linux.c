@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/port.h for Linux: SocketCAN, a thread for the interrupts, main() for the main loop. Used by
- * firmware/app. Contexts: port/port.h. */
+ * firmware/app and the ports. Contexts: port/port.h. */
 #define _GNU_SOURCE
 #include "port/port.h"
 
