@@ -1,9 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_users.py [ROOT]: compares the lists of users in C headers and Python modules with the files that use them.
-Prints FILE:LINE and the missing and superfluous names of each wrong list; exit status 1 then.
+"""check_users.py [ROOT]: each C file and Python module names its users and its effects in its first comment, and the
+lists of users are right. Run by `make lint`. Reads the files of the tree; prints FILE:LINE and what is wrong, with exit
+status 1 then.
 
-A list is a sentence in the first comment of a header or in the docstring of a module:
+Users are a sentence with one of the words of USERS ("Used by", "Started by", "A part of"), effects one with a word of
+EFFECTS ("Main loop", "Pure", "No I/O", "Reads"). Both stand in the first FIRST_SCREEN lines of each file outside of
+tests. Whether the effects are true is for readers to check.
+
+A list of users is a sentence in the first comment of a C file or in the docstring of a module:
 
     (Used|Called) by PART, PART and PART.           PART: NAME [words], or words that name no file
 
@@ -16,7 +21,7 @@ A C module uses a header when it includes it and contains a name that the header
 of these names is a function or macro with arguments. A Python module uses another when it imports it or a name of it,
 also through a package that exports the name. A list is right when each of its names contains a user, and each user is
 in it. A user that includes a header through another one may be missing; so may tests, tools and benchmarks. A list has
-at most MOST names.
+at most MOST names. The list of a C source is that of the header that its comment names first.
 """
 
 from __future__ import annotations
@@ -43,6 +48,17 @@ WORDS = {
 MOST = 4
 OPTIONAL = ("tests/", "tools/", "benchmarks/")
 """Users that may be missing, except in lists of the same folder."""
+
+FIRST_SCREEN = 40
+USERS = re.compile(
+    r"\b(Used|Called|Started|Run|Included|Imported|Loaded|Executed)\s+(\w+\s+)?(by|as|when|only|in)\b"
+    r"|\b[Pp]art\s+of\b",
+)
+EFFECTS = re.compile(
+    r"\b(pure|main\s+loop|timer|contexts?|threads?|I/O|ticks?|interrupts?|lock|reset|constants?|plain\s+data|macros"
+    r"|changes|reads|writes|receives|sends|starts|prints|waits|keeps|opens|builds|draws|makes|measures)\b",
+    re.IGNORECASE,
+)
 
 _LIST = re.compile(r"\b(?P<verb>Used|Called)\s+by\s(?P<names>.*?)(?:[.;:](?=\s|$)|$)", re.DOTALL)
 _INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
@@ -104,7 +120,7 @@ class Tree:
     def lists(self) -> Iterator[UserList]:
         """All lists to compare."""
         for path, text in self.texts.items():
-            if path.endswith(".c") or path.startswith("tests/"):
+            if path.startswith("tests/"):
                 continue
             start, comment = _first_comment(path, text)
             for found in _LIST.finditer(comment):
@@ -113,11 +129,18 @@ class Tree:
                 if names:
                     yield UserList(path, line, found["verb"], names)
 
-    def users(self, item: UserList) -> Users:
-        """The modules that use the file of the list."""
-        if item.path.endswith(".h"):
-            return self._users_of_header(item.path, item.verb == "Called")
-        return self._users_of_module(item.path)
+    def users(self, item: UserList) -> Users | None:
+        """The modules that use the file of the list; None for a C source without a header."""
+        if item.path.endswith(".py"):
+            return self._users_of_module(item.path)
+        header = item.path if item.path.endswith(".h") else self._header_of(item.path)
+        return self._users_of_header(header, item.verb == "Called") if header else None
+
+    def _header_of(self, source: str) -> str | None:
+        """The header that the first comment of a C source names first."""
+        named = re.search(r"[\w/]+\.h\b", _first_comment(source, self.texts[source])[1])
+        paths = [f"{root}/{named[0]}" for root in INCLUDE_ROOTS] if named else []
+        return next((path for path in paths if path in self.texts), None)
 
     def named(self, name: str, path: str) -> set[str]:
         """Modules that `name` in a list of the file at `path` means; empty if there is none."""
@@ -268,6 +291,8 @@ def _optional(module: str, path: str) -> bool:
 def faults(tree: Tree, item: UserList) -> Iterator[str]:
     """What is wrong with a list."""
     users = tree.users(item)
+    if users is None:
+        return
     means = {name: tree.named(name, item.path) for name in item.names}
     covered = set().union(*means.values())
     missing = sorted(m for m in users.required - covered if not _optional(m, item.path))
@@ -280,9 +305,22 @@ def faults(tree: Tree, item: UserList) -> Iterator[str]:
         yield f"{len(item.names)} names, at most {MOST}: name a folder, or remove the list"
 
 
-def check(root: Path) -> Iterator[str]:
-    """One line for each wrong list."""
-    tree = Tree(root)
+def silent(tree: Tree) -> Iterator[str]:
+    """One line for each file that does not name its users, or its effects, in its first screen."""
+    for path, text in tree.texts.items():
+        if path.startswith("tests/") or not text.strip():
+            continue
+        start, comment = _first_comment(path, text)
+        screen = comment.split("\n")[: FIRST_SCREEN - text.count("\n", 0, start)]
+        words = "\n".join(screen)
+        if not USERS.search(words):
+            yield f"{path}:1: the first comment does not name the users (Used by ...)"
+        if not EFFECTS.search(words):
+            yield f"{path}:1: the first comment does not name the effects (Main loop, No I/O, Reads ...)"
+
+
+def wrong_lists(tree: Tree) -> Iterator[str]:
+    """One line for each list that differs from the users."""
     for item in tree.lists():
         wrong = "; ".join(faults(tree, item))
         if wrong:
@@ -292,7 +330,8 @@ def check(root: Path) -> Iterator[str]:
 def main(arguments: list[str]) -> int:
     """Exit status."""
     root = Path(arguments[0]) if arguments else Path(__file__).resolve().parent.parent
-    wrong = list(check(root))
+    tree = Tree(root)
+    wrong = [*silent(tree), *wrong_lists(tree)]
     for line in wrong:
         print(line)
     return 1 if wrong else 0

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/chunk_records.h (see there): the coefficient records of a job in chunks, made ahead of the tick. */
+/* Implements app/chunk_records.h (see there): the coefficient records of a job in chunks, made ahead of the tick. Used
+ * by app/stream. Main loop; takes the machine's lock where it is needed. */
 #include "app/chunk_records.h"
 
 #include "core/kernel.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/chunk_ring.h (see there): memory for the chunks of a stream. */
+/* Implements app/chunk_ring.h (see there): memory for the chunks of a stream. Used by app/stream. Main loop. */
 #include "app/chunk_ring.h"
 
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/controller.h (see there): the wiring of machine, tick, protocol objects and port. */
+/* Implements app/controller.h (see there): the wiring of machine, tick, protocol objects and port. Used by app/main.c.
+ * Main loop. */
 #include "app/controller.h"
 
 #include <stddef.h>

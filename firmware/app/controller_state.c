@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/controller_state.h (see there): what the parts of the controller need of the whole. */
+/* Implements app/controller_state.h (see there): what the parts of the controller need of the whole. Used by
+ * firmware/app, except its folders. Main loop. */
 #include "app/controller_state.h"
 
 #include "port/port.h"

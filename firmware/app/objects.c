@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/objects.h (see there): the behaviour of the controller's object dictionary (controller.eds). */
+/* Implements app/objects.h (see there): the behaviour of the controller's object dictionary (controller.eds). Used by
+ * app/controller.c. Main loop. */
 #include "app/objects.h"
 
 #include <stddef.h>

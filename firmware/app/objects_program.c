@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/objects_program.h (see there): handlers of object 0x2000, for the table and the hooks in
- * objects.c. */
+/* Implements app/objects_program.h (see there): handlers of object 0x2000, for the table and the hooks in objects.c.
+ * Called by objects.c only. They read and change controller->slot. `context` is the controller. Main loop. */
 #include "app/objects_program.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/program_slot.h (see there): the active program and the upload of its successor (object 0x2000). */
+/* Implements app/program_slot.h (see there): the active program and the upload of its successor (object 0x2000).
+ * Called by app/commands, app/objects_program and app/controller.c. Main loop. */
 #include "app/program_slot.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/report.h (see there): emergency messages, the NMT state after errors, lines on the console. */
+/* Implements app/report.h (see there): emergency messages, the NMT state after errors, lines on the console. Used by
+ * app/controller.c. Main loop; takes the port's lock to read the machine. */
 #include "app/report.h"
 
 #include "canopen/cia402.h"

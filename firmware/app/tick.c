@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/tick.h: one period of the controller. */
+/* Implements app/tick.h: one period of the controller. Called by app/controller.c. Timer, once a period, under the
+ * port's lock; tick_init in the main loop. */
 #include "app/tick.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements can/slcan.h (see there): CAN frames as lines of text, as LAWICEL's adapters and their many
- * descendants have them. */
+/* Implements can/slcan.h (see there): CAN frames as lines of text, as LAWICEL's adapters and their many descendants
+ * have them. Used by sim/gateway and port/mps2. Pure, any context. */
 #include "can/slcan.h"
 
 #include <string.h>

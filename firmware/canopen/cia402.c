@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/cia402.h (see there): states, controlword and statusword of the drive profile. */
+/* Implements canopen/cia402.h (see there): states, controlword and statusword of the drive profile. Used by
+ * firmware/app, firmware/canopen and sim/node. Pure, any context. */
 #include "canopen/cia402.h"
 
 #include <stddef.h>

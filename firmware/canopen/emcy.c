@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/emcy.h (see there): emergency messages, error register 0x1001 and history 0x1003. */
+/* Implements canopen/emcy.h (see there): emergency messages, error register 0x1001 and history 0x1003. Used by
+ * firmware/app and sim/node. No I/O: the caller sends. */
 #include "canopen/emcy.h"
 
 #include <assert.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/heartbeat.h (see there): heartbeat producer (0x1017) and consumer (0x1016). */
+/* Implements canopen/heartbeat.h (see there): heartbeat producer (0x1017) and consumer (0x1016). Used by the
+ * controller and by each simulated node. No I/O: the caller sends. */
 #include "canopen/heartbeat.h"
 
 #include "canopen/cob.h"

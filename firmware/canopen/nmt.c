@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/nmt.h (see there): the NMT slave's state machine and the master's commands. */
+/* Implements canopen/nmt.h (see there): the NMT slave's state machine and the master's commands. Used by firmware/app,
+ * canopen/heartbeat and sim/node. No I/O: the caller sends. */
 #include "canopen/nmt.h"
 
 #include <stddef.h>

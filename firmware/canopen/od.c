@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/od.h: finds and moves values of an object dictionary. */
+/* Implements canopen/od.h: finds and moves values of an object dictionary. Used by canopen/od_transfer,
+ * canopen/pdo_map, firmware/app and sim/node. Main loop, if not stated otherwise. */
 #include "canopen/od.h"
 
 #include <string.h>

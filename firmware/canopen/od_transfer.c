@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/od_transfer.h: writes or reads one object of a dictionary piece by piece. */
+/* Implements canopen/od_transfer.h: writes or reads one object of a dictionary piece by piece. Called by
+ * canopen/sdo_server. Main loop. */
 #include "canopen/od_transfer.h"
 
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/pdo.h (see there): the fixed process data of the bus. */
+/* Implements canopen/pdo.h (see there): the fixed process data of the bus. Used by firmware/app, and by the simulated
+ * drives of the tests. Pure functions, any context. */
 #include "canopen/pdo.h"
 
 #include "canopen/cob.h"

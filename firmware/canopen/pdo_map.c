@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/pdo_map.h (see there): one remappable PDO of a device: parameters, mapping, packing, times. */
+/* Implements canopen/pdo_map.h (see there): one remappable PDO of a device: parameters, mapping, packing, times. Used
+ * by app/objects_axis and sim/node. All functions of one PDO in one context. */
 #include "canopen/pdo_map.h"
 
 #include <assert.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/sdo_client.h: reads and writes objects of other nodes. */
+/* Implements canopen/sdo_client.h: reads and writes objects of other nodes. Used by app/drives. Main loop; no I/O. */
 #include "canopen/sdo_client.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/sync.h (see there): SYNC with counter, producer and consumer. */
+/* Implements canopen/sync.h (see there): SYNC with counter, producer and consumer. Used by app/tick and
+ * sim/node/sync_clock. No I/O; changes its struct only. */
 #include "canopen/sync.h"
 
 #include "canopen/cob.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/bernstein.h (see there): bounds of a polynomial from its Bernstein coefficients. */
+/* Implements core/bernstein.h (see there): bounds of a polynomial from its Bernstein coefficients. Used by
+ * core/feed_bounds. Integer arithmetic; pure, main loop. */
 #include "core/bernstein.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/brake_check.h (see there): the proof that path stops keep the limits of the path axes. */
+/* Implements core/brake_check.h (see there): the proof that path stops keep the limits of the path axes. Used by
+ * `hodograph verify` through host_tools/hodograph/native; a controller does not call it. Main loop of a host. */
 #include "core/brake_check.h"
 
 #include "core/qmath.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/crc32.h (see there): CRC-32 of IEEE 802.3. */
+/* Implements core/crc32.h (see there): CRC-32 of IEEE 802.3. Used by firmware/app, core/chunk and core/program. Pure
+ * functions, any context. */
 #include "core/crc32.h"
 
 static const uint32_t nibble_table[16] = {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/event_check.h (see there): the checks of the events of a program. */
+/* Implements core/event_check.h (see there): the checks of the events of a program. A part of program_check. Pure,
+ * main loop. */
 #include "core/event_check.h"
 
 #include "core/segment_length_check.h"

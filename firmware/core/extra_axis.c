@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/extra_axis.h (see there): coefficients of an extra axis for the kernels fixed and float. */
+/* Implements core/extra_axis.h (see there): coefficients of an extra axis for the kernels fixed and float. Used by
+ * core/kernel_fixed and core/kernel_float. Pure; extra_axis_set in the main loop, the others in the tick. */
 #include "core/extra_axis.h"
 
 /* By how much coefficients in q48 are shifted down, so that the sum of all powers fits 31 bits after any rounding. Of

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/feed_bounds.h (see there): feed, acceleration and jerk of a piece: values at its ends and bounds
- * over it. */
+ * over it. Used by the checks of a program. Pure, main loop. */
 #include "core/feed_bounds.h"
 
 #include <assert.h>

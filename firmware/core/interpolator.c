@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/interpolator.h (see there): program time in, point on the path out. */
+/* Implements core/interpolator.h (see there): program time in, point on the path out. Used by core, app/machine,
+ * sim/offline and host tools. Main loop or tick, as each function states. */
 #include "core/interpolator.h"
 
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/joint_check.h (see there): whether the direction of a path is continuous from a segment to the next.
- * */
+ * Used by core/segment_check. Pure, main loop. */
 #include "core/joint_check.h"
 
 #include "core/qwide.h"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/kernel_double.h (see there): the double kernel, the host's reference. */
+/* Implements core/kernel_double.h (see there): the double kernel, the host's reference. Used by core/coefficients;
+ * called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop, the others in the
+ * tick. */
 #include "core/kernel_double.h"
 
 #include "core/kernel.h"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/kernel_fixed.h (see there): the fixed kernel: integers only, the same bits everywhere. */
+/* Implements core/kernel_fixed.h (see there): the fixed kernel: integers only, the same bits everywhere. Used by
+ * core/coefficients; called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop,
+ * the others in the tick. */
 #include "core/kernel_fixed.h"
 
 #include "core/kernel.h"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/kernel_float.h (see there): the float kernel: single precision and integers. */
+/* Implements core/kernel_float.h (see there): the float kernel: single precision and integers. Used by
+ * core/coefficients; called through struct kernel (core/kernel.h). Pure; the functions named *_set in the main loop,
+ * the others in the tick. */
 #include "core/kernel_float.h"
 
 #include "core/kernel.h"

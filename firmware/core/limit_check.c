@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/limit_check.h (see there): the proof that a program keeps the limits of its path axes. */
+/* Implements core/limit_check.h (see there): the proof that a program keeps the limits of its path axes. A part of
+ * program_check. Main loop. */
 #include "core/limit_check.h"
 
 #include <stddef.h>

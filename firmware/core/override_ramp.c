@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/override_ramp.h (see there): ramps of the feed override from one constant value to another. */
+/* Implements core/override_ramp.h (see there): ramps of the feed override from one constant value to another. Used by
+ * core/chunk, core/coefficients, core/override_plan and core/program_clock. Pure, any context. */
 #include "core/override_ramp.h"
 
 #include "core/qmath.h"

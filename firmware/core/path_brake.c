@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/path_brake.h (see there): a path stop: an S-curve of path speed, decided anew in each tick. */
+/* Implements core/path_brake.h (see there): a path stop: an S-curve of path speed, decided anew in each tick. Used by
+ * core/feed_override, and by sim/offline to search stop parameters. Changes its struct only; any context. */
 #include "core/path_brake.h"
 
 #include "core/qmath.h"

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, and bounds of it. */
+/* Implements core/path_motion.h (see there): the motion of the path axes on one segment, and bounds of it. Used by the
+ * proofs of axis limits (core/limit_check.h, core/brake_check.h); docs/theory/proofs.md section 16 has the formulas.
+ * Pure, main loop. */
 #include "core/path_motion.h"
 
 #include "core/ph_segment.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/piece_check.h (see there): the rules of feed pieces (docs/reference/protocol.md 1.3). */
+/* Implements core/piece_check.h (see there): the rules of feed pieces (docs/reference/protocol.md 1.3). A part of
+ * program_check. Pure, main loop. */
 #include "core/piece_check.h"
 
 #include "core/feed_bounds.h"

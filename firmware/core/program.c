@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/program.h (see there): reading header, segments, feed pieces and stops of a program image. */
+/* Implements core/program.h (see there): reading header, segments, feed pieces and stops of a program image. Used by
+ * firmware/core, firmware/app, sim/offline and host tools. Any context. */
 #include "core/program.h"
 
 #include <stddef.h>

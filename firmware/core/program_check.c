@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/program_check.h (see there): all checks of a program before it may run, and the texts of
- * refusals. */
+/* Implements core/program_check.h (see there): all checks of a program before it may run, and the texts of refusals.
+ * Used by app/program_slot, core/chunk and host tools. Main loop, never an interrupt. */
 #include "core/program_check.h"
 
 #include "core/event_check.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/program_clock.h (see there): which program time each tick has, and which feed piece that time is
- * in. */
+/* Implements core/program_clock.h (see there): which program time each tick has, and which feed piece that time is in.
+ * Used by core/override_plan, which decides the override, and core/feed_override. Tick, if not stated otherwise. */
 #include "core/program_clock.h"
 
 uint64_t program_clock_step_q62_s(const struct program_clock *clock,

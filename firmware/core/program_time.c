@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/program_time.h (see there): the program time at which a program reaches an arc length. */
+/* Implements core/program_time.h (see there): the program time at which a program reaches an arc length. Used by
+ * app/machine/motion. Pure, main loop. */
 #include "core/program_time.h"
 
 #include "core/feed_piece.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/qmath.h (see there): divisions and square roots in integers. */
+/* Implements core/qmath.h (see there): divisions and square roots in integers. Used by firmware/core,
+ * app/machine/config and app/stream. Pure, any context. */
 #include "core/qmath.h"
 
 /* A digit of 16 bits: floor((high 2^16 + next) / b) for high < b, b with its highest bit set, and the remainder. The

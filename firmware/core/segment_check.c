@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/segment_check.h (see there): the rules of segments (docs/reference/protocol.md 1.2). */
+/* Implements core/segment_check.h (see there): the rules of segments (docs/reference/protocol.md 1.2). A part of
+ * program_check. Pure, main loop. */
 #include "core/segment_check.h"
 
 #include "core/joint_check.h"

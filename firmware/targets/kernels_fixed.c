@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Targets without an FPU: the fixed kernel. */
+/* The kernels of targets without an FPU: fixed. Used by core/kernel. Constant data. */
 #include "core/kernel.h"
 
 const struct kernel *const kernels_linked[KERNELS] = {&kernel_fixed};

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Implements numerics/quadratic_program.h (see there).
+ * Implements numerics/quadratic_program.h (see there). Called by host_tools/hodograph/native. Any thread.
  *
  * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step needs
  *

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements faults/fault_log.h (see there): what was injected when, one JSON object a line. */
+/* Implements faults/fault_log.h (see there): what was injected when, one JSON object a line. Used by sim/injector/main
+ * and sim/node/drives. Any thread; writes to `out` only. */
 #include "faults/fault_log.h"
 
 #include <inttypes.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements faults/fault_rules.h (see there): scripted faults, one a line of text. */
+/* Implements faults/fault_rules.h (see there): scripted faults, one a line of text. Used by sim/faults, sim/injector
+ * and sim/node. Any thread; fault_rules_read reads a file, the other functions change their arguments only. */
 #include "faults/fault_rules.h"
 
 #include <assert.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements faults/fault_trigger.h (see there): when a fault rule acts. */
+/* Implements faults/fault_trigger.h (see there): when a fault rule acts. Used by sim/injector/forwarder and
+ * sim/node/node_faults. Changes its struct only; one thread. */
 #include "faults/fault_trigger.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements gateway/bus.h (see there): the CAN side of the gateway, its signals and its errors. */
+/* Implements gateway/bus.h (see there): the CAN side of the gateway, its signals and its errors. Used by gateway/main,
+ * gateway/fifo_side and gateway/slcan_side. One thread. */
 #define _GNU_SOURCE
 #include "gateway/bus.h"
 

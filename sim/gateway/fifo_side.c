@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements gateway/fifo_side.h (see there): serves the requests of an emulated board on two FIFOs
- * (port/mps2/exchange.h). */
+ * (port/mps2/exchange.h). Called by gateway/main. One thread, once: its state is static. */
 #define _GNU_SOURCE
 #include "gateway/fifo_side.h"
 

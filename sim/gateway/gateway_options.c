@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements gateway/gateway_options.h (see there): the command line of hodograph-bridge. */
+/* Implements gateway/gateway_options.h (see there): the command line of hodograph-bridge. Used by gateway/main. Main
+ * thread, once; prints nothing. */
 #include "gateway/gateway_options.h"
 
 #include <stdbool.h>

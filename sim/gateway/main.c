@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-bridge: the gateway between an emulated board, or one without SocketCAN, and a CAN interface. */
+/* hodograph-bridge: the gateway between an emulated board, or one without SocketCAN, and a CAN interface. Started by
+ * the operator. One thread: it sleeps until frames or a signal come. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

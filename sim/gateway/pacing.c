@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements gateway/pacing.h (see there): when a request of the emulated board is answered, so that its ticks come at
- * the times of the Linux port (port/linux/schedule.h). */
+ * the times of the Linux port (port/linux/schedule.h). Used by gateway/fifo_side. Pure arithmetic on monotonic
+ * nanoseconds. */
 #include "gateway/pacing.h"
 
 #define SLEEP_MAX_NS 100000000u /* latest check for signals */

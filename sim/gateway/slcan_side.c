@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements gateway/slcan_side.h (see there): a stream of SLCAN lines (can/slcan.h) on a socket. */
+/* Implements gateway/slcan_side.h (see there): a stream of SLCAN lines (can/slcan.h) on a socket. Called by
+ * gateway/main (hodograph-bridge --slcan). One thread. */
 #define _GNU_SOURCE
 #include "gateway/slcan_side.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements hub/frame_bits.h (see there): the number of bits of a CAN frame, stuff bits included. */
+/* Implements hub/frame_bits.h (see there): the number of bits of a CAN frame, stuff bits included. Used by
+ * sim/hub/hub. Pure. */
 #include "hub/frame_bits.h"
 
 #include <stdint.h>

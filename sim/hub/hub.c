@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements hub/hub.h (see there): CAN buses for the processes of one computer, in real or virtual time. */
+/* Implements hub/hub.h (see there): CAN buses for the processes of one computer, in real or virtual time. Used by
+ * hub/main (hodograph-hub). One thread. It makes the sockets of the buses in the file system and nothing else outside
+ * of struct hub. */
 #define _GNU_SOURCE
 #include "hub/hub.h"
 

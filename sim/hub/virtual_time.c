@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements hub/virtual_time.h (see there): the participants of virtual time, and which of them computes next. */
+/* Implements hub/virtual_time.h (see there): the participants of virtual time, and which of them computes next. Used
+ * by sim/hub/hub. No I/O; the functions change struct virtual_time only. One thread. */
 #define _GNU_SOURCE
 #include "hub/virtual_time.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/delay_queue.h (see there): frames that are sent later. */
+/* Implements injector/delay_queue.h (see there): frames that are sent later. Used by injector/forwarder. The functions
+ * change their struct only; one thread. */
 #include "injector/delay_queue.h"
 
 #include <string.h>

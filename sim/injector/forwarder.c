@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/forwarder.h (see there): passes every frame between the controller's bus and the drives',
- * and injects the faults of the fault rules. */
+/* Implements injector/forwarder.h (see there): passes every frame between the controller's bus and the drives', and
+ * injects the faults of the fault rules. Used by injector/main. No I/O, no heap. All functions in one thread. */
 #include "injector/forwarder.h"
 
 #include <string.h>

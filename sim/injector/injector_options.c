@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/injector_options.h (see there): the command line of hodograph-injector. */
+/* Implements injector/injector_options.h (see there): the command line of hodograph-injector. Used by injector/main.
+ * Main thread, once; prints nothing. */
 #include "injector/injector_options.h"
 
 #include <string.h>

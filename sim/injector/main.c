@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-injector: joins two SocketCAN buses and injects faults. One thread: it sleeps until frames or a signal
- * come, or a delayed frame is due. */
+/* hodograph-injector: joins two SocketCAN buses and injects faults. Started by the operator and by host_tools. One
+ * thread: it sleeps until frames or a signal come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

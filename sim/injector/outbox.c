@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/outbox.h (see there): frames to one bus that are sent together. */
+/* Implements injector/outbox.h (see there): frames to one bus that are sent together. Used by injector/main. One
+ * thread for each box. */
 #define _GNU_SOURCE
 #include "injector/outbox.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/axis_motion.h (see there): the simulated axis of a drive node. */
+/* Implements node/axis_motion.h (see there): the simulated axis of a drive node. Used by sim/node only. Changes its
+ * structs only; all in one context. */
 #include "node/axis_motion.h"
 
 #include <stdlib.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/axis_stop.h (see there): how a simulated drive stops its axis. */
+/* Implements node/axis_stop.h (see there): how a simulated drive stops its axis. Used by node/servo. One call in each
+ * period; all in one context. */
 #include "node/axis_stop.h"
 
 #define WAIT_MAX_US 1000000u

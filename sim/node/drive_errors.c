@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_errors.h: reports errors of a simulated drive. */
+/* Implements node/drive_errors.h: reports errors of a simulated drive. Used by node/servo, node/drive_pdos and
+ * node/drive_node. All in one context. */
 #include "node/drive_errors.h"
 
 enum { HISTORY = 8 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_homing.h (see there): the homing mode of a simulated drive. */
+/* Implements node/drive_homing.h (see there): the homing mode of a simulated drive. Called by node/servo. All in one
+ * context. */
 #include "node/drive_homing.h"
 
 #include <stddef.h>

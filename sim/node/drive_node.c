@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_node.h (see there): one simulated servo drive on the bus. */
+/* Implements node/drive_node.h (see there): one simulated servo drive on the bus. Used by node/drives. All functions
+ * in one context. */
 #include "node/drive_node.h"
 
 #include <string.h>

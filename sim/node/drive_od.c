@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_od.h (see there): the behaviour of the object dictionary of a simulated drive (drive.eds). */
+/* Implements node/drive_od.h (see there): the behaviour of the object dictionary of a simulated drive (drive.eds).
+ * Used by node/drive_node. All in one context. */
 #include "node/drive_od.h"
 
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_pdos.h (see there): the PDOs of a simulated drive. */
+/* Implements node/drive_pdos.h (see there): the PDOs of a simulated drive. Called by node/drive_node and
+ * node/drive_od. All in one context. */
 #include "node/drive_pdos.h"
 
 enum { FIRST_RPDO = 0x1400, FIRST_TPDO = 0x1800 };

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drives.h (see there): the simulated drives of one process on one SocketCAN bus. */
+/* Implements node/drives.h (see there): the simulated drives of one process on one SocketCAN bus. Used by node/main
+ * (hodograph-drive). One thread. */
 #define _GNU_SOURCE
 #include "node/drives.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/equipment.h (see there): limit switches, home switch and brake of a simulated axis. */
+/* Implements node/equipment.h (see there): limit switches, home switch and brake of a simulated axis. Used by sim/node
+ * only. Pure functions. */
 #include "node/equipment.h"
 
 void equipment_init(struct equipment *e, const struct drive_config *config)

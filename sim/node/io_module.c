@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/io_module.h (see there): a simulated I/O module. */
+/* Implements node/io_module.h (see there): a simulated I/O module. Used by node/drives. All in one context. */
 #include "node/io_module.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-drive: simulated servo drives on a SocketCAN bus. One thread: it sleeps until frames or
- * a signal come. */
+/* hodograph-drive: simulated servo drives on a SocketCAN bus. Started by the operator and by host_tools. One thread:
+ * it sleeps until frames or a signal come. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/node_faults.h (see there): faults injected into simulated drives. */
+/* Implements node/node_faults.h (see there): faults injected into simulated drives. Used by node/drives. All in one
+ * context, that of drive_node_receive, between two frames. */
 #include "node/node_faults.h"
 
 #include <assert.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/node_options.h (see there): the command line of hodograph-drive. */
+/* Implements node/node_options.h (see there): the command line of hodograph-drive. Called by node/main. Main thread,
+ * once; prints nothing. */
 #include "node/node_options.h"
 
 #include <errno.h>

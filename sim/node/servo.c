@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/servo.h (see there): the CiA 402 part of a simulated drive, without its communication. */
+/* Implements node/servo.h (see there): the CiA 402 part of a simulated drive, without its communication. Called by
+ * node/drive_node, node/drive_pdos, node/drive_od and node/node_faults. No I/O, no heap. All functions in one context.
+ */
 #include "node/servo.h"
 
 #define CONTROL_HOMING_START 0x0010u

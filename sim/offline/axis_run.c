@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/axis_run.h (see there): one axis under given setpoints and offsets, for fits of its plant. */
+/* Implements offline/axis_run.h (see there): one axis under given setpoints and offsets, for fits of its plant. Called
+ * by host_tools/hodograph/native. Pure, any thread. */
 #include "offline/axis_run.h"
 
 #include "plant/influence.h"

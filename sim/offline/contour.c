@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/contour.h (see there): the contour error: distance of a position from the exact curve. */
+/* Implements offline/contour.h (see there): the contour error: distance of a position from the exact curve. Used by
+ * offline/offline and host_tools/hodograph/native. One thread for each struct contour. */
 #include "offline/contour.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/offline.h (see there): interpolation, rounding and simulated axes in one process, without a
- * bus. */
+/* Implements offline/offline.h (see there): interpolation, rounding and simulated axes in one process, without a bus.
+ * Called by host_tools/hodograph/native. One thread for each struct offline. */
 #include "offline/offline.h"
 
 #include <stddef.h>

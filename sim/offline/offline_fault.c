@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/offline_fault.h (see there): faults of a run without a bus. */
+/* Implements offline/offline_fault.h (see there): faults of a run without a bus. Used by offline/offline. Changes its
+ * arguments only; any thread. */
 #include "offline/offline_fault.h"
 
 #include "core/program.h"

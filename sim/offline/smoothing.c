@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/smoothing.h (see there): Newton's method with a barrier for banded least squares in bounds. */
+/* Implements offline/smoothing.h (see there): Newton's method with a barrier for banded least squares in bounds.
+ * Called by host_tools/hodograph/native. Any thread. */
 #include "offline/smoothing.h"
 
 #include <math.h>

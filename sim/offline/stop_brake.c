@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_brake.h (see there): whether a brake along the path keeps given limits. */
+/* Implements offline/stop_brake.h (see there): whether a brake along the path keeps given limits. Used by
+ * offline/stop_search, offline/stop_piece and offline/stop_verdict. Changes its arguments only; any thread of a host.
+ */
 #include "offline/stop_brake.h"
 
 #include <math.h>

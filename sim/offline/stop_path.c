@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_path.h (see there): the path of a program as a table. */
+/* Implements offline/stop_path.h (see there): the path of a program as a table. Used by offline/stop_search,
+ * offline/stop_usage, the other files of this search and host tools. Any thread of a host; the functions change their
+ * arguments only. */
 #include "offline/stop_path.h"
 
 #include <math.h>

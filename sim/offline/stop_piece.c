@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_piece.h (see there): instants and states of a feed piece in which a stop may begin. */
+/* Implements offline/stop_piece.h (see there): instants and states of a feed piece in which a stop may begin. Used by
+ * offline/stop_verdict and offline/stop_search. mm, s. Any thread of a host; the functions change their arguments
+ * only. */
 #include "offline/stop_piece.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_search.h (see there): the search of stop parameters for each feed piece. */
+/* Implements offline/stop_search.h (see there): the search of stop parameters for each feed piece. Called by
+ * host_tools/hodograph/native. Any thread; the functions change their arguments only. */
 #include "offline/stop_search.h"
 
 #include <math.h>

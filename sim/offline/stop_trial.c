@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_trial.h (see there): random sequences of commands, and whether their stops keep limits
- * and bounds. */
+/* Implements offline/stop_trial.h (see there): random sequences of commands, and whether their stops keep limits and
+ * bounds. Called by host_tools/hodograph/native. Any thread; the functions change their arguments only. */
 #include "offline/stop_trial.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_usage.h (see there): the limit usage of a motion along a path. */
+/* Implements offline/stop_usage.h (see there): the limit usage of a motion along a path. Used by offline/stop_brake,
+ * offline/stop_verdict and offline/stop_search. Pure functions, any thread of a host. */
 #include "offline/stop_usage.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed
- * piece. */
+ * piece. Used by offline/stop_search. Any thread of a host; the functions change their arguments only. */
 #include "offline/stop_verdict.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements plant/encoder.h (see there): the encoder on the motor shaft. */
+/* Implements plant/encoder.h (see there): the encoder on the motor shaft. Used by plant/drive and plant/influence.
+ * Pure functions, any thread. */
 #include "plant/encoder.h"
 
 #include <assert.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements plant/motor.h (see there): motor and ball screw. */
+/* Implements plant/motor.h (see there): motor and ball screw. Used by plant/drive and plant/influence. Pure, any
+ * context. */
 #include "plant/motor.h"
 
 #include <assert.h>

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The checker of lists of users: right lists pass, and each kind of wrong list is found, at its line."""
+"""The checker of users and effects: right lists pass, each kind of wrong list is found at its line, and so is each file
+that does not name its users or its effects.
+"""
 
 from __future__ import annotations
 
@@ -29,12 +31,17 @@ FILES = {
 
 
 def found(root: Path, path: str, comment: str) -> list[str]:
-    """What the check says of the tree with `comment` at the top of `path`."""
+    """What the check of lists prints for the tree with `comment` at the top of `path`."""
+    return list(check_users.wrong_lists(tree_with(root, path, comment)))
+
+
+def tree_with(root: Path, path: str, comment: str) -> check_users.Tree:
+    """The tree with `comment` at the top of `path`."""
     for name, text in FILES.items():
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     (root / path).write_text(comment + FILES[path])
-    return list(check_users.check(root))
+    return check_users.Tree(root)
 
 
 @pytest.mark.parametrize(
@@ -115,6 +122,40 @@ def test_a_header_of_the_native_module(tmp_path: Path) -> None:
     assert found(tmp_path, "firmware/core/counts.h", comment.format(".")) == [
         "firmware/core/counts.h:2: missing: host_tools/hodograph/native/declarations"
     ]
+
+
+def test_the_list_of_a_source_is_that_of_its_header(tmp_path: Path) -> None:
+    path = "firmware/core/counts.c"
+    comment = LICENCE + "/* Implements core/counts.h: mm to counts. {} */\n"
+    right = comment.format("Used by app/tick and app/state.")
+    assert found(tmp_path, path, right) == []
+    assert found(tmp_path, path, comment.format("Used by app/tick.")) == [
+        f"{path}:2: missing: firmware/app/state"
+    ]
+    assert found(tmp_path, path, LICENCE + "/* A program. Started by tools/bench.py. */\n") == []
+
+
+@pytest.mark.parametrize(
+    ("path", "comment", "lacks"),
+    [
+        ("firmware/core/counts.c", LICENCE + "/* Counts. Used by app/tick. Pure. */\n", ()),
+        ("firmware/core/counts.c", LICENCE + "/* Counts. Pure. */\n", ("users",)),
+        ("firmware/core/counts.h", LICENCE + "/* Counts. Used by app/x. */\n", ("effects",)),
+        ("firmware/core/counts.h", LICENCE, ("users", "effects")),
+        ("tools/soak.py", '"""Long runs. Run by `make soak`. Starts processes."""\n', ()),
+        ("tools/soak.py", '"""Long runs. Starts processes."""\n', ("users",)),
+        ("tools/soak.py", "\n" * 40 + '"""Long. Used by x. No I/O."""\n', ("users", "effects")),
+        ("tests/unit/test_counts.c", LICENCE, ()),
+    ],
+)
+def test_users_and_effects_in_the_first_screen(
+    tmp_path: Path, path: str, comment: str, lacks: tuple[str, ...]
+) -> None:
+    lines = [
+        line for line in check_users.silent(tree_with(tmp_path, path, comment)) if path in line
+    ]
+    assert len(lines) == len(lacks)
+    assert all(f"does not name the {word}" in line for line, word in zip(lines, lacks, strict=True))
 
 
 def test_the_tree_is_clean(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_boot.h (see there): finds the drives, configures them by SDO (drive_configuration)
- * and starts them (NMT), one after the other, and begins again from the first when one does not answer or refuses. */
+/* Implements app/drives/drive_boot.h (see there): finds the drives, configures them by SDO (drive_configuration) and
+ * starts them (NMT), one after the other, and begins again from the first when one does not answer or refuses. Called
+ * by app/controller.c. Frames in, frames out; main loop. */
 #include "app/drives/drive_boot.h"
 
 #include <string.h>

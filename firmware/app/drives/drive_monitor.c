@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_monitor.h: supervises heartbeats and emergency messages. */
+/* Implements app/drives/drive_monitor.h: supervises heartbeats and emergency messages. Called by app/controller.c.
+ * Main loop; takes the port's lock where it changes the machine. */
 #include "app/drives/drive_monitor.h"
 
 #include <stddef.h>

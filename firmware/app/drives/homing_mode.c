@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/homing_mode.h (see there): brings a drive into a mode of operation by SDO. */
+/* Implements app/drives/homing_mode.h (see there): brings a drive into a mode of operation by SDO. Used by
+ * app/drives/homing. No I/O; changes its struct only. */
 #include "app/drives/homing_mode.h"
 
 #include <string.h>

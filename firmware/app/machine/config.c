@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/config.h (see there): the configuration of the host as one value. */
+/* Implements app/machine/config.h (see there): the configuration of the host as one value. Used by firmware/app. Main
+ * loop: reads the dictionary and writes its results only. The tick works with a copy (machine.config), which the main
+ * loop replaces under the port's lock at standstill. */
 #include "app/machine/config.h"
 
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/fault.h (see there): what stopped the machine (object 0x2003 subs 1 to 3). */
+/* Implements app/machine/fault.h (see there): what stopped the machine (object 0x2003 subs 1 to 3). Used by
+ * firmware/app. Plain data of machine, guarded by the port's lock; the functions are pure. */
 #include "app/machine/fault.h"
 
 const char *fault_text(uint16_t code)

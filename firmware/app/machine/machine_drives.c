@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/machine_drives.h (see there): all drives of a machine at once. */
+/* Implements app/machine/machine_drives.h (see there): all drives of a machine at once. Used by app/machine only.
+ * Under the lock, any context. */
 #include "app/machine/machine_drives.h"
 
 void machine_command(struct machine *machine, enum cia402_goal goal)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/machine_fault.h (see there): how the machine enters a fault, goes through its phases and
- * leaves it. */
+ * leaves it. Used by app/machine only; the public functions of machine_fault.c are in machine.h (machine_raise,
+ * machine_note_emergency, machine_switch_off, machine_reset). Under the lock. */
 #include "app/machine/machine_fault.h"
 
 #include "app/machine/machine_drives.h"

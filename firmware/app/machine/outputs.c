@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/outputs.h: the effect of the machine's state, the delay by ticks, and the frame. */
+/* Implements app/machine/outputs.h: the effect of the machine's state, the delay by ticks, and the frame. Called by
+ * app/tick after the machine's step. Timer; outputs_init in the main loop. */
 #include "app/machine/outputs.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/path_counts.h (see there): the point of a program in counts of its path axes. */
+/* Implements app/machine/path_counts.h (see there): the point of a program in counts of its path axes. Used by
+ * app/machine/motion, app/program_slot and app/stream. Pure; tick or main loop. */
 #include "app/machine/path_counts.h"
 
 #include <stddef.h>

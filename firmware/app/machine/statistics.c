@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/statistics.h (see there): how the ticks went (object 0x2008). */
+/* Implements app/machine/statistics.h (see there): how the ticks went (object 0x2008). Used by app/machine, app/tick
+ * and app/objects. Guarded by the port's lock: written by the tick and by machine_supervise.c, read by the main loop.
+ */
 #include "app/machine/statistics.h"
 
 void statistics_restart(struct statistics *statistics)

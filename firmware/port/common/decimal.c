@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/common/decimal.h (see there): an integer as text. */
+/* Implements port/common/decimal.h (see there): an integer as text. Used by the ports. Pure. */
 #include "port/common/decimal.h"
 
 /* Digits from the end. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/common/ram_store.h (see there): the store of port.h in memory. */
+/* Implements port/common/ram_store.h (see there): the store of port.h in memory. Used by port/linux/store and
+ * port/mps2/store. Main loop. */
 #include "port/common/ram_store.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/cortex_m/startup.h (see there): what every Cortex-M does between reset and main(). */
+/* Implements port/cortex_m/startup.h (see there): what every Cortex-M does between reset and main(). Called by the
+ * hardware, at reset and in interrupts; a board defines those that it needs. */
 #include "port/cortex_m/startup.h"
 
 #include <stddef.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/cortex_m/systick.h (see there): sysTick as the tick's timer and as the clock of a port. */
+/* Implements port/cortex_m/systick.h (see there): sysTick as the tick's timer and as the clock of a port. Used by
+ * port/mps2. Main loop and interrupts, as each function states. */
 #include "port/cortex_m/systick.h"
 
 #include "port/cortex_m/core.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a local
- * bus without kernel CAN. */
+/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a
+ * local bus without kernel CAN. Used by port/linux and sim/. One thread at a time for each socket, except that
+ * can_socket_send may be called by a second one. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/clock.h (see there): the time of a process of this computer, for the Linux port and the
- * simulated drives. */
+ * simulated drives. Used by port/linux and sim/. Any thread in real time, one thread in virtual time. */
 #define _GNU_SOURCE
 #include "port/linux/clock.h"
 

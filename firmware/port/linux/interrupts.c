@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The thread that stands for both interrupts of a board, and what the main loop shares with it (interrupts.h). */
+/* Implements port/linux/interrupts.h (see there): the thread that stands for both interrupts of a board, and what the
+ * main loop shares with it. Used by port_linux.c. Main loop, except interrupts_in_tick (any context). */
 #define _GNU_SOURCE
 #include "port/linux/interrupts.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/interrupts_thread.h (see there): how the thread of the interrupts is made. */
+/* Implements port/linux/interrupts_thread.h (see there): how the thread of the interrupts is made. Used by
+ * port/linux/interrupts. Main loop. */
 #define _GNU_SOURCE
 #include "port/linux/interrupts_thread.h"
 

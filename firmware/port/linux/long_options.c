@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/long_options.h (see there): reads the command line of a program, one option after the
- * other, by getopt_long. */
+/* Implements port/linux/long_options.h (see there): reads the command line of a program, one option after the other,
+ * by getopt_long. Used by port/linux/options and sim/. One thread. */
 #define _GNU_SOURCE
 #include "port/linux/long_options.h"
 

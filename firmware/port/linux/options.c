@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/options.h (see there): the command line of hodograph-controller. */
+/* Implements port/linux/options.h (see there): the command line of hodograph-controller. Used by port_linux.c. Main
+ * thread, once, at the start; prints help to stdout and errors to stderr. */
 #include "port/linux/options.h"
 
 #include <stdio.h>

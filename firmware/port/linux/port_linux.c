@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The Linux port: SocketCAN, a thread for the interrupts, main() for the main loop. */
+/* Implements port/port.h for Linux: SocketCAN, a thread for the interrupts, main() for the main loop. Used by
+ * firmware/app and the ports. Contexts: port/port.h. */
 #define _GNU_SOURCE
 #include "port/port.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/schedule.h (see there): when the next tick is due. */
+/* Implements port/linux/schedule.h (see there): when the next tick is due. Used by port/linux/interrupts and
+ * sim/gateway/pacing. Pure arithmetic on monotonic nanoseconds; the caller's lock guards the struct. */
 #include "port/linux/schedule.h"
 
 #include <string.h>

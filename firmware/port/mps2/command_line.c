@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/command_line.h (see there): the words that the emulator passes on as options of the board. */
+/* Implements port/mps2/command_line.h (see there): the words that the emulator passes on as options of the board. Used
+ * by link and by port_mps2.c at the start. Pure. */
 #include "port/mps2/command_line.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/interrupts.h (see there): the tick, and the receive handler. */
+/* Implements port/mps2/interrupts.h (see there): the tick, and the receive handler. Used by port_mps2.c, uart.c,
+ * link_fifo.c and link_slcan.c. Main loop and interrupts, as each function states. */
 #include "port/mps2/interrupts.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* link_fifo of port/mps2/link.h: in each tick it sends all frames and receives those that came, as if by an interrupt
- * right after the tick. */
+ * right after the tick. Used by port/mps2 only. Main loop and interrupts, as struct link states. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"

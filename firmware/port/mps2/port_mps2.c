@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/port.h for QEMU's mps2 boards: command line, console and end by semihosting. */
+/* Implements port/port.h for QEMU's mps2 boards: command line, console and end by semihosting. Used by firmware/app
+ * and the ports. Contexts: port/port.h. */
 #include "port/port.h"
 
 #include <string.h>

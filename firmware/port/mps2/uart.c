@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both directions by interrupt. */
+/* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both directions by interrupt. Used
+ * by link_slcan. Any context; uart_begin in the main loop. */
 #include "port/mps2/uart.h"
 
 #include "port/cortex_m/core.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/semihost/semihost.h (see there): semihosting: files, console and exit of an emulated board. */
+/* Implements port/semihost/semihost.h (see there): semihosting: files, console and exit of an emulated board. Used by
+ * port/mps2, port/rv32 and tests/target. Any context; each call waits. */
 #include "port/semihost/semihost.h"
 
 #include <string.h>

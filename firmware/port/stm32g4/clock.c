@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/clock.h (see there): 170 MHz from the board's 24 MHz crystal. */
+/* Implements port/stm32g4/clock.h (see there): 170 MHz from the board's 24 MHz crystal. Used by port_stm32g4.c. Main
+ * loop, once; changes registers of RCC, PWR and FLASH only. */
 #include "port/stm32g4/clock.h"
 
 #include <stdint.h>

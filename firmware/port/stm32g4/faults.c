@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/faults.h (see there): hard faults and uncorrectable words of the flash. */
+/* Implements port/stm32g4/faults.h (see there): hard faults and uncorrectable words of the flash. Used by
+ * port_stm32g4.c. Main loop; the reactions run in the interrupt handlers of the faults. */
 #include "port/stm32g4/faults.h"
 
 #include <stdbool.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/fdcan.h (see there): FDCAN1 for classic frames with 11-bit identifiers. */
+/* Implements port/stm32g4/fdcan.h (see there): FDCAN1 for classic frames with 11-bit identifiers. Used by
+ * port_stm32g4.c and irq. Main loop and interrupts, as each function states. */
 #include "port/stm32g4/fdcan.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/irq.h (see there): the two interrupts of the controller, and the port's lock. */
+/* Implements port/stm32g4/irq.h (see there): the two interrupts of the controller, and the port's lock. Used by
+ * port_stm32g4.c and vectors.c. Main loop, except the handlers and irq_period (tick). */
 #include "port/stm32g4/irq.h"
 
 #include "port/stm32g4/cpu.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The board's part of the vector table, up to the last interrupt that is used. */
+/* The interrupt vectors of the board, up to the last interrupt that is used. Used by the hardware. Constant data. */
 #include "port/cortex_m/startup.h"
 #include "port/stm32g4/irq.h"
 #include "port/stm32g4/reg_fdcan.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/watchdog.h (see there): the independent watchdog. */
+/* Implements port/stm32g4/watchdog.h (see there): the independent watchdog. Used by port_stm32g4.c. Main loop. */
 #include "port/stm32g4/watchdog.h"
 
 #include "port/stm32g4/reg_clock.h"
