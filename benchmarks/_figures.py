@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The option `--json OUT` of benchmarks and the file that it names; tools/run_benchmarks.py gathers these files."""
+"""The option `--json OUT` of benchmarks and the file that it names; tools/run_benchmarks.py gathers these files. Used
+by all scripts of `make bench` and by `make compare`. Writes that file.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 
     python benchmarks/acceptance.py [--json OUT] [--plans N] [--first SEED]
 
+Run by `make bench`. Prints to stdout; writes OUT and temporary path files.
+
 Random paths in the plane, in space and of five axes, with random limits of the machine's axes, in all profiles. A plan
 keeps 0.998 of these limits. It is checked against the limits themselves (0.2 % of headroom), and against limits with
 0.5 %. Stops are searched with few trials: the proof does not depend on them.

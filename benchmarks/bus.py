@@ -5,6 +5,8 @@ simulate.
 
     tools/with-vcan .venv/bin/python benchmarks/bus.py --json OUT
 
+Run by `make bench`. Starts the simulated machine, sends to its controller and receives from the bus; writes OUT.
+
 At full pace the next tick comes as soon as both drives have answered, so the ratio says how much faster than real time
 this machine's bus, controller, drives and recorder are together. The goal is 1.
 """

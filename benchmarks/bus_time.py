@@ -3,6 +3,8 @@
 
     .venv/bin/python benchmarks/bus_time.py --json OUT
 
+Run by `make bench`. Prints to stdout, writes OUT.
+
 The table of docs/reference/bus-time.md section 2.1. It takes no bus: CAN FD is modelled only, no code sends it.
 """
 

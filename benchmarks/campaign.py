@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Speed of `hodograph campaign`: 10^4 runs of the alpha on two cores, and on a cluster of two workers over loopback.
 
+Run by `make bench`. Starts processes; writes temporary files and the file of --json.
+
 Times are of the whole command: import, workers, program, runs, table, report. Processor time counts all its processes.
 """
 

@@ -3,7 +3,8 @@
 
     python benchmarks/counts.py [--json OUT] [--build BUILD]
 
-Needs `make counter`. Prints the main figures of docs/validation/counts.md:
+Run by `make bench`. Needs `make counter`. Starts the emulator, writes OUT. Prints the main figures of
+docs/validation/counts.md:
 
 - motion part of a tick and whole interrupt: for each core and kernel the median over the examples and the most over all
   programs, plain and with the override in use;

@@ -3,6 +3,8 @@
 digits, and the time for planning and compiling.
 
     python benchmarks/feed.py [--json OUT] [--feed MM_S] [--ramp S]
+
+Run by `make bench`. Prints to stdout, writes OUT.
 """
 
 from __future__ import annotations

@@ -4,6 +4,8 @@
 
     .venv/bin/python benchmarks/gcode_reader.py --json OUT
 
+Run by `make bench`. Writes OUT, and the program as a temporary file.
+
 The program has many G1 lines as CAM systems write them. `plain` uses the fast method for such lines, `general` does
 not.
 """

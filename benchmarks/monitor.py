@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Cost of the monitor's pump: frames to samples, derived figures, contour error, decimation, JSON.
 
+Run by `make bench`. Uses no bus; prints the figures, writes the file of --json.
+
 The traffic of the alpha is repeated at 1 kHz, with five frames a tick, and read 40 ticks at a time as by the pump.
 Figures: processor time of one thread for a tick, the share of a processor that 1000 ticks a second take, bytes a second
 to a browser.

@@ -3,6 +3,8 @@
 the paper's kind, all under the same limits, on the paper's curves, in space, with five axes, and on random ones.
 
     python benchmarks/optimal.py [--json OUT] [--only NAME…] [--intervals N]
+
+Run by `make bench`. Prints to stdout; writes OUT and temporary path files.
 """
 
 from __future__ import annotations

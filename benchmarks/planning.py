@@ -3,6 +3,8 @@
 
     python benchmarks/planning.py [--json OUT] [--segments N…]
 
+Run by `make bench`. Prints to stdout, writes OUT.
+
 Paths are random walks of control points, legs of 7.5 to 22.5 mm, turns of 40 degrees rms; 2000 mm/s^2 and 50 000
 mm/s^3 for each axis, controller 500 mm/s, 5000 mm/s^2, 200 000 mm/s^3 less 10 %. Each is planned in a process of its
 own, by one thread. Other work on the computer changes the wall time, and less the processor time.

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Speed of `simulate`, and the accuracy of the simulated drives.
 
+Run by `make bench`. Uses no bus; writes the file of --json.
+
 Speed: 10^6 ticks of 1 ms on one core, contour error included, for each kernel: the heart, 350 laps, each turned by one
 degree. Accuracy: alpha and heart at servo sample rates up to 1.024 MHz, compared with the rate of the drive files.
 """

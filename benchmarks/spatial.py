@@ -3,6 +3,8 @@
 
     python benchmarks/spatial.py [--json OUT] [--paths N]
 
+Run by `make bench`.
+
 Campaigns: N (200) random walks, seeds 0 … N - 1 of tests/host/spline/polygons.py, for each kind of knots. Prints the
 figures and writes them as one JSON object.
 """

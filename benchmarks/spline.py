@@ -3,6 +3,8 @@
 
     python benchmarks/spline.py [--json OUT] [--polygons N]
 
+Run by `make bench`. Starts processes.
+
 Campaigns: N (10^4) smooth and N uniformly random polygons, seeds 0 … N - 1 of
 tests/host/spline/polygons.py. Prints the figures and writes them as one JSON object.
 """

@@ -3,6 +3,8 @@
 instants spread over each program.
 
     python benchmarks/stops.py [--json OUT] [--only NAME…] [--instants N]
+
+Run by `make bench`. Uses no bus; prints to stdout, writes OUT.
 """
 
 from __future__ import annotations

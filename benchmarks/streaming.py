@@ -4,6 +4,9 @@ in a ring of 48 KiB.
 
     python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…] [--files FILE…]
 
+Run by `make bench`. The time to the first chunk is taken with a simulated machine on a local bus. Prints to stdout;
+writes OUT and temporary files.
+
 Jobs are a zigzag of short lines over a wavy surface, as finishing passes are, at 50 mm/s on
 examples/machines/mill.toml. Each is planned in a process of its own, by one thread; those of --fit-lines are only read
 and fitted; --files are planned too. Wall time has other work on the computer in it; processor time has less of that.

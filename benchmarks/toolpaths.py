@@ -3,6 +3,8 @@
 
     python benchmarks/toolpaths.py [--json OUT] [--only NAME…] [--folder DIR…] [--lines N]
 
+Run by `make bench`. Prints to stdout; writes OUT and temporary files.
+
 The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs, including the time
 that plans lose so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with
 its S-curve planner and 50000 mm/s^3. For a file that is in none of the folders a line is printed instead. At the end

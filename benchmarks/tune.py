@@ -2,6 +2,8 @@
 """Contour error of the paper's and of tuned loops, at SYNCs and between them, and on plants that are not the modelled
 one; plants found from noisy reports.
 
+Run by `make bench`. Uses no bus; writes the file of --json and temporary path files.
+
 Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
 (examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the
 search finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a

@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The bus of tools/with-vcan: time to boot, round trip of a frame between two sockets, frames a second.
 
+Run by `make bench`. Starts tools/with-vcan, sends and receives on its bus; prints the figures, writes the file of
+--json.
+
 Round trip: a process sends a frame and waits; another one, waiting, sends it back. So both ways wake a process that
 sleeps, as with a controller and a drive.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compares measured figures with goals: benchmarks/goals.toml and the figures of all benchmarks, by script."""
+"""Compares measured figures with goals: benchmarks/goals.toml and the figures of all benchmarks, by script. Used by
+tools/run_benchmarks. Reads the file of goals.
+"""
 
 from __future__ import annotations
 

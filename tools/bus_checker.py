@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Checks each frame of a machine's bus for unexpected frames and content. Used by soak.py and tests/.
+"""Checks each frame of a machine's bus for unexpected frames and content. Used by soak.py and tests/. Reads the EDS of
+the drives, for the DBC; no other I/O.
 
 Known identifiers with the length that the machine's DBC gives them; SYNC counters in order; each PDO of SYNC type
 once a SYNC while its drive is operational, and none of a drive that is not; setpoints within the feed limit; legal

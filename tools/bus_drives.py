@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rules for the frames of one drive: statuswords and transitions of CiA 402, setpoints within the feed limit. Used by
-tools/bus_checker.py.
+tools/bus_checker.py. No I/O.
 """
 
 from __future__ import annotations

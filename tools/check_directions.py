@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
 """check_directions.py [ROOT]: checks which layer uses which. Prints FILE:LINE and the rule for each breach; exit status
-1 then.
+1 then. Run by `make lint`. Reads the sources, writes nothing.
 
 The two tables below are all rules. A C layer is a folder (or single header), by the longest prefix of the path. A
 Python layer is a package or module directly under hodograph, or one within it that has its own row; a layer that may

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: MIT
 """check_registers.py [BUILD]: the constants of firmware/port/stm32g4/reg_*.h against crate stm32-metapac.
 
+Run by tests/tools/test_check_registers.py and by hand. Reads the headers and the linker script; cargo fetches the crate
+once.
+
 Compared are addresses, offsets, fields, values of fields, numbers of interrupts and of alternate functions, and the
 memories of the linker script. A constant that the crate does not have must be in NOT_THERE, with its source.
 Prints each difference; exit status 1 then, or when the crate cannot be had.

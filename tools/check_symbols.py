@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_symbols.py ARCHIVE...: global names that two static libraries define. Prints them; exit status 1 then.
+"""check_symbols.py ARCHIVE...: global names that two static libraries define. Prints them; exit status 1 then. Run by
+`make lint`. Starts nm, writes nothing.
 
 Programs and tests link several libraries at once. If two functions have one name, the linker takes the first without a
 message. Only what port.h declares may be defined by each port: a program links one of them.

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """count.py: `make count`: instructions of the tick on all cores, compared with the committed ones.
 
+Run by `make count`. Starts the emulator (analysis/campaign.py).
+
 Prints the tables, writes them as JSON, and compares with tests/data/counts.json with no tolerance. Exit status 1 when a
 count differs; `--update` takes the new ones over, there and into docs/validation/counts.md. A core is not counted again
 while its images, the emulator and the programs are the same (testing/cache.py); `--no-stamps` counts all. Counts are

@@ -6,6 +6,8 @@
     .venv/bin/python tools/count_tick.py microbit fixed ladder --commands restless --worst 5
     .venv/bin/python tools/count_tick.py an386 float ladder --isr --functions  # the whole interrupt, by functions
 
+Run by hand. Used by tools/count_til, for `show`. Starts the emulator, prints to stdout.
+
 Needs `make counter`. The program is a path file, an image (.hdgp) or the name of one of the worst-case programs
 (analysis/worst_case.py), which also has the commands: overrides, holds and resumes.
 """

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """count_til.py [--target TARGET] [--kernel KERNEL] FILE: instructions of the whole tick interrupt, on a bus of its own.
 
+Run by hand. Starts a local bus, the simulated drives and the emulator; prints to stdout.
+
 The whole controller on an emulated board, with simulated drives, uploads and runs a path at full pace; every tick while
 setpoints come from the program is counted from the first instruction of the vector's handler to its last: the port's
 handler and clock are in it, as they are not in tests/target/isr.c. Only the exchange of frames with the bridge is left

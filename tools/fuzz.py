@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """fuzz.py [--seconds S] [--seed N] [--jobs N] [NAME...]: runs harnesses (C) and targets (Python) for S seconds each.
 
+Run by `make fuzz`. Starts processes; writes new inputs and findings to build/fuzz.
+
 C harnesses are tests/fuzz/fuzz_NAME.c, with libFuzzer under the address and undefined-behaviour sanitizers; Python
 targets are in tools/fuzzing/targets.py. Without NAME all of them run. Prints executions, coverage and findings of each;
 the last line is `N passed, N failed`, a harness without a finding being one that passed.

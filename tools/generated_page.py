@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Pages of the manual that a script writes: written, or compared with what is there.
 
-For scripts that make one page (list_api.py, list_options.py). They call `write_or_check` from `main`.
+Used by tools/list_api and tools/list_options, which call `write_or_check` from `main`. Reads the options of the command
+line; writes the page, or reads it.
 """
 
 from __future__ import annotations

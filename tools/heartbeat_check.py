@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Rules for heartbeats of all nodes: in time, in the state that NMT commanded, no boot-up that was not requested. Used
-by tools/bus_checker.py.
+by tools/bus_checker.py. No I/O.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """lint_changed.py: lints what changed, by `make lint-files FILES=...`; the first part of `make check`.
 
+Starts git and make; keeps stamps in the cache folder.
+
 A file has changed when it differs from the last commit, or is not in it, and has no stamp for its present content in
 the cache (testing/cache.py). Without Git every file is taken for changed.
 """

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """list_api.py [--check]: docs/reference/python-api.md, the public Python names, from their docstrings.
 
+Run by `make options`. Writes this page only.
+
 With --check nothing is written; the exit status is 1 when the page is not the one that would be written.
 """
 

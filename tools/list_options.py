@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """list_options.py [--check]: docs/reference/options.md, the options of every command, from the command line itself.
 
+Run by `make options`. Writes this page only.
+
 With --check nothing is written; the exit status is 1 when the page is not the one that would be written.
 """
 

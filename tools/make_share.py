@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """make_share.py DIR: man page and shell completion of `hodograph`, from its help, as they lie below PREFIX/share.
 
+Run by `make share`. Writes to DIR only.
+
 The same bytes from the same tree.
 """
 

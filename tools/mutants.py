@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """mutants.py [--count N] [--seed N] [--again] [--list] AREA...: checks whether tests find planted mistakes.
 
+Run by `make mutants`. Starts compilers and tests; writes to BUILD/mutation only.
+
 Plants one mistake at a time (a comparison turned round, a constant one off, a statement left out) in the
 sources of an area and runs the area's tests: C sources with the unit tests that link them, under the
 sanitizers; Python modules in a copy of the tree with the tests of their folder. A mistake that no test

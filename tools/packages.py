@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""packages.py SET...: makes sure that what the machine must have is there.
+"""packages.py SET...: makes sure that what the machine must have is there. Run by the Makefile. Used by vcan/main.
 
 A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash`, `aarch64`, `deb`,
-`clean-root` or `container`. Missing Debian packages are installed when this runs as root or with passwordless sudo;
-otherwise the command to type is printed and the exit status is 1. Standard library only: it runs before anything is
-installed.
+`clean-root`, `container` or `compare`. Missing Debian packages are installed when this runs as root or with
+passwordless sudo; otherwise the command to type is printed and the exit status is 1. Standard library only: it runs
+before anything is installed.
 """
 
 from __future__ import annotations

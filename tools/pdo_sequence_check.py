@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks that each PDO comes once for each SYNC. Used by tools/bus_checker.py and tools/bus_drives.py."""
+"""Checks that each PDO comes once for each SYNC. Used by tools/bus_checker.py and tools/bus_drives.py. No I/O."""
 
 from __future__ import annotations
 

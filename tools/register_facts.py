@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""register_facts: data of the STM32G474RE from crate stm32-metapac, fetched once by cargo and pinned by its hash.
+"""register_facts: data of the STM32G474RE from crate stm32-metapac, fetched once by cargo and pinned by its hash. Used
+by tools/check_registers. Starts cargo; keeps the crate in the folder that it is given.
 
 The crate is data that its authors extracted from the manufacturer's files and reviewed register by register; nothing of
 it is compiled or built in. Its tables of constants are read as text (rust_literal).

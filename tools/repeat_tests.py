@@ -3,6 +3,8 @@
 """repeat_tests.py [--runs N] [--modes "idle busy one-core"] [--out DIR] [COMMAND...]: `make test` over and over, to see
 whether its verdict is always the same.
 
+Run by `make test-repeat`. Starts and ends processes.
+
 The runs take the modes in turn:
 
     idle      no other load

@@ -3,6 +3,8 @@
 """run_benchmarks.py: runs each benchmarks/*.py, prints its figures and gathers them in build/bench.json. At the end it
 prints each goal of benchmarks/goals.toml with its measured figure, and the load of the computer before and after.
 
+Run by `make bench`. Starts processes; writes below BUILD.
+
 Each script takes `--json OUT` and writes one JSON object: name of a figure to its value (a number, text,
 or an object). A script with the line `# bench: bus` near its top runs under tools/with-vcan. Exit status
 1 when one of them fails.

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """run_faults.py [--seeds N] [--jobs N] [SCENARIO...]: the whole campaign of `hodograph faults`, in parts side by side.
 
+Run by `make faults`. Starts processes.
+
 Each part has a core and, for each case, local buses of its own in virtual time: the table is the same each time.
 Prints one table for all; build/faults.json has every case. The exit status is 0 only when there was no violation and
 every part came to its end.

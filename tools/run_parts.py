@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """run_parts.py [--step NAME COMMAND | --tests NAME COMMAND]...: runs commands one after the other and sums them up.
 
+Run by `make test-all` and .ci/run. Used by tools/repeat_tests. Starts processes.
+
 The output of a part passes through. A part given by --tests has to end with a line `N passed, N failed`, with or
 without `, N skipped`. A part fails if its exit status is not 0; a part of --tests also if it has no such line or counts
 a failure. After a failure the other parts still run. At the end there is a table of how long each part took, and as the

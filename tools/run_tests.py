@@ -6,6 +6,8 @@
     --suite test    everything but the tests marked `long`
     --suite all     everything
 
+Run by these three targets. Starts processes; writes their reports below BUILD.
+
 The last line of its output is `N passed, N failed` (and `, N skipped` where there are any); the exit status is 0 only
 when none has failed and, but for `check`, at least one has passed. A C test binary that crashes, or says nothing,
 counts as one failed test. What has passed is kept in the cache (testing/cache.py), which only `check` reads.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""rust_literal: reads constants of Rust source text into Python values.
+"""rust_literal: reads constants of Rust source text into Python values. Used by tools/register_facts. No I/O.
 
 Enough of the syntax for tables of data: structs become dicts (their type is dropped), arrays lists, Some(x) x and
 None None; `a..=b` a range; a path such as `Clock::Mux` becomes its last word, `Mux(x)` the pair ("Mux", x).

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """size.py [--build DIR] [--update]: code, data, RAM and worst stack of every image, beside the committed table.
 
+Run by `make size`. Reads images by the binary utilities.
+
 Prints what differs from firmware/targets/sizes.json; --update writes it there instead. Bytes: `code` is all that lies
 in flash, `data` the part of it that is copied to RAM, `ram` variables without the stack, `stack` the worst case of
 main loop and interrupts one upon the other (tools/analysis/stack.py), of the `room` that the linker script gives.

@@ -4,6 +4,9 @@
 
     .venv/bin/python tools/soak.py [--seconds 3600] [--periods 1000,2000] [--json FILE] [--bus vcan0]
 
+Run by `make soak`. Starts the simulated machine, sends to its controller and receives all frames of its bus; writes
+FILE.
+
 Without --bus it has local buses of its own, in virtual time. `--seconds` is bus time: SYNCs times period. It is shared
 equally by the periods. Setpoints and encoders of each repetition must have the hashes that `hodograph simulate` gives
 for the program. Prints a summary; exit status 1 if the bus had unexpected frames, 4 if the machine failed.

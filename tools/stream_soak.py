@@ -4,6 +4,8 @@
 
     .venv/bin/python tools/stream_soak.py [--seconds 3600] [--period 1000] [--target an386] [--json FILE]
 
+Run by `make soak-stream`. Starts the machine, sends to its controller and receives all frames of its bus; writes FILE.
+
 Streams one job of about `--seconds` of motion on a local bus in virtual time to the controller on an emulated board.
 The setpoints on the bus must have the hash that the same chunks have in the offline simulation, without the standstill
 before and after. Virtual time stands still while the host plans, so no load on this computer makes a chunk late. Prints

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""docs/start/tutorial.md as a notebook: its Python blocks, run one after the other in one namespace.
+"""docs/start/tutorial.md as a notebook: its Python blocks, run one after the other in one namespace. Used by
+tools/draw_figures. Executes the code of the page in this process.
 
 A block of ```text right after a block of Python is what that prints. An image ../images/NAME.svg after it shows the
 `figure` that it leaves.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Other motion planners, run on the same toolpaths with the same limits, and the measurement of each.
+"""Other motion planners, run on the same toolpaths with the same limits, and the measurement of each. Starts processes
+and writes temporary files.
 
 The limits are those of the axes; Klipper's act along the path. `make compare` (benchmarks/peers/compare.py) runs all
 planners; docs/validation/compare.md has the results and how each was set up. Nothing of a peer is part of this tree:

@@ -3,6 +3,8 @@
 
     compare.py [--json OUT] [--figure OUT] [--only NAME ...] [--klipper CLONE --klipper-python PYTHON]
 
+Run by `make compare`. Starts processes; writes both files OUT, and temporary files.
+
 Each motion is sampled at 1 kHz. Printed of each: cycle time, greatest distance from the programmed path (both ways),
 greatest velocity, acceleration and jerk of an axis, ticks beyond the limits of the axes, processor time (of LinuxCNC,
 which plans while it moves, there is none) and peak memory of the planning process. docs/validation/compare.md says how

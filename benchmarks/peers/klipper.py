@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Klipper's planner, from a clone of the user's: a batch run of its host program (its docs/Debugging.md).
+"""Klipper's planner, from a clone of the user's: a batch run of its host program (its docs/Debugging.md). Used by
+peers/compare. Starts make and Klipper in a temporary copy of the clone.
 
 No registry has Klipper. The clone is copied first, so that nothing is written into it. Its host program gets the
 micro-controller's dictionary from its own build for Linux, the program as input, and an extra module that logs each

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A peer's motion: commanded positions at 1 kHz, and its measured figures."""
+"""A peer's motion: commanded positions at 1 kHz, and its measured figures. Used by peers/. No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The figure of `make compare`: a corner of the toolpath zigzag by each planner, and its speed and jerk over time."""
+"""The figure of `make compare`: a corner of the toolpath zigzag by each planner, and its speed and jerk over time. Used
+by peers/compare. Writes the file that it is given.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""TOPP-RA or Ruckig in a process of its own, so that time and memory are those of this planner.
+"""TOPP-RA or Ruckig in a process of its own, so that time and memory are those of this planner. Used by peers/compare.
+`plan_alone` starts this file as a script; both read and write temporary files.
 
     plan_alone.py PLANNER PROBLEM SOLUTION
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Processor time and memory of a command, in addition to its output.
+"""Processor time and memory of a command, in addition to its output. Used by peers/compare, peers/klipper and
+peers/plan_alone.
 
     process_cost.py OUT COMMAND ...
 

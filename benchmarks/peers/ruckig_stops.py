@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Ruckig: state to state, jerk-limited and time-optimal, here from rest to rest at each point of a program.
+"""Ruckig: state to state, jerk-limited and time-optimal, here from rest to rest at each point of a program. Used by
+peers/compare and peers/plan_alone. Reads the version of the package; no other I/O.
 
 Motion through intermediate points at speed is not part of the published package (a remote service plans it). So Ruckig
 represents exact stops: jerk-limited motion that never leaves the path and rests in each corner. Phase synchronisation

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""TOPP-RA: the least time along the C2 cubic spline through the points of a program, without a limit of the jerk.
+"""TOPP-RA: the least time along the C2 cubic spline through the points of a program, without a limit of the jerk. Used
+by peers/compare and peers/plan_alone. Reads the version of the package; no other I/O.
 
 It plans no path and has no corners, tolerance or feed words. So it is used only for programs whose points sample a
 smooth curve, with the feed word as a limit of the speed along the path.

@@ -3,6 +3,8 @@
 
     butterfly.py [--json OUT] [--only ROW ...]
 
+Run by `make butterfly`. Prints to stdout; writes OUT and a temporary drawing.
+
 Data of the curve: Y. Hu, X. Jiang, G. Huo and others, Int. J. Adv. Manuf. Technol. 129 (2023) 2843-2860. Limits and
 times: K. Erwinski, A. Wawrzak, M. Paprocki, IEEE Trans. Ind. Informatics 18 (2022) 7560-7571, table III and figures 13
 to 15. docs/validation/butterfly.md says what is printed and what is inferred.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The fastest feed along a path as a nonlinear program, for comparison: transcribed in CasADi, solved by Ipopt.
+"""The fastest feed along a path as a nonlinear program, for comparison: transcribed in CasADi, solved by Ipopt. Used by
+benchmarks/optimal. No I/O.
 
 Each span of the path is a phase of its own length in time, cut into equal intervals. Arc length is a quartic in each
 (jerk linear, free to jump at the ends of intervals); the curve's parameter xi is a variable at every node, tied to arc

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Program images with extreme but legal segments and feeds. Used by benchmarks/kernels.py."""
+"""Program images with extreme but legal segments and feeds. Used by benchmarks/kernels.py. No I/O."""
 
 from __future__ import annotations
 

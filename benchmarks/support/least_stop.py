@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The least time to rest along a path from a state of motion, as a nonlinear program: the reference for stops.
+"""The least time to rest along a path from a state of motion, as a nonlinear program: the reference for stops. Used by
+benchmarks/stops. No I/O.
 
 The stop is one phase of unknown length, cut into equal intervals. Jerk is linear in each interval and free to jump
 between them; speed and acceleration are 0 at the end. The path's tangent, curvature and change of curvature are cubic

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Motion ahead in the ring of a small controller, and bytes of chunks by part; used by streaming.py.
+"""Motion ahead in the ring of a small controller, and bytes of chunks by part. Used by benchmarks/streaming. Reads
+machine files and toolpaths of the examples.
 
 Paths of the examples are too short to fill a ring: the paths here repeat their shape, with their limits.
 """

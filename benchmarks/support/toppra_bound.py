@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one.
+"""Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one. Used by
+benchmarks/optimal. No I/O.
 
 Besides its axes the path has a coordinate more, arc length itself, so that feed and tangential acceleration are limits
 like those of axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The campaign of `make count`: counts each kernel on each core, over the example programs and worst-case programs."""
+"""The campaign of `make count`: counts each kernel on each core, over the example programs and worst-case programs.
+Used by tools/count, analysis/tables, analysis/taylor and benchmarks/counts. Reads the images that `make counter` makes,
+starts the emulator and (for their versions) the compilers, keeps counts in the cache folder.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 """Instructions of the controller's proof of the axis limits (core/limit_check.h), by segment and piece, and of the
 proof of stops (core/brake_check.h), by piece and kind of stop.
 
-For benchmarks/counts.py, which prints them: runs the image `checker` of two cores over the example programs.
+Used by benchmarks/counts, which prints them. Runs the images `checker` of two cores and `stop_checker` of one in the
+emulator, over the example programs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A plugin for QEMU's translator: instructions executed between two labels, call by call and part by part.
+ * A plugin for QEMU's translator: instructions executed between two labels, call by call and part by part. Loaded by
+ * QEMU, which tools/analysis/counting.py starts. Reads MAP, writes OUT.
  *
  *   qemu-system-arm ... -plugin FILE.so,map=MAP,out=OUT
  *

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Counts the instructions of the tick in an emulated run: an array of calls by parts."""
+"""Counts the instructions of the tick in an emulated run: an array of calls by parts. Used by analysis/,
+tools/count_tick and tools/count_til. Starts the emulator with count_plugin.c; writes temporary files.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The effect of an instruction on the stack pointer, and the instructions that may follow; Thumb and RISC-V, as written
-by objdump.
+by objdump. Used by analysis/longest, analysis/stack and tools/check_image. No I/O but that of `analysis/image`.
 """
 
 from __future__ import annotations

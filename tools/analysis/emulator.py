@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The emulated boards: which machine a target's image runs on, and how it is started with one program.
+"""The emulated boards: which machine a target's image runs on, and how it is started with one program. Used by all
+tools that count instructions or bound their number. Starts QEMU and waits for its end.
 
 tests/target/setpoints.c is the image; its words are KERNEL FILE (and more, see there).
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Forbidden content of images: functions of libraries, by name, and float instructions outside the float kernel."""
+"""Forbidden content of images: functions of libraries, by name, and float instructions outside the float kernel. Used
+by tools/check_image. No I/O but that of `analysis/image`.
+"""
 
 from __future__ import annotations
 

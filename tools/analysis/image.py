@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A linked image as the binary utilities show it: symbols, memory, instructions by function."""
+"""A linked image as the binary utilities show it: symbols, memory, instructions by function. Used by analysis/,
+tools/check_image, tools/longest_path and tools/size. Reads the image, and starts the binary utilities (nm, readelf,
+size, objdump) when their output is first needed.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The longest path through a function of a linked image, with all that it calls, in instructions.
+"""The longest path through a function of a linked image, with all that it calls, in instructions. Used by
+tools/longest_path. Reads loops.toml, and the image by `analysis/image`.
 
 Each path that the instructions allow counts, whether values can take it or not, so no run can be longer.
 firmware/targets/loops.toml has what instructions do not show: bounds of loops, targets of calls through pointers, and

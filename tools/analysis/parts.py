@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Maps the instructions of an image to parts of the tick, for count_plugin.c.
+"""Maps the instructions of an image to parts of the tick, for count_plugin.c. Used by analysis/ and tools/count_til.
+Starts objdump and addr2line.
 
 The compiler merges functions, so addr2line (DWARF) gives the functions from which an address was inlined. The innermost
 of them that has a rule below gives the part. A function without a rule (helpers, the compiler's own library) counts for

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """prove.py [OPTION...] [NAME...]: runs the proofs of tests/proofs, or those named; --help has the options.
 
+Run by `make proofs`. Starts the provers; writes below --build and to the cache folder.
+
 A proof is a C file with a first comment that says, line by line, `prover: eva` or `prover: cbmc`, the functions whose
 contracts it `assumes:` (Eva) or `replaces: function:stub` (CBMC), those that it `shows:`, more `options:`, what stands
 `instead:` of something equal that the prover cannot follow, and its `mutant:`s, both `FILE: OLD => NEW`. It counts as

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The most stack that a linked image can need, from its own instructions.
+"""The most stack that a linked image can need, from its own instructions. Used by tools/check_image and tools/size.
+Reads stack.toml, and the image by `analysis/image`.
 
 Each path through each function, also of libraries, is followed with the value of the stack pointer, so the stack in use
 at each call is known. firmware/targets/stack.toml has what instructions do not show: targets of calls through pointers,

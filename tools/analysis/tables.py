@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Figures of campaign.py as text: tables for docs/validation/counts.md and the console, JSON of one line for
-each row."""
+"""Figures of campaign.py as text: tables for docs/validation/counts.md and the console, JSON of one line for each row.
+Used by tools/count, tools/longest_path and benchmarks/counts. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Compares the usual NURBS interpolator (tests/target/taylor.c) with the PH kernel: instructions of a tick and ripple
-of the feed.
+of the feed. Used by tools/count and benchmarks/counts. Reads the example alpha, starts the emulator; writes temporary
+files.
 
 Both run the alpha at its feed of 100 mm/s: the kernel runs the PH spline without ramps, the other one the B-spline of
 the same control polygon, which the PH spline meets at its knots.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Worst-case programs: as expensive as the controller accepts, with the commands to run them.
+"""Worst-case programs: as expensive as the controller accepts, with the commands to run them. Used by analysis/campaign
+and tools/count_tick. No I/O.
 
 At 200 % many ticks cross two ends of segments and two of pieces: a very short and a long one alternate, together just
 longer than docs/reference/protocol.md 1.2 and 1.3 require. Segments have the greatest speed ratio. The override bounds

@@ -4,6 +4,8 @@
 
     abi.py LIBRARY [--update]
 
+Run by `make abi`. Starts the C compiler and the binary utilities; writes temporary files.
+
 LIBRARY is the folder that `make library` makes. Compared are what the shared library exports, its SONAME, and the bytes
 of each public struct; --update writes the bytes anew. Exit status 1 where something differs.
 """

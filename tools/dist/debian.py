@@ -4,6 +4,8 @@
 
     debian.py --build BUILD OUT
 
+Run by `make deb`. Starts processes; writes packages to OUT, all else to a temporary folder.
+
 Programs and library are those of `make build`, the Python packages those of `make runtime`. The host tools come with
 the Python packages that they need, at the locked versions and with the locked hashes, in a virtual environment in
 /usr/lib/hodograph: Debian's own packages of these are other versions, or not there. So the package works with one

@@ -4,6 +4,8 @@
 
     install.py install|uninstall --build BUILD --prefix PREFIX [--destdir DIR] [--libdir DIR]
 
+Run by `make install` and `make uninstall`. Writes below PREFIX, or below DIR.
+
 Programs with their man pages, library, headers, EDS files and examples. With --destdir everything lies below that
 folder, and the files still name PREFIX; so packages are made. `uninstall` removes what `install` with the same options
 would write, and the folders that are empty then. Standard library only.

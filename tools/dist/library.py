@@ -4,6 +4,8 @@
 
     library.py OUT
 
+Run by `make library`. Used by dist/. Writes to OUT only.
+
 In this tree the core is one part of many: its headers are included as "core/NAME.h", and its names meet no other code.
 A library lies beside other code. So here it has one header `hodograph.h`, the rest in a folder `hodograph`, and the
 prefix `hodograph_` before every name that the linker sees. `hodograph/names.h` adds the prefix, so the sources keep

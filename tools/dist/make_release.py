@@ -4,6 +4,9 @@
 
     make_release.py OUT [--platform TAG]
 
+Run by `make dist` and `make wheels`. Used by dist/debian. Starts git and the build of the package (setup.py); writes to
+OUT and to a temporary folder.
+
 The wheel is built from the unpacked source distribution, so that it has nothing that the distribution lacks. Times in
 both are SOURCE_DATE_EPOCH, or that of the last commit. `--platform` names the platform of the wheel, for compilers
 ($CC, $AR) that build for another platform than this computer's.

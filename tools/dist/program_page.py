@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Man pages of the C programs, from what they print for --help, so that both say the same. Standard library only."""
+"""Man pages of the C programs, from what they print for --help, so that both say the same. Standard library only. Used
+by dist/install. Starts each program with --help.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Builds the C programs that the Python package starts, with nothing but a C compiler.
+"""Builds the C programs that the Python package starts, with nothing but a C compiler. Used by dist/install; setup.py
+calls it. Starts the compiler; writes to the folders that it is given.
 
 `make c` builds the same programs from the same folders for work on the tree; this is for `pip install`, where there may
 be no make.

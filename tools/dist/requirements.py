@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which locked Python requirements the package itself needs: requirements.lock has those of tests and lint too."""
+"""Which locked Python requirements the package itself needs: requirements.lock has those of tests and lint too. Used by
+dist/runtime. Reads pyproject.toml and requirements.lock.
+"""
 
 from __future__ import annotations
 

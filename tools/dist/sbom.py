@@ -4,6 +4,8 @@
 
     sbom.py --build BUILD --tool CYCLONEDX_PY OUT
 
+Run by `make sbom`. Starts cyclonedx-py; writes OUT and a temporary file.
+
 cyclonedx-py reads BUILD/runtime: the Python packages with versions, licences and dependencies. The library and the
 programs in C are added with their hashes; they are this project's own and contain no other code. The same tree gives
 the same bytes.

@@ -4,7 +4,8 @@
     python -m eds.to_c FILE.eds NAME OUTDIR    OUTDIR/od_NAME.h and OUTDIR/od_NAME.c
     python -m eds.check FILE.eds...            a line for each fault
 
-with tools/ in PYTHONPATH. `make build` calls the first for each dictionary of this tree, `make lint` the second.
+with tools/ in PYTHONPATH. The first is run by `make build`, for each dictionary of this tree, the second by
+`make lint`. Run by tools/dist/programs.py too. Reads EDS files; only `to_c` writes.
 
 | module | what it has |
 | --- | --- |

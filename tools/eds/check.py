@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Checks EDS files against CiA 306, 301 and 402, and that python canopen loads them.
+"""Checks EDS files against CiA 306, 301 and 402, and that python canopen loads them. Run by `make lint`. Reads the
+files, writes nothing.
 
     python -m eds.check FILE.eds...
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reads an EDS file by python canopen; a fault is an EdsError, which names the section."""
+"""Reads an EDS file by python canopen; a fault is an EdsError, which names the section. Used by eds/check and eds/to_c.
+Reads the file that it is given.
+"""
 
 from __future__ import annotations
 

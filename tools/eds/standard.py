@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What CiA 301 and CiA 402 fix about the objects that our dictionaries may have: kind and data types."""
+"""What CiA 301 and CiA 402 fix about the objects that our dictionaries may have: kind and data types. Used by
+eds/check. No I/O.
+"""
 
 from __future__ import annotations
 

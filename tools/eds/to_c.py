@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Makes the C tables of an object dictionary from its EDS file (CiA 306).
+"""Makes the C tables of an object dictionary from its EDS file (CiA 306). Run by `make build` and dist/programs.py.
+Reads FILE.eds and two templates, writes both files.
 
     python -m eds.to_c FILE.eds NAME OUTDIR    ->  OUTDIR/od_NAME.h and OUTDIR/od_NAME.c
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """child.py TARGET --folder DIR [--seconds S] [--seed N] [--case K]: cases of one target, until the time is over.
 
+Started by tools/fuzz.py, once for each target. Writes to DIR.
+
 Says one line of JSON at its end: cases, findings. A case that takes longer than HANG_S ends the process with the traces
 of its threads; the folder then has its files and its number.
 """

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The C harnesses of tests/fuzz, each run by libFuzzer for so many seconds."""
+"""The C harnesses of tests/fuzz, each run by libFuzzer for so many seconds. Used by tools/fuzz. Starts processes;
+writes new inputs, logs and findings to build/fuzz.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The kinds of input that the Python side reads, with what may and may not come of a mutated one.
+"""The kinds of input that the Python side reads, with what may and may not come of a mutated one. Used by
+fuzzing/child. Writes to the folder that it is given; to make a recording it starts a local bus and the simulated
+machine.
 
 Each target makes its cases from a random generator alone, so a case is found again by target, seed and number. A
 `Finding` is raised where a rule is broken:

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Mutates the values and keys of TOML documents, and writes the same document in many forms. Used by targets.py."""
+"""Mutates the values and keys of TOML documents, and writes the same document in many forms. Used by targets.py. No
+I/O.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: MIT
 """check_misra.py --build DIR --include DIR... FILE...: cppcheck's MISRA C:2012 add-on, less the deviations.
 
+Run by `make lint`. Starts cppcheck, which keeps results in DIR.
+
 tools/misra/deviations.txt has a line `RULE PLACE reason` for each: PLACE is a glob of paths, `*` for all. Prints
 FILE:LINE: RULE for what remains, and deviations that nothing needs any more. Exit status 1 then. The rules' texts are
 not free, so only their numbers are given. Files whose objects have not changed are not checked again.

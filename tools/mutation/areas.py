@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The areas whose tests are tried with planted mistakes: their sources, and the tests that should find the mistakes."""
+"""The areas whose tests are tried with planted mistakes: their sources, and the tests that should find the mistakes.
+Used by tools/mutants and mutation/python_tests. Lists the files of folders; no other I/O.
+"""
 
 from __future__ import annotations
 

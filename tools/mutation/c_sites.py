@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mistakes that can be planted in a C source, found in its text.
+"""Mistakes that can be planted in a C source, found in its text. Used by tools/mutants. No I/O.
 
 The text must be in the format of `make format`: binary operators stand between spaces, and a statement
 begins its line. Not touched: comments, strings, the preprocessor, assertions, and initialisers of

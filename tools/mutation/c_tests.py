@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Compiles one C source with a mistake in it and runs the unit tests that link it.
+"""Compiles one C source with a mistake in it and runs the unit tests that link it. Used by tools/mutants. Starts
+processes; writes to BUILD/mutation/c only.
 
 Compiling is quick, linking each test anew is not: so every test is linked once, under BUILD/mutation/c, against shared
 objects, and a first one, libmutant.so, is made anew for each mutant. It holds the source with the mistake; its symbols

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The result of one planted mistake, and the file that keeps results until the source changes."""
+"""The result of one planted mistake, and the file that keeps results until the source changes. Used by tools/mutants,
+mutation/c_tests and mutation/python_tests. Reads this file and appends to it.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Mistakes that can be planted in a Python module, found in its syntax tree.
+"""Mistakes that can be planted in a Python module, found in its syntax tree. Used by tools/mutants. No I/O.
 
 Not touched: annotations, strings, imports, the condition `if TYPE_CHECKING`, decorators, and `strict=` of zip.
 """

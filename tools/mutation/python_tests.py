@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Runs an area's Python tests with a mistake in a copy of the tree."""
+"""Runs an area's Python tests with a mistake in a copy of the tree. Used by tools/mutants. Starts processes; writes to
+BUILD/mutation only.
+"""
 
 from __future__ import annotations
 

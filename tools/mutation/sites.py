@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A planted mistake: its place, the text that it replaces, and the changed source."""
+"""A planted mistake: its place, the text that it replaces, and the changed source. Used by tools/mutants and mutation/.
+No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sphinx settings of the manual (`make site`)."""
+"""Sphinx settings of the manual (`make site`). Loaded by Sphinx, which tools/site/make_site.py starts. No I/O."""
 
 project = "Hodograph"
 author = "the Hodograph developers"

@@ -3,6 +3,8 @@
 
     make_site.py OUTPUT
 
+Run by `make site`. Starts Sphinx; writes OUTPUT and a copy of the pages beside it, OUTPUT-source.
+
 The navigation is the tables of docs/index.md, in their order. Warnings of Sphinx, a broken link among them, are errors.
 OUTPUT/index.html opens from the disk; nothing is fetched from outside.
 """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Stamps: results for one content of all inputs, kept outside the tree so that they need not be computed again.
+"""Stamps: results for one content of all inputs, kept outside the tree so that they need not be computed again. Used by
+all tools that keep results. Reads and writes files in the cache folder.
 
 A stamp lies in ${XDG_CACHE_HOME:-~/.cache}/hodograph/PART, under the hash of all that the finding depends on: sources,
 tools, flags. The writer of a stamp has to include all of them in its key. A file that is damaged in any way, or was

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What `make check` runs: of the tests that a change can reach, as many as its budget of time allows.
+"""What `make check` runs: of the tests that a change can reach, as many as its budget of time allows. Used by
+tools/run_tests. Reads test files and stamps.
 
 Test files that were edited always run, and those that are not known to have passed and need no bus and not the machine
 for themselves. Then, as long as the budget lasts, come those that start no processes, the ones

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs Python tests in groups, by what they need of the machine.
+"""Runs Python tests in groups, by what they need of the machine. Used by tools/run_tests and testing/choice. Starts and
+ends processes; keeps their logs and reports in the build folder.
 
 `free` tests run in parallel; those marked `serial` measure time and run alone; those marked `bus` run one at a time
 inside tools/with-vcan, which gives all of them one vcan0. Tests marked `long` are chosen only where all are wanted.

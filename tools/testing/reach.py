@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""What a Python test file depends on, and which test files a change can therefore reach.
+"""What a Python test file depends on, and which test files a change can therefore reach. Used by tools/run_tests and
+testing/. Reads files of the tree; keeps stamps in the cache folder.
 
 A test file's inputs are
 - the file, the conftest.py files above it, and all modules of this tree that these import, at any depth and anywhere in

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A plugin of pytest that writes down what each test file reads and starts, and how long its tests take.
+"""A plugin of pytest that writes down what each test file reads and starts, and how long its tests take. Used by
+testing/groups, which starts pytest with it. Writes to FOLDER.
 
     HODOGRAPH_RECORD=FOLDER HODOGRAPH_GROUP=NAME pytest -p testing.recording ...
 

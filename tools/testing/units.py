@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The C tests under the sanitizers: a Unity binary for each tests/unit/test_*.c, and one for each tests/fuzz/fuzz_*.c,
-which replays its corpus.
+which replays its corpus. Used by tools/run_tests and testing/choice. Starts processes; prints to stdout, keeps stamps
+in the cache folder.
 """
 
 from __future__ import annotations

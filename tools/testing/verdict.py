@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Counts tests from the output of test programs. Output that is not understood counts as a failure."""
+"""Counts tests from the output of test programs. Output that is not understood counts as a failure. Used by
+tools/run_tests, testing/groups and testing/units. Reads the reports of pytest; prints skipped tests to stdout.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A vcan0 (and vcan1) for a command: the Linux kernel's own, or inside user-mode Linux. tools/with-vcan is the command.
+"""A vcan0 (and vcan1) for a command: the Linux kernel's own, or inside user-mode Linux. Used by tools/with-vcan, which
+is the command. Starts processes and makes network interfaces.
 
 main       command line
 kernel     the buses of this Linux kernel: an existing vcan0, or buses in a new network namespace

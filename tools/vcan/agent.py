@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """First process inside user-mode Linux: starts commands, opens connections, passes their streams over the serial line.
 
-init.sh runs it as `python3 -I -S agent.py TTY`, from the folder of this file. It serves until the line is cut, and then
-stops the kernel it runs in. Written to start quickly: few imports.
+Started by init.sh as `python3 -I -S agent.py TTY`, from the folder of this file. It serves until the line is cut, and
+then stops the kernel it runs in. Written to start quickly: few imports.
 """
 
 from __future__ import annotations

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Owns a user-mode Linux process with a vcan0 and joins clients to the agent inside it.
+"""Owns a user-mode Linux process with a vcan0 and joins clients to the agent inside it. Used by vcan/main, which starts
+it as a process. Serves a socket in the folder of the bus.
 
 Runs as a process in a session of its own, so that a Ctrl-C at the terminal does not reach it. The client
 that opened the bus is connected from the start; when that connection ends, for whatever reason, the kernel

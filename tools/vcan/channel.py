@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """One stream of bytes between `tools/with-vcan` and user-mode Linux: base class of a command (vcan/job) and of a TCP
-connection (vcan/connection). Used by vcan/agent, vcan/connection and vcan/job, inside of that kernel.
+connection (vcan/connection). Used by vcan/agent, vcan/connection and vcan/job, inside of that kernel. Closes
+descriptors; no other I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Runs one command on a user-mode bus: its streams, signals and exit status pass through as if it ran here."""
+"""Runs one command on a user-mode bus: its streams, signals and exit status pass through as if it ran here. Used by
+vcan/main. Sends and receives on a socket of the broker; catches signals of this process.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A TCP connection to a port inside user-mode Linux, which a forwarder outside has requested."""
+"""A TCP connection to a port inside user-mode Linux, which a forwarder outside has requested. Used by vcan/agent. Opens
+a socket.
+"""
 
 from __future__ import annotations
 

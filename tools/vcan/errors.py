@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The errors of this package; main turns them into a line on stderr and exit status 125."""
+"""The errors of this package; main turns them into a line on stderr and exit status 125. Used by vcan/. No I/O."""
 
 
 class BusUnavailable(Exception):

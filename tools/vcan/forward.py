@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""TCP ports of this machine's loopback, passed on to the same or another port beside the bus.
+"""TCP ports of this machine's loopback, passed on to the same or another port beside the bus. Used by vcan/main.
+Listens at ports; starts a thread or a process (vcan/relay).
 
 `--forward OUTSIDE[:INSIDE]` serves 127.0.0.1:OUTSIDE as long as the command runs; each connection becomes one to
 127.0.0.1:INSIDE there. User-mode Linux is reached through the broker, a network namespace by a process within it.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Frames of the multiplexed channel between client, broker and agent.
+"""Frames of the multiplexed channel between client, broker and agent. Used by vcan/. No I/O.
 
 A frame is type u8, channel u32, length u32 (little-endian) and the payload. A channel is one command inside, or one TCP
 connection to a port inside. Data flows against credit, so that a slow reader delays its own channel only: each side may

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A command that runs inside user-mode Linux, with its streams: one channel of the agent."""
+"""A command that runs inside user-mode Linux, with its streams: one channel of the agent. Used by vcan/agent. Starts
+the process, sends signals to it.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The buses of this Linux kernel: vcan0 if there is one, else one in a network namespace of the command; and vcan1.
+Used by vcan/main. Makes network interfaces; moves this process to a network namespace.
 
 vcan1 is a second bus for processes between two buses, such as the fault injector.
 

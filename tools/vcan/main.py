@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Command line of tools/with-vcan."""
+"""Command line of tools/with-vcan. Called by that script, which has nothing else. Starts processes, prints to stdout
+and stderr, then becomes the command or waits for it.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Which buses are open: one folder each under /tmp/hodograph-bus-UID.
+"""Which buses are open: one folder each under /tmp/hodograph-bus-UID. Used by vcan/broker, vcan/main and
+vcan/user_mode. Makes, locks and removes these folders.
 
 A folder holds `info.json` and `lock`. The process that keeps the bus alive holds the lock (flock), so a folder whose
 lock is free is left over from an ended process. A user-mode bus also keeps its socket and boot log there. The lock is

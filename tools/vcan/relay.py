@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Forwards TCP connections to a port beside the bus: through the broker into user-mode Linux, or into a network
-namespace (`tools/with-vcan --forward`).
+namespace (`tools/with-vcan --forward`). Used by vcan/forward. Starts a thread or a process; sends and receives on TCP
+sockets.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Starts a Linux kernel as a process (user-mode Linux) and ends it with all its processes. Used by vcan/broker and
-vcan/main, outside of that kernel.
+vcan/main, outside of that kernel. Starts and ends processes; writes to the folder of the bus.
 """
 
 from __future__ import annotations

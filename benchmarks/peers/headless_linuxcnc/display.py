@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: MIT
 """The DISPLAY of a headless LinuxCNC: switches the machine on, homes it, runs program.ngc and records samples.txt.
 
-memory.txt gets the peak resident size of the processes that read and plan, in KiB. LinuxCNC starts it with Debian's own
-Python, which has the module `linuxcnc`; PEER_FOLDER has the files.
+memory.txt gets the peak resident size of the processes that read and plan, in KiB. Started by LinuxCNC, with Debian's
+own Python, which has the module `linuxcnc`; PEER_FOLDER has the files.
 """
 
 import os

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Small functions for polynomials in Bernstein form, vectorised over spans (last axis: coefficients).
+"""Small functions for polynomials in Bernstein form, vectorised over spans (last axis: coefficients). Used by spline/,
+program/check and toolpath/fit/corners. No I/O.
 
 Everything here is exact algebra on polynomials over [0, 1]; docs/theory/numerics.md section 4.
 """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From points or a control polygon to a PHSpline; docs/theory/numerics.md sections 1 to 3. For the pipeline and the
-API.
+"""From points or a control polygon to a PHSpline; docs/theory/numerics.md sections 1 to 3. Used by all modules that
+make a spline from points. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Contour errors of a tuned loop with plants that differ from the model: friction, load, gain, time constant, late
-sensing.
+sensing. Used by tune/. Runs simulations in this process; no I/O.
 """
 
 from __future__ import annotations

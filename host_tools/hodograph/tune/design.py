@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Gains and feedforward from the requested properties, by placing the poles of the known plant (drives.md section
-17)."""
+"""Gains and feedforward from the requested properties, by placing the poles of the known plant (drives.md section 17).
+Used by tune/result, tune/search and tune/tuning. No I/O.
+"""
 
 from __future__ import annotations
 

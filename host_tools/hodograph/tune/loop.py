@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The servo loop of one axis as a linear sampled system, and its margins; docs/theory/drives.md section 17.
+"""The servo loop of one axis as a linear sampled system, and its margins; docs/theory/drives.md section 17. Used by
+tune/ and report/tune_report. No I/O.
 
 Exact for the simulated drive (sim/plant), except for its nonlinear parts: encoder increments, voltage limit, friction.
 """

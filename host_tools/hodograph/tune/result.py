@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The results of a tuning, by axis and by path and case; as text and as JSON."""
+"""The results of a tuning, by axis and by path and case; as text and as JSON. Used by cli/tune_command,
+report/tune_report and tune/tuning. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Searches the servo loop with the least contour error on given paths in the worst of fourteen plants, within margins
-that a real loop needs; docs/theory/drives.md section 17.
+that a real loop needs; docs/theory/drives.md section 17. Used by cli/tune_command and tune/tuning. Runs simulations in
+this process; no I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Tunes a machine: from the requested properties to gains, feedforward and their results. Used by cli/tune_command."""
+"""Tunes a machine: from the requested properties to gains, feedforward and their results. Used by cli/tune_command.
+Runs simulations in this process; reads the files of a path by `pipeline`.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From points or a control polygon in space to a SpatialPHSpline. For the pipeline and the API."""
+"""From points or a control polygon in space to a SpatialPHSpline. Used by bus/goto, pipeline and toolpath/fit/fitting.
+No I/O.
+"""
 
 from __future__ import annotations
 
