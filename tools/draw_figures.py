@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """draw_figures.py [--check] [--output DIR]: the figures of the manual (docs/images), from the programs themselves.
 
-Run by `make figures`.
+Run by `make figures`. Reads the tutorial and the examples; writes to DIR only.
 
 Draws path, feed, outputs, phase plane of a stop, state machine, bus timing and the figures of the tutorial as SVG
 files. With --check nothing is written; the exit status is 1 when a figure in DIR is not the one that would be drawn.

@@ -7,9 +7,8 @@
 
 Run by tests/system/test_longest_path.py and by hand. Reads images by the binary utilities.
 
-Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/validation/wcet.md
-compares the sum with
-what was counted. Exit status 1 when no bound can be shown.
+Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/validation/wcet.md compares
+the sum with what was counted. Exit status 1 when no bound can be shown.
 """
 
 from __future__ import annotations

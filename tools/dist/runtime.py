@@ -4,7 +4,7 @@
 
     runtime.py FOLDER
 
-Used by dist/debian. Starts pip, which gets the packages; writes to FOLDER.
+Run by `make runtime`. Used by dist/debian. Starts pip, which gets the packages; writes to FOLDER.
 
 It has the locked versions, checked by the locked hashes. Packages copy it, and the list of components is made of it.
 Its Python is /usr/bin/python3, so that it works on another computer with the same version of Python.

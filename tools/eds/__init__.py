@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """EDS files (CiA 306): from the description of an object dictionary to its C tables, and a check of the description.
+Run by `make build`, `make lint` and tools/dist/programs.py. Reads EDS files; only `to_c` writes.
 
     python -m eds.to_c FILE.eds NAME OUTDIR    OUTDIR/od_NAME.h and OUTDIR/od_NAME.c
     python -m eds.check FILE.eds...            a line for each fault
 
-with tools/ in PYTHONPATH. The first is run by `make build`, for each dictionary of this tree, the second by
-`make lint`. Run by tools/dist/programs.py too. Reads EDS files; only `to_c` writes.
+with tools/ in PYTHONPATH. `make build` calls the first for each dictionary of this tree, `make lint` the second.
 
 | module | what it has |
 | --- | --- |

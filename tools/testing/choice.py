@@ -3,9 +3,9 @@
 tools/run_tests. Reads test files and stamps.
 
 Test files that were edited always run, and those that are not known to have passed and need no bus and not the machine
-for themselves. Then, as long as the budget lasts, come those that start no processes, the ones
-with the fewest inputs first, since these are nearest to what was changed; then those that start some, the quickest
-first. What does not fit is named and left to `make test`; so are tests of programs that only `make test` builds.
+for themselves. Then, as long as the budget lasts, come those that start no processes, the ones with the fewest inputs
+first, since these are nearest to what was changed; then those that start some, the quickest first. What does not fit is
+named and left to `make test`; so are tests of programs that only `make test` builds.
 """
 
 from __future__ import annotations

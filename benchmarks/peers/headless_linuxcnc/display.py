@@ -3,7 +3,8 @@
 """The DISPLAY of a headless LinuxCNC: switches the machine on, homes it, runs program.ngc and records samples.txt.
 
 memory.txt gets the peak resident size of the processes that read and plan, in KiB. Started by LinuxCNC, with Debian's
-own Python, which has the module `linuxcnc`; PEER_FOLDER has the files.
+own Python, which has the module `linuxcnc`; PEER_FOLDER has the files. Starts halsampler; reads the program of
+PEER_FOLDER and writes both text files there.
 """
 
 import os
