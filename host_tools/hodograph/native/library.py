@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the compiled module; all other modules of this package use `library`. Loads the compiled
-module; no other I/O.
-"""
+"""Finds the compiled module. Used by the other modules of this package. Loads the compiled module; no other I/O."""
 
 from __future__ import annotations
 
