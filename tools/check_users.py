@@ -56,7 +56,7 @@ USERS = re.compile(
 )
 EFFECTS = re.compile(
     r"\b(pure|main\s+loop|timer|contexts?|threads?|I/O|ticks?|interrupts?|lock|reset|constants?|plain\s+data|macros"
-    r"|changes|reads|writes|receives|sends|starts|prints|waits|keeps|opens|builds|draws|makes|measures)\b",
+    r"|changes|reads?|writes?|receives?|sends?|starts|prints?|waits?|returns|ends|keeps|opens|draws|makes|measures)\b",
     re.IGNORECASE,
 )
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The public Python API (docs/reference/python-api.md). Used by programs of users, which import its names from
+"""The public Python API (docs/reference/python-api.md). Used by programs of users, who import its names from
 `hodograph`.
 
 Thin classes over the other packages, which are not public. Modules read and write files and use the bus; importing them

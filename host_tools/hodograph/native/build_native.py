@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Builds `_native`, the compiled module of this package, from the C core and the simulator (cffi, API mode).
+Run by `make build`; setup.py uses it too. Starts the compiler and writes the module.
 
     python build_native.py [--build DIR]
 

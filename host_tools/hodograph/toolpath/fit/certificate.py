@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Proves a bound of the distance between a curve and the programmed path, for every point of both.
+"""Proves a bound of the distance between a curve and the programmed path, for every point of both. Used by fit/fitting
+and fit/turning. No I/O.
 
 docs/theory/toolpath-fitting.md section 6. Chords with an error bound replace the curve. The distance of a point from a
 chord is convex, so a whole chord is no farther from another chord than the farther one of its ends. Chords whose bound

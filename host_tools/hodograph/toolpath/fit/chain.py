@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joins lines, corner curves and splines to one curve of continuous curvature.
+"""Joins lines, corner curves and splines to one curve of continuous curvature. Used by fit/fitting. No I/O.
 
 docs/theory/toolpath-fitting.md section 5.
 """

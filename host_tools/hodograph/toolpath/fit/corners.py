@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Corner curves between two straight legs: chains of PH quintics with curvature 0 at both ends.
+"""Corner curves between two straight legs: chains of PH quintics with curvature 0 at both ends. Used by toolpath/fit.
+No I/O.
 
 docs/theory/toolpath-fitting.md section 4. The preimage w of a corner is a uniform quadratic B-spline, symmetric about
 the bisector. Its few numbers were found by search for the least time through the corner at limited jerk. In the

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From a programmed path to a curve of continuous curvature within a certified tolerance.
+"""From a programmed path to a curve of continuous curvature within a certified tolerance. Used by all modules that make
+curves of toolpaths. No I/O.
 
 Theory: docs/theory/toolpath-fitting.md.
 """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The programmed path of moves as chords, with a bound of the error of each chord.
+"""The programmed path of moves as chords, with a bound of the error of each chord. Used by toolpath/fit, stream/reading
+and equal_sections. No I/O.
 
 docs/theory/toolpath-fitting.md section 2.
 """

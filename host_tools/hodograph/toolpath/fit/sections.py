@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Divides a toolpath into sections from rest to rest, with the commands at the rests between them.
+"""Divides a toolpath into sections from rest to rest, with the commands at the rests between them. Used by job,
+equal_sections and stream/reading. Takes commands from an iterator that may read the toolpath; no other I/O.
 
 docs/theory/toolpath-fitting.md section 1.
 """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Moves points sideways, each within its bound, so that the path through them can be passed fast.
+"""Moves points sideways, each within its bound, so that the path through them can be passed fast. Used by fit/fitting.
+No I/O.
 
 docs/theory/toolpath-fitting.md section 3. The cost of a path is the integral of its jerk squared over time, at speeds
 (n,) that are given. It is quadratic in the shifts. A barrier keeps the bounds, so every step of the search stays inside

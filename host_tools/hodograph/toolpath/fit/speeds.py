@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """An estimate of the speed along a path of points, with which smoothing weighs its cost;
-docs/theory/toolpath-fitting.md 3. It only decides where smoothing matters: the feed itself is planned later.
+docs/theory/toolpath-fitting.md 3. It only decides where smoothing matters: the feed itself is planned later. Used by
+fit/fitting and job. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Divides a path at long straight lines into corners and stretches, and a stretch into stations that smoothing may
-move.
+move. Used by toolpath/fit and stream/reading. No I/O.
 
 docs/theory/toolpath-fitting.md section 3.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rotary axes that move with a curve: smooth functions of its arc length within a tolerance.
+"""Rotary axes that move with a curve: smooth functions of its arc length within a tolerance. Used by job. No I/O.
 
 docs/theory/toolpath-fitting.md section 9. A programmed axis is linear over each chord of the reference. It becomes a C2
 function that differs from it by at most the tolerance at each place of the path.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arcs and helices: G2 and G3 with their centre (I, J, K) or radius (R).
+"""Arcs and helices: G2 and G3 with their centre (I, J, K) or radius (R). Used by gcode/interpreter. No I/O.
 
 I, J and K give the centre. The radii from it to start and end may differ by 0.1 % or by 0.0283 mm (0.00283 inch in
 G20), whichever is more, and by 100 times that length at most. These are LinuxCNC's bounds: programs are rounded to few

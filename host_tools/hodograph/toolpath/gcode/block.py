@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A block: one line of G-code as its words, with all checks that need this line only.
+"""A block: one line of G-code as its words, with all checks that need this line only. Used by toolpath/gcode. No I/O.
 
     N10 G1 X[#1 + 2] F100 #2=5 (comment)
 

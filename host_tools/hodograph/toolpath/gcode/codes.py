@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""G and M codes: modal groups, the words that each code uses, and why others are refused.
+"""G and M codes: modal groups, the words that each code uses, and why others are refused. Used by toolpath/gcode. No
+I/O; tables and pure functions.
 
 G codes are integers of ten times their number: 532 is none, 592 is G59.2.
 """

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Coordinate systems: from the numbers of a program to machine positions and back.
+"""Coordinate systems: from the numbers of a program to machine positions and back. Used by toolpath/gcode. No I/O;
+changes its own object and the parameters that it was given.
 
     machine position = R (program position + G92 offset) + origin of the coordinate system + tool offset
 

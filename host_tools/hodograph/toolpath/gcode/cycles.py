@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Canned cycles: G81 (drill), G82 (drill and dwell) and G83 (drill in pecks), as moves.
+"""Canned cycles: G81 (drill), G82 (drill and dwell) and G83 (drill in pecks), as moves. Used by gcode/interpreter. No
+I/O.
 
     G81 X Y Z R L    G82 X Y Z R P L    G83 X Y Z R Q L
 

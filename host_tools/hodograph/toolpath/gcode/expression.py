@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Numbers, parameters and expressions of G-code (RS274/NGC version 3, section 3.3.2).
+"""Numbers, parameters and expressions of G-code (RS274/NGC version 3, section 3.3.2). Used by gcode/block and
+gcode/flow. No I/O.
 
 Operators, the strongest first; those of one row go from left to right:
 

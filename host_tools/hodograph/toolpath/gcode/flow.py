@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""O-words: subroutines, conditions and loops.
+"""O-words: subroutines, conditions and loops. Used by gcode/reader. Reads the lines of the program that it is given.
 
     o<name> sub ... o<name> return [v] ... o<name> endsub [v]     o<name> call [v1] [v2] ...
     o1 if [v] ... o1 elseif [v] ... o1 else ... o1 endif

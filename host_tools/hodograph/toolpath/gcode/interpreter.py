@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Executes blocks: from the words of a block and the modal state to commands.
+"""Executes blocks: from the words of a block and the modal state to commands. Used by gcode/flow and gcode/reader. No
+I/O; changes its own object only.
 
 The order of execution within a block is that of RS274/NGC (table in docs/reference/gcode.md). The reader stops at a
 refused block, so its effect on the state does not matter.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Modal state of the interpreter: settings that stay in force from block to block, and the machine position."""
+"""Modal state of the interpreter: settings that stay in force from block to block, and the machine position. Used by
+toolpath/gcode. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Options of the G-code reader: the machine's tables, and the bounds of loops and subroutines."""
+"""Options of the G-code reader: the machine's tables, and the bounds of loops and subroutines. Used by toolpath/files
+and toolpath/gcode. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Parameters of G-code: `#5` and `#<name>`.
+"""Parameters of G-code: `#5` and `#<name>`. Used by toolpath/gcode. No I/O; changes its own object only.
 
 Numbered parameters 1 to 5601 are 0 until they are set. Named ones are local to the subroutine that sets them, or to
 the main program; those whose name begins with an underscore are global. Some parameters hold the state of the

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Polar coordinates: `@` is a distance from the program's origin in mm or inches, `^` an angle in degrees from x.
+"""Polar coordinates: `@` is a distance from the program's origin in mm or inches, `^` an angle in degrees from x. Used
+by gcode/cycles and gcode/interpreter. No I/O.
 
 After G90 both are absolute; a missing one keeps its value of the present position. After G91 they are steps of the
 present distance and angle. They replace X and Y of a motion in plane XY.

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads a program of G-code, line by line, as commands.
+"""Reads a program of G-code, line by line, as commands. Used by toolpath/files. Reads lines from an open file, one at a
+time.
 
     with open("part.ngc", encoding="utf-8", errors="surrogateescape") as lines:
         for command in read_gcode(lines, "part.ngc"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A line of G-code as it was written, and the compact text that is parsed.
+"""A line of G-code as it was written, and the compact text that is parsed. Used by toolpath/gcode. No I/O.
 
 RS274/NGC does not distinguish upper and lower case, and blanks have no meaning outside comments. The compact text is
 the line in lower case without blanks; a comment becomes one character (`COMMENT`). Places in the compact text turn

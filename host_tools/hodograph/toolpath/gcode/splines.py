@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Splines of plane XY: G5 (cubic Bézier), G5.1 (quadratic Bézier), G5.2 with G5.3 (NURBS).
+"""Splines of plane XY: G5 (cubic Bézier), G5.1 (quadratic Bézier), G5.2 with G5.3 (NURBS). Used by gcode/interpreter.
+No I/O.
 
     G5 X Y I J P Q   control points: start, start + (I, J), end + (P, Q), end; without I and J a G5 continues the G5
                      before it without a corner

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Parameters that hold the state of the interpreter, with the numbers and names that LinuxCNC gives them.
+"""Parameters that hold the state of the interpreter, with the numbers and names that LinuxCNC gives them. Used by
+gcode/interpreter. No I/O.
 
 #5400                  tool in the spindle
 #5401 to #5406         tool offset in force, in mm and degrees
