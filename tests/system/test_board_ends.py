@@ -91,7 +91,7 @@ def targets(frames: Frames, node: int) -> tuple[np.ndarray, np.ndarray]:
     return data[:, :2].copy().view("<u2")[:, 0], data[:, 2:].copy().view("<i4")[:, 0]
 
 
-def test_told_to_end_it_stops_the_axes_on_the_path_first(running: Running) -> None:
+def test_a_request_to_end_stops_the_axes_on_the_path_first(running: Running) -> None:
     running.board.end(END_S)
     assert running.board.child.returncode == 0
     frames = running.recorder.so_far()

@@ -248,7 +248,7 @@ def test_the_controller_sends_sync_with_its_counter(hub: LocalHub, controller: L
     assert controller.node.sdo[0x1019].raw == 240
 
 
-def test_the_controller_obeys_resets_only(controller: Listened) -> None:
+def test_the_controller_executes_resets_only(controller: Listened) -> None:
     """It is the master: it starts itself, and nobody stops it."""
     assert controller.states(1) == [OPERATIONAL]
     for name in ("STOPPED", "PRE-OPERATIONAL"):

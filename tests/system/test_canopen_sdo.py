@@ -283,7 +283,9 @@ def test_block_download_out_of_sequence(controller: canopen.RemoteNode, by_hand:
     assert is_active(controller, program("line_tiny"))
 
 
-def test_block_download_of_more_than_told(controller: canopen.RemoteNode, by_hand: Hand) -> None:
+def test_block_download_of_more_than_announced(
+    controller: canopen.RemoteNode, by_hand: Hand
+) -> None:
     image = program("line_tiny")
     initiate_block(by_hand, 100)
     for number, data in enumerate(segments_of(image)[:126], start=1):
@@ -294,7 +296,7 @@ def test_block_download_of_more_than_told(controller: canopen.RemoteNode, by_han
 
 
 @pytest.mark.parametrize(("wrong", "code"), [(0, TOO_SHORT), (1, CRC)])
-def test_block_download_of_less_than_told(
+def test_block_download_of_less_than_announced(
     controller: canopen.RemoteNode, by_hand: Hand, wrong: int, code: int
 ) -> None:
     """The CRC is checked first."""

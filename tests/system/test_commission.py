@@ -199,7 +199,7 @@ def test_text_for_people(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> N
         assert "0x60C2 sub 1" in whole
 
 
-def test_another_machine_is_told_apart(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> None:
+def test_another_machine_is_recognized(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> None:
     file = str(PAPER_ALPHA.parent / "real_drives.toml")
     with simulated_drives(hub):
         assert main(["check", file]) == 4
@@ -416,7 +416,7 @@ def test_nodes_without_number_are_found_and_left_alone(
         assert "serial 0x80000002: no node number" in capsys.readouterr().out
 
 
-def test_a_node_that_hides_others_is_told(
+def test_a_node_that_hides_others_is_reported(
     hub: LocalHub, capsys: pytest.CaptureFixture[str]
 ) -> None:
     nodes = [(NO_NUMBER, OTHER_ID), (NO_NUMBER, SERVO_ID)]

@@ -122,7 +122,7 @@ def test_two_nodes_answer_a_sync_each(hub: LocalHub, network: Network) -> None:
             assert struct.unpack("<h", found[0x280 + 43]) == (0,)
 
 
-def test_a_moved_pdo_is_heard(network: Network) -> None:
+def test_a_moved_pdo_is_received(network: Network) -> None:
     """The filters of the process follow the COB-ID; type 255 acts without SYNC."""
     sdo = network[42].sdo
     network.nmt.send_command(1)

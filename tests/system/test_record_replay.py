@@ -123,7 +123,7 @@ def motion(hub: LocalHub, clock: VirtualClock, jump_at: int) -> None:
 
 
 @pytest.mark.parametrize("jump_at", [-1, 100, 500, 1100, 1299])
-def test_a_jump_on_the_bus_is_told(
+def test_a_jump_on_the_bus_is_reported(
     hub: LocalHub, clock: VirtualClock, tmp_path: Path, jump_at: int
 ) -> None:
     def record(name: str, *more: str) -> tuple[int, dict[str, Any], str]:

@@ -642,7 +642,7 @@ static void test_a_full_port_is_counted(void)
     TEST_ASSERT_EQUAL_INT(3, app_bench_read(&bench, 0x2008, 7));
 }
 
-static void test_nmt_reset_is_obeyed_only_while_off(void)
+static void test_nmt_reset_is_executed_only_while_off(void)
 {
     struct can_msg reset;
     nmt_master_command(NMT_RESET_NODE, 1, &reset);
@@ -721,7 +721,7 @@ int main(void)
     RUN_TEST(test_a_fault_stop_beyond_its_deadline);
     RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);
     RUN_TEST(test_a_full_port_is_counted);
-    RUN_TEST(test_nmt_reset_is_obeyed_only_while_off);
+    RUN_TEST(test_nmt_reset_is_executed_only_while_off);
     RUN_TEST(test_a_reset_gives_objects_their_defaults);
     return UNITY_END();
 }

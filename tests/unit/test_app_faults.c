@@ -232,7 +232,7 @@ static void test_off_has_more_patience(void)
 /* --- Drives that do not follow --- */
 
 /* A heartbeat that stops while the drive follows: the stop is on the path, then all are off. */
-static void test_a_fault_with_all_drives_obeying_stops_on_the_path(void)
+static void test_a_fault_with_all_drives_following_stops_on_the_path(void)
 {
     run_some(250);
     port_lock();
@@ -267,7 +267,7 @@ static void test_a_drive_lost_while_braking_makes_it_a_quick_stop(void)
 }
 
 /* It receives, it brakes, only its answers are lost: power is not taken from it while it moves. */
-static void test_a_drive_that_is_not_heard_may_finish_its_quick_stop(void)
+static void test_a_silent_drive_may_finish_its_quick_stop(void)
 {
     run_some(250);
     drive(0)->quick_stop_syncs = 50;
@@ -1149,9 +1149,9 @@ int main(void)
     RUN_TEST(test_late_answers_are_neither_counted_nor_a_fault);
     RUN_TEST(test_a_slow_host_is_no_fault);
     RUN_TEST(test_off_has_more_patience);
-    RUN_TEST(test_a_fault_with_all_drives_obeying_stops_on_the_path);
+    RUN_TEST(test_a_fault_with_all_drives_following_stops_on_the_path);
     RUN_TEST(test_a_drive_lost_while_braking_makes_it_a_quick_stop);
-    RUN_TEST(test_a_drive_that_is_not_heard_may_finish_its_quick_stop);
+    RUN_TEST(test_a_silent_drive_may_finish_its_quick_stop);
     RUN_TEST(test_a_drive_in_fault_makes_a_quick_stop_of_the_others);
     RUN_TEST(test_a_drive_that_stops_quickly_by_itself);
     RUN_TEST(test_a_drive_that_restarts_is_not_braked_along_the_path);

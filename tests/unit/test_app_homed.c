@@ -158,7 +158,7 @@ static void test_a_fault_reset_keeps_it(void)
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
 }
 
-static void test_an_axis_that_is_pushed_while_it_is_heard_keeps_it(void)
+static void test_an_axis_that_is_pushed_in_boot_keeps_its_reference(void)
 {
     home();
     bench.drives[0].position_counts += 50000000;
@@ -294,7 +294,7 @@ static void test_a_drive_that_is_found_somewhere_else_loses_it(void)
     }
 }
 
-static void test_a_drive_that_does_not_say_where_it_is_loses_it(void)
+static void test_a_drive_without_a_position_loses_its_reference(void)
 {
     home();
     bench.drives[0].lacks[0] = 0x6064;
@@ -389,7 +389,7 @@ int main(void)
     RUN_TEST(test_a_refused_start_ends_the_permission);
     RUN_TEST(test_a_start_while_the_controller_ends_takes_the_permission_too);
     RUN_TEST(test_a_fault_reset_keeps_it);
-    RUN_TEST(test_an_axis_that_is_pushed_while_it_is_heard_keeps_it);
+    RUN_TEST(test_an_axis_that_is_pushed_in_boot_keeps_its_reference);
     RUN_TEST(test_an_interrupted_homing_affects_only_the_axis_under_way);
     RUN_TEST(test_a_homing_that_is_broken_off_loses_the_elder_zero);
     RUN_TEST(test_a_drive_that_restarts_loses_it);
@@ -399,7 +399,7 @@ int main(void)
     RUN_TEST(test_a_short_silence_is_none);
     RUN_TEST(test_the_silence_that_counts_is_configured);
     RUN_TEST(test_a_drive_that_is_found_somewhere_else_loses_it);
-    RUN_TEST(test_a_drive_that_does_not_say_where_it_is_loses_it);
+    RUN_TEST(test_a_drive_without_a_position_loses_its_reference);
     RUN_TEST(test_an_encoder_that_fails_loses_it);
     RUN_TEST(test_other_coordinates_lose_it);
     RUN_TEST(test_an_axis_that_was_left_out_for_a_while_loses_it);

@@ -70,7 +70,7 @@ static void test_boots_with_one_frame(void)
     TEST_ASSERT_EQUAL_INT(0, node_resets + communication_resets);
 }
 
-static void test_obeys_its_own_and_common_commands(void)
+static void test_executes_its_own_and_common_commands(void)
 {
     boot();
     TEST_ASSERT_TRUE(command(NMT_START, 0));
@@ -186,7 +186,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_boots_with_one_frame);
-    RUN_TEST(test_obeys_its_own_and_common_commands);
+    RUN_TEST(test_executes_its_own_and_common_commands);
     RUN_TEST(test_ignores_malformed_frames);
     RUN_TEST(test_resets_in_the_main_loop_and_boots_again);
     RUN_TEST(test_a_reset_is_not_overtaken);

@@ -272,7 +272,7 @@ static void test_the_rest_of_a_block_after_an_abort_is_no_request(void)
     TEST_ASSERT_EQUAL_HEX32(0x04030201, talk.small.values.word);
 }
 
-static void test_a_request_after_an_abort_is_heard(void)
+static void test_a_request_after_an_abort_is_answered(void)
 {
     initiate(100);
     sdo_talk_segment(&talk, 1, image, 7);
@@ -551,7 +551,7 @@ int main(void)
     RUN_TEST(test_sequence_numbers_out_of_range);
     RUN_TEST(test_domain_refuses_in_the_middle);
     RUN_TEST(test_the_rest_of_a_block_after_an_abort_is_no_request);
-    RUN_TEST(test_a_request_after_an_abort_is_heard);
+    RUN_TEST(test_a_request_after_an_abort_is_answered);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
     RUN_TEST(test_a_second_client_inside_a_block);
     RUN_TEST(test_a_second_client_that_hits_the_next_number);

@@ -159,7 +159,7 @@ def test_a_broken_line_far_into_a_large_file(tmp_path: Path) -> None:
         read_recording(file)
 
 
-def test_channels_are_told_apart(tmp_path: Path) -> None:
+def test_channels_are_distinguished(tmp_path: Path) -> None:
     file = tmp_path / "bus.log"
     file.write_text("(1.000000) vcan0 080#01\n(1.000001) vcan1 080#02\n(1.000002) vcan0 080#03\n")
     with pytest.raises(InputError, match=r"several channels \(vcan0, vcan1\)"):
@@ -196,7 +196,7 @@ HEADER = (
         ("\xff\xfe\x80", "line 1 is not as ASC has it"),
     ],
 )
-def test_a_broken_asc_is_told(tmp_path: Path, text: str, words: str) -> None:
+def test_a_broken_asc_is_reported(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "bus.asc"
     file.write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError) as caught:
@@ -204,7 +204,7 @@ def test_a_broken_asc_is_told(tmp_path: Path, text: str, words: str) -> None:
     assert str(caught.value).startswith(f"{file}: {words}")
 
 
-def test_a_broken_blf_is_told(tmp_path: Path) -> None:
+def test_a_broken_blf_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "bus.blf"
     write_recording(file, np.concatenate([frame(0x182, b"\x27\x06")] * 20))
     whole = file.read_bytes()

@@ -210,7 +210,7 @@ def test_an_answer_that_comes_too_late_is_not_taken_for_the_next(clock: SteppedC
     node.close()
 
 
-def test_connections_of_one_process_are_told_of_each_other() -> None:
+def test_connections_of_one_process_notice_each_other() -> None:
     mine, yours = Turns(BUS, 3), Turns(BUS, 3)
     had = []
     for turns in (mine, mine, yours, mine):

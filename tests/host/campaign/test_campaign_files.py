@@ -116,7 +116,7 @@ def test_bad_files(write: Write, text: str, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_bad_path_file_is_told_by_its_own_name(write: Write) -> None:
+def test_a_bad_path_file_is_named_in_the_message(write: Write) -> None:
     file = write(PATHS, path="[path]\n")
     with pytest.raises(InputError, match=r"path\.toml: "):
         load_campaign(file)

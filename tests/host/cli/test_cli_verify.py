@@ -67,7 +67,7 @@ def test_beyond_a_limit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "beyond its limits by more than 0.1 %: y_jerk_mm_s3" in captured.err
 
 
-def test_a_little_beyond_is_told_and_kept(
+def test_a_little_beyond_is_reported_and_kept(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     peak = document(capsys, 0, str(EXAMPLES / "alpha.toml"))["peak"]["y_jerk_mm_s3"]["value"]

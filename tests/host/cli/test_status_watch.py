@@ -36,7 +36,7 @@ class Meter:
 
 
 @pytest.mark.parametrize("down", [False, True])
-def test_what_is_heard_meanwhile_is_not_kept(
+def test_frames_received_meanwhile_are_not_kept(
     down: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     meter: Any = Meter(down)

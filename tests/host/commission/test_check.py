@@ -118,7 +118,7 @@ def test_process_data_is_needed(index: int) -> None:
     assert any(one.index == index and one.verdict == FAULT for one in check(objects))
 
 
-def test_an_object_that_is_there_but_not_told_is_there() -> None:
+def test_an_object_that_exists_but_is_not_listed_exists() -> None:
     """Some drives do not let 0x6040 be read."""
     findings = check(complete() | {(0x6040, 0): b""})
     assert at(findings, (0x6040, 0)) == [OK]

@@ -27,7 +27,7 @@ EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
         ),
     ],
 )
-def test_what_has_no_effect_is_told(
+def test_what_has_no_effect_is_reported(
     tmp_path: Path, profile: str, limits: str, reported: list[str]
 ) -> None:
     file = tmp_path / "path.toml"

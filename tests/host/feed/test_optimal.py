@@ -197,7 +197,7 @@ def test_each_period_has_pieces_that_the_controller_takes() -> None:
         assert check(compile_path(spline, plan, QUICK_STOPS, replan_optimal).program) is None
 
 
-def test_without_a_limit_of_jerk_one_is_taken_and_told() -> None:
+def test_without_a_limit_of_jerk_one_is_taken_and_reported() -> None:
     plan = plan_optimal(walk(8, 7), OPTIMAL, Limits(feed_mm_s=80.0))
     assert any("jerk" in note for note in plan.notes)
     assert keeps(plan)

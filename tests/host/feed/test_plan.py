@@ -67,7 +67,9 @@ def test_report_lists_what_exceeds_and_leaves_the_feed() -> None:
     st.floats(100.0, 20000.0),
     st.floats(5e3, 1e6),
 )
-def test_respect_obeys_and_wastes_little(profile, feed, time, acceleration, jerk) -> None:
+def test_respect_keeps_the_limits_and_wastes_little(
+    profile, feed, time, acceleration, jerk
+) -> None:
     limits = Limits(None, acceleration, jerk)
     plan = plan_feed(5000.0, FeedRequest(profile, feed, time), limits)
     assert plan.peak_acceleration_mm_s2 <= acceleration * (1.0 + 1e-9)

@@ -29,7 +29,7 @@ def texts(events: list[dict[str, Any]]) -> list[str]:
     return [event["text"] for event in events]
 
 
-def test_each_node_and_code_is_told_once_a_window() -> None:
+def test_each_node_and_code_is_reported_once_a_window() -> None:
     found = Emergencies().feed(frames((0, 0, 0), (0, 2, 0x8611), (0, 3, 0x3220), (0, 2, 0)))
     assert [event["text"].split(":")[0] for event in found] == ["node 2", "node 3", "node 2"]
     assert "(0x8611)" in found[0]["text"]

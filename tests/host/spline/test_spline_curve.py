@@ -168,7 +168,7 @@ def test_greatest_curvature_of_a_line_and_of_a_cusp():
 @given(
     seed=SEEDS, build=st.sampled_from([smooth_spline, uniform_spline]), limit=st.floats(0.5, 100)
 )
-def test_split_keeps_the_curve_and_obeys_its_limits(seed, build, limit):
+def test_split_keeps_the_curve_and_its_limits(seed, build, limit):
     spline = build(seed)
     pieces = spline.split(limit)
     sigma = square_modulus(pieces.w)

@@ -222,7 +222,7 @@ def test_ends(ends, count):
         assert np.abs(a[..., 0] - 2 * a[..., 1] + a[..., 2]).max() < 1e-12
 
 
-def test_end_tangents_are_obeyed():
+def test_end_tangents_are_kept():
     directions = [[0, 0, 2.0], [-1.0, 0, 0]]
     spline = spatial_through_points(helix(8), False, "cubic", *directions).spline
     tangents = spline.tangent([0, spline.length_mm])

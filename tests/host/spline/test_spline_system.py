@@ -55,7 +55,7 @@ def test_cyclic_solver_against_dense(count, seed):
     np.testing.assert_allclose(a @ x, rhs, atol=1e-8 * np.linalg.norm(a) * np.abs(x).max())
 
 
-def test_singular_matrices_are_told():
+def test_singular_matrices_are_reported():
     zero, one = np.zeros(4, complex), np.ones(4, complex)
     with pytest.raises(SingularSystem):
         solve_tridiagonal(zero, zero, zero, one)

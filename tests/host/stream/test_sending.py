@@ -289,7 +289,7 @@ def test_a_disk_that_is_full_keeps_the_old_journal(
     assert load(journal.file).section == 0
 
 
-def test_a_user_without_a_place_for_the_journal_is_told_what_to_name(
+def test_without_a_place_for_the_journal_the_message_says_what_to_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in a container with a user of its own: no home folder, or none that can be written."""
