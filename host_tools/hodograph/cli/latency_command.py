@@ -45,7 +45,7 @@ def _lines(found: Latency) -> Iterator[str]:
     yield f"{count} ticks of {found.period_us} us ({span}) on {found.bus}, {found.missed} missed"
     yield f"kernel {platform.release()}, {kind} PREEMPT_RT, {load.cpus} processors"
     yield (
-        f"load beside it: {load.busy_percent:.0f} % of the processors (this measurement included), "
+        f"processor load: {load.busy_percent:.0f} % of the processors (this measurement included), "
         f"load average {load.load_average_begin:.2f} to {load.load_average_end:.2f}"
     )
     yield (

@@ -78,7 +78,7 @@ def test_a_controller_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
 def test_text_for_people(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["latency", "--seconds", "0.2"]) == 0
     out = capsys.readouterr().out
-    assert "load beside it: " in out
+    assert "processor load: " in out
     assert "lateness: median " in out
 
 
