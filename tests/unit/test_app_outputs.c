@@ -332,6 +332,44 @@ static void test_module_that_restarts_stops_the_machine(void)
     TEST_ASSERT_EQUAL_HEX16(0, digital());
 }
 
+/* Its start command was lost, or it has left OPERATIONAL: its heartbeats come all the time. */
+static void test_module_that_is_not_operational_is_started_again(void)
+{
+    make_ready();
+    command(COMMAND_DISABLE);
+    bench.module.nmt.state = NMT_PRE_OPERATIONAL;
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1200);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.module.nmt.state);
+    app_bench_periods(&bench, 3000);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, bench.controller.machine.state);
+}
+
+static void test_module_that_is_not_operational_stops_the_machine(void)
+{
+    make_ready();
+    bench.module.nmt.state = NMT_STOPPED;
+    app_bench_periods(&bench, 900);
+    TEST_ASSERT_EQUAL_INT(MACHINE_READY, bench.controller.machine.state);
+    (void)app_bench_until(&bench, MACHINE_FAULT, 300);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, app_bench_read(&bench, 0x2003, 1));
+    TEST_ASSERT_EQUAL_INT(MODULE, app_bench_read(&bench, 0x2003, 2));
+    TEST_ASSERT_EQUAL_HEX32(NMT_STOPPED, app_bench_read(&bench, 0x2003, 3));
+}
+
+/* It was configured and started, and is lost before its first heartbeat. */
+static void test_module_that_is_lost_before_its_first_heartbeat(void)
+{
+    while (bench.controller.machine.state != MACHINE_OFF) {
+        app_bench_period(&bench);
+        if (bench.module.nmt.state == NMT_OPERATIONAL) {
+            bench.module_dead = true;
+        }
+    }
+    bench.controller.monitor.consumers[BENCH_DRIVES].presence = HEARTBEAT_UNKNOWN;
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1200);
+}
+
 static void test_module_that_is_missing_or_another_one(void)
 {
     bench.module_dead = true;
@@ -385,6 +423,9 @@ int main(void)
     RUN_TEST(test_delay_by_ticks);
     RUN_TEST(test_module_that_is_lost_stops_the_machine);
     RUN_TEST(test_module_that_restarts_stops_the_machine);
+    RUN_TEST(test_module_that_is_not_operational_is_started_again);
+    RUN_TEST(test_module_that_is_not_operational_stops_the_machine);
+    RUN_TEST(test_module_that_is_lost_before_its_first_heartbeat);
     RUN_TEST(test_module_that_is_missing_or_another_one);
     RUN_TEST(test_refused_values);
     RUN_TEST(test_module_without_its_controller_switches_off);

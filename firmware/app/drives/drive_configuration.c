@@ -211,6 +211,9 @@ static const struct drive_row drive_rows[] = {
     {WHEN_NO_TORQUE, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO1},
     {WHEN_VELOCITY, ROW_PDO_OFFSET, 0, 0, 0, FROM_ROW, RPDO2_VELOCITY},
     {WHEN_NO_VELOCITY, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
+    /* offsets that it received last, in motion, would act from the next enabling on */
+    {WHEN_NO_TORQUE, ROW_TRY, 0x60B2, 0, 2, FROM_ROW, 0},
+    {WHEN_NO_VELOCITY, ROW_TRY, 0x60B1, 0, 4, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO4_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO1},
