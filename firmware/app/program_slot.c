@@ -186,9 +186,14 @@ static int prepare(struct program_slot *slot, const struct config *config)
     return found ? 0 : move(slot, config);
 }
 
+bool program_slot_is_checked(const struct program_slot *slot, const struct config *config)
+{
+    return !slot->present || (slot->checked && slot->config_crc32 == config->crc32);
+}
+
 void program_slot_refresh(struct program_slot *slot, const struct config *config)
 {
-    if (!slot->present || (slot->checked && slot->config_crc32 == config->crc32)) {
+    if (program_slot_is_checked(slot, config)) {
         return;
     }
     struct program_fault fault = {.code = 0, .index = 0};

@@ -69,6 +69,10 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
 
+/* Whether the program has been checked under this configuration since power-on: program_slot_refresh then costs nothing.
+ * Without a program: true. Pure. */
+bool program_slot_is_checked(const struct program_slot *slot, const struct config *config);
+
 /* Brings start, end, `acceptable` and the coefficient records up to date. Costs a whole check if the configuration has
  * changed, and a copy of the program to the other bank if the kernel has changed. */
 void program_slot_refresh(struct program_slot *slot, const struct config *config);
