@@ -370,6 +370,41 @@ static void test_module_that_is_lost_before_its_first_heartbeat(void)
     (void)app_bench_until(&bench, MACHINE_BOOT, 1200);
 }
 
+/* Kept at the fault; but in boot they are off, also while a drive is missing. */
+static void test_boot_that_waits_for_a_drive_switches_off(void)
+{
+    configure(4, KEPT_AT_FAULT, 1);
+    make_ready();
+    start();
+    app_bench_periods(&bench, 100);
+    bench.drives[1].dead = true;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 100);
+    app_bench_periods(&bench, 2500);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital() & LAMP);
+    command(COMMAND_RESET);
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1000);
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+}
+
+/* The power of the controller was off for less than the module waits for its heartbeat; a drive has lost it too. */
+static void test_controller_that_restarts_switches_off(void)
+{
+    make_ready();
+    start();
+    app_bench_periods(&bench, 100);
+    bench.drives[0].dead = true;
+    app_bench_power_cycle(&bench);
+    configure(1, MODULE, 1);
+    configure(2, 16, 1);
+    configure(3, 3, 1);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital() & LAMP);
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+    TEST_ASSERT_EQUAL_INT16(0, analogue(1));
+}
+
 static void test_module_that_is_missing_or_another_one(void)
 {
     bench.module_dead = true;
@@ -398,10 +433,14 @@ static void test_refused_values(void)
 
 static void test_module_without_its_controller_switches_off(void)
 {
+    for (unsigned i = 0; i < 3u; ++i) { /* it would keep them */
+        bench.module.values.analogue_output_error_mode[i] = 0;
+    }
     make_ready();
     start();
     app_bench_periods(&bench, 250);
     TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    TEST_ASSERT_EQUAL_INT16(-1234, analogue(2));
     for (uint32_t i = 0; i < 200u; ++i) {
         io_module_process(&bench.module, 11000);
     }
@@ -426,6 +465,8 @@ int main(void)
     RUN_TEST(test_module_that_is_not_operational_is_started_again);
     RUN_TEST(test_module_that_is_not_operational_stops_the_machine);
     RUN_TEST(test_module_that_is_lost_before_its_first_heartbeat);
+    RUN_TEST(test_boot_that_waits_for_a_drive_switches_off);
+    RUN_TEST(test_controller_that_restarts_switches_off);
     RUN_TEST(test_module_that_is_missing_or_another_one);
     RUN_TEST(test_refused_values);
     RUN_TEST(test_module_without_its_controller_switches_off);
