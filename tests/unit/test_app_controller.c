@@ -666,16 +666,19 @@ static void test_a_reset_gives_objects_their_defaults(void)
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     values->producer_heartbeat_time = 77;
     values->configuration.start_tolerance_counts = tolerance + 1u;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2060, 16, 0, 1));
     nmt_master_command(NMT_RESET_COMMUNICATION, 1, &reset);
     fake_port_receive(&reset);
     app_bench_period(&bench);
     TEST_ASSERT_EQUAL_UINT16(od_controller_defaults.producer_heartbeat_time,
                              values->producer_heartbeat_time);
     TEST_ASSERT_EQUAL_UINT32(tolerance + 1u, bench.controller.config.start_tolerance_counts);
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2060, 16));
     nmt_master_command(NMT_RESET_NODE, 1, &reset);
     fake_port_receive(&reset);
     app_bench_period(&bench);
     TEST_ASSERT_EQUAL_UINT32(tolerance, bench.controller.config.start_tolerance_counts);
+    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2060, 16));
     TEST_ASSERT_EQUAL_HEX32(0x81, values->cob_id_emcy);
 }
 
