@@ -254,6 +254,16 @@ static void test_looking_costs_little(void)
     TEST_ASSERT_UINT32_WITHIN(2, 4, drive(0)->reads - before);
 }
 
+static void test_inputs_are_read_as_often(void)
+{
+    drive(0)->lacks[0] = 0x1802;
+    drive(1)->lacks[0] = 0x1802;
+    boot();
+    const uint32_t before = drive(0)->reads;
+    app_bench_periods(&bench, 2000);
+    TEST_ASSERT_UINT32_WITHIN(2, 16, drive(0)->reads - before);
+}
+
 static void test_objects_that_a_drive_may_lack(void)
 {
     static const uint16_t optional[] = {0x1006, 0x1016, 0x1019, 0x1029,
@@ -375,6 +385,7 @@ int main(void)
     RUN_TEST(test_inputs_without_their_pdo);
     RUN_TEST(test_inputs_by_their_pdo);
     RUN_TEST(test_looking_costs_little);
+    RUN_TEST(test_inputs_are_read_as_often);
     RUN_TEST(test_objects_that_a_drive_may_lack);
     RUN_TEST(test_objects_that_it_must_have);
     RUN_TEST(test_a_window_that_is_wanted_must_be_there);

@@ -418,6 +418,8 @@ static void test_module_that_is_missing_or_another_one(void)
     TEST_ASSERT_EQUAL_HEX32(0x101802, app_bench_read(&bench, 0x2025, 2));
     configure(7, 3, 4);
     (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+    TEST_ASSERT_EQUAL_INT64(2, app_bench_read(&bench, 0x2028, 2));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2028, 3)); /* there is no third drive */
 }
 
 static void test_refused_values(void)
