@@ -30,8 +30,8 @@ enum program_slot_state {
 };
 
 struct program_slot {
-    /* Called with `self` at each step of the check of a program, so that the main loop can send heartbeats. May be
-     * NULL. */
+    /* Called with `self` at each step of the check of a program, and while one is copied or its records are written, so
+     * that the main loop can send heartbeats. May be NULL. */
     void (*attend)(void *self);
     void *self;
     struct program program;       /* active, when present */
