@@ -456,19 +456,19 @@ static void test_a_busy_main_loop_ends_no_transfer(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
 }
 
-/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of
- * it. */
+/* A watchdog lives on it: at the segment, the piece, each of its stops, at both records, and, with limits of an axis, at
+ * each part of it. */
 static void test_a_check_reports_its_progress_to_the_port(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     const unsigned before = fake_port_progress();
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
-    TEST_ASSERT_EQUAL_UINT(before + 4u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u, fake_port_progress());
     app_bench_periods(&bench, 100);
-    TEST_ASSERT_EQUAL_UINT(before + 4u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u, fake_port_progress());
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2030, 1, 20000, 4));
     (void)app_bench_read(&bench, 0x2000, 12); /* checks it anew */
-    TEST_ASSERT_EQUAL_UINT(before + 4u + 5u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u + 5u, fake_port_progress());
 }
 
 static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(void)
