@@ -166,11 +166,26 @@ static void recover_bank(struct program_slot *slot, unsigned bank)
     }
 }
 
+/* The next upload is to be the newest for each firmware, also for one that takes a program which this one refuses. */
+static void note_newest(struct program_slot *slot)
+{
+    bool known = slot->present;
+    for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
+        struct bank_record record;
+        const struct bank_record newest = {.sequence = slot->sequence, .size = 0, .tag = 0};
+        if (bank_record_read(bank, &record) && (!known || bank_record_newer(&record, &newest))) {
+            slot->sequence = record.sequence;
+            known = true;
+        }
+    }
+}
+
 void program_slot_recover(struct program_slot *slot)
 {
     for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
         recover_bank(slot, bank);
     }
+    note_newest(slot);
     slot->checked = false;
 }
 

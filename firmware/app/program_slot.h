@@ -40,7 +40,7 @@ struct program_slot {
         [AXES_MAX]; /* first and last setpoint with the present configuration, by axis of the machine */
     int32_t end_counts[AXES_MAX];
     unsigned bank;         /* of the active program */
-    uint32_t sequence;     /* of its record */
+    uint32_t sequence;     /* of the newest record */
     uint32_t config_crc32; /* of the configuration it was last checked against */
     bool present;
     bool receiving;

@@ -271,6 +271,32 @@ static void test_after_power_on_the_newest_program_is_there(void)
     TEST_ASSERT_EQUAL_INT(0, upload());
 }
 
+/* A firmware with stricter rules refuses the newer program of two, or both; then the first one is back. */
+static void test_an_upload_is_the_newest_for_each_firmware(void)
+{
+    for (unsigned refused = 1; refused <= 2u; ++refused) {
+        setUp();
+        for (int32_t x = 0; x < 4; ++x) {
+            app_image_make(image, x, 20);
+            TEST_ASSERT_EQUAL_INT(0, upload());
+        }
+        const unsigned banks[2] = {slot.bank, 1u - slot.bank};
+        for (unsigned i = 0; i < refused; ++i) {
+            fake_port_spoil_store(banks[i], 48);
+        }
+        power_on();
+        app_image_make(image, 9, 20);
+        TEST_ASSERT_EQUAL_INT(0, upload());
+        for (unsigned i = 0; i < refused; ++i) {
+            if (banks[i] != slot.bank) {
+                fake_port_spoil_store(banks[i], 48);
+            }
+        }
+        power_on();
+        expect_active(image);
+    }
+}
+
 static void test_a_program_without_its_record_is_refused(void)
 {
     TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
@@ -298,6 +324,7 @@ int main(void)
     RUN_TEST(test_the_records_are_those_of_the_kernel);
     RUN_TEST(test_no_room_for_the_records);
     RUN_TEST(test_after_power_on_the_newest_program_is_there);
+    RUN_TEST(test_an_upload_is_the_newest_for_each_firmware);
     RUN_TEST(test_a_program_without_its_record_is_refused);
     return UNITY_END();
 }
