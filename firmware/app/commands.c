@@ -41,6 +41,19 @@ static enum machine_refusal prepare_any(struct controller *controller, int64_t f
                                                                          : MACHINE_OUTSIDE_LIMITS;
 }
 
+/* While axes move nothing is started, and the main loop has no time for the check of a program. */
+static enum machine_refusal moving_refusal(const struct machine *machine)
+{
+    port_lock();
+    const bool moving = machine_moving(machine);
+    const bool fault = machine->state == MACHINE_FAULT;
+    port_unlock();
+    if (!moving) {
+        return MACHINE_ACCEPTED;
+    }
+    return fault ? MACHINE_FAULT_PRESENT : MACHINE_MOVING;
+}
+
 /* What keeps the program from being started. Costs a check of it where it was not checked under this configuration:
  * apart from the start, so that the stack never holds the check and a prepared motion. */
 static enum machine_refusal program_refusal(struct controller *controller)
@@ -51,6 +64,12 @@ static enum machine_refusal program_refusal(struct controller *controller)
     }
     if (first_axis_end(&slot->program.header) > controller->config.axis_count) {
         return MACHINE_AXES_MISSING;
+    }
+    const enum machine_refusal refusal = program_slot_is_checked(slot, &controller->config)
+                                             ? MACHINE_ACCEPTED
+                                             : moving_refusal(&controller->machine);
+    if (refusal != MACHINE_ACCEPTED) {
+        return refusal;
     }
     program_slot_refresh(slot, &controller->config);
     return slot->acceptable ? MACHINE_ACCEPTED : MACHINE_OUTSIDE_LIMITS;

@@ -62,6 +62,7 @@ static void reset_node(void *self)
 {
     struct controller *controller = self;
     reset_values(controller);
+    controller->stream.optional_stop = controller->values.stream.optional_stop != 0u;
     take_configuration(controller);
 }
 

@@ -74,7 +74,9 @@ uint64_t object_read_drive_state(struct controller *controller, const struct od_
 
 uint64_t object_read_identity(struct controller *controller, const struct od_entry *entry)
 {
-    return controller->boot.properties[entry->sub - 1u].value[entry->index - 0x2027u];
+    const bool is_axis = entry->sub <= controller->config.axis_count; /* then: the I/O module */
+    return is_axis ? controller->boot.properties[entry->sub - 1u].value[entry->index - 0x2027u]
+                   : 0u;
 }
 
 /* ---- PDO parameters: 0x1400, 0x1800, 0x1A00 + i of axis i; 0x1806, 0x1A06 + i ---- */

@@ -150,9 +150,13 @@ static uint64_t stop_number(const struct program *p, uint8_t sub)
     return number == 2u ? piece : start_um(p, piece);
 }
 
+/* While axes move the main loop has no time for a check: a job in chunks needs it, and homing, and stop commands. */
 static uint64_t place_number(struct controller *controller, uint8_t sub)
 {
     struct program_slot *slot = &controller->slot;
+    if (!program_slot_is_checked(slot, &controller->config) && moving(controller)) {
+        return 0;
+    }
     program_slot_refresh(slot, &controller->config);
     const uint32_t first = first_axis(&slot->program.header);
     if (sub >= START_REST) {

@@ -8,7 +8,8 @@
 #include "app/controller_state.h"
 
 /* The reader of the sub-indices from 2 on: two's complement in 64 bits; 0 if the value needs a program and there is
- * none. Checks the program anew if the configuration has changed (program_slot_refresh). Not under the lock. */
+ * none. Checks the program anew if the configuration has changed (program_slot_refresh), but not while axes move: start
+ * and end are then 0. Not under the lock. */
 uint64_t object_read_program(struct controller *controller, const struct od_entry *entry);
 
 /* Refused with SDO_ABORT_STATE while a program runs, SDO_ABORT_MEMORY when it cannot fit. */

@@ -13,6 +13,8 @@
 #include "core/program_check.h"
 #include "port/port.h"
 
+#define COPY_BYTES 256u
+
 void program_slot_init(struct program_slot *slot)
 {
     memset(slot, 0, sizeof *slot);
@@ -94,13 +96,18 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
     slot->present = true;
 }
 
+static struct program_table_user user_of(const struct program_slot *slot)
+{
+    return (struct program_table_user){.attend = slot->attend, .self = slot->self};
+}
+
 /* Makes the image in a bank the active program: coefficient records for the kernel, then the commit record. */
 static int seal(struct program_slot *slot, struct program *program, unsigned bank,
                 const struct config *config)
 {
     const struct bank_record record = {
         .sequence = slot->sequence + 1u, .size = program->header.image_size, .tag = config->crc32};
-    const int result = program_table_write(bank, program, config->kernel);
+    const int result = program_table_write(bank, program, config->kernel, user_of(slot));
     if (result != 0) {
         return result;
     }
@@ -160,12 +167,43 @@ static void recover_bank(struct program_slot *slot, unsigned bank)
     }
 }
 
+/* The next upload is to be the newest for each firmware, also for one that takes a program which this one refuses. */
+static void note_newest(struct program_slot *slot)
+{
+    bool known = slot->present;
+    for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
+        struct bank_record record;
+        const struct bank_record newest = {.sequence = slot->sequence, .size = 0, .tag = 0};
+        if (bank_record_read(bank, &record) && (!known || bank_record_newer(&record, &newest))) {
+            slot->sequence = record.sequence;
+            known = true;
+        }
+    }
+}
+
 void program_slot_recover(struct program_slot *slot)
 {
     for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
         recover_bank(slot, bank);
     }
+    note_newest(slot);
     slot->checked = false;
+}
+
+/* A board erases and writes a block of it in less than 100 ms. */
+static int copy_image(const struct program_slot *slot, unsigned bank)
+{
+    const uint32_t size = slot->program.header.image_size;
+    int result = 0;
+    for (uint32_t at = 0; at < size && result == 0; at += COPY_BYTES) {
+        const uint32_t left = size - at;
+        result = port_store_write(bank, at, slot->program.image + at,
+                                  left < COPY_BYTES ? left : COPY_BYTES);
+        if (slot->attend != NULL) {
+            slot->attend(slot->self);
+        }
+    }
+    return result;
 }
 
 /* Copies the program to the spare bank, with records for another kernel; the bank it was in stays as it is. */
@@ -173,8 +211,7 @@ static int move(struct program_slot *slot, const struct config *config)
 {
     const unsigned bank = spare_bank(slot);
     struct program moved = slot->program;
-    if (slot->receiving || port_store_erase(bank) != 0 ||
-        port_store_write(bank, 0, moved.image, moved.header.image_size) != 0) {
+    if (slot->receiving || port_store_erase(bank) != 0 || copy_image(slot, bank) != 0) {
         return PROGRAM_ERR_STORE;
     }
     moved.image = port_store_data(bank);
@@ -183,13 +220,19 @@ static int move(struct program_slot *slot, const struct config *config)
 
 static int prepare(struct program_slot *slot, const struct config *config)
 {
-    const bool found = program_table_find(slot->bank, &slot->program, config->kernel);
+    const bool found =
+        program_table_find(slot->bank, &slot->program, config->kernel, user_of(slot));
     return found ? 0 : move(slot, config);
+}
+
+bool program_slot_is_checked(const struct program_slot *slot, const struct config *config)
+{
+    return !slot->present || (slot->checked && slot->config_crc32 == config->crc32);
 }
 
 void program_slot_refresh(struct program_slot *slot, const struct config *config)
 {
-    if (!slot->present || (slot->checked && slot->config_crc32 == config->crc32)) {
+    if (program_slot_is_checked(slot, config)) {
         return;
     }
     struct program_fault fault = {.code = 0, .index = 0};

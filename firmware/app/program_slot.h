@@ -30,8 +30,8 @@ enum program_slot_state {
 };
 
 struct program_slot {
-    /* Called with `self` at each step of the check of a program, so that the main loop can send heartbeats. May be
-     * NULL. */
+    /* Called with `self` at each step of the check of a program, and while one is copied or its records are written, so
+     * that the main loop can send heartbeats. May be NULL. */
     void (*attend)(void *self);
     void *self;
     struct program program;       /* active, when present */
@@ -40,7 +40,7 @@ struct program_slot {
         [AXES_MAX]; /* first and last setpoint with the present configuration, by axis of the machine */
     int32_t end_counts[AXES_MAX];
     unsigned bank;         /* of the active program */
-    uint32_t sequence;     /* of its record */
+    uint32_t sequence;     /* of the newest record */
     uint32_t config_crc32; /* of the configuration it was last checked against */
     bool present;
     bool receiving;
@@ -68,6 +68,10 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
                        uint32_t size);
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
+
+/* Whether the program has been checked under this configuration since power-on: program_slot_refresh then costs nothing.
+ * Without a program: true. Pure. */
+bool program_slot_is_checked(const struct program_slot *slot, const struct config *config);
 
 /* Brings start, end, `acceptable` and the coefficient records up to date. Costs a whole check if the configuration has
  * changed, and a copy of the program to the other bank if the kernel has changed. */

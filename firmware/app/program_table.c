@@ -3,6 +3,7 @@
  * after its image, for the kernel that the tick uses. Used by app/program_slot. Main loop. */
 #include "app/program_table.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "app/bank_record.h"
@@ -13,13 +14,22 @@
 struct place {
     unsigned bank;
     uint32_t offset;
+    struct program_table_user user;
 };
+
+static void attend(const struct place *place)
+{
+    if (place->user.attend != NULL) {
+        place->user.attend(place->user.self);
+    }
+}
 
 static int put_records(void *context, const uint8_t *bytes, uint32_t size)
 {
     struct place *place = context;
     const int result = port_store_write(place->bank, place->offset, bytes, size);
     place->offset += size;
+    attend(place);
     return result;
 }
 
@@ -28,13 +38,15 @@ static int compare_records(void *context, const uint8_t *bytes, uint32_t size)
     struct place *place = context;
     const int result = memcmp(port_store_data(place->bank) + place->offset, bytes, size);
     place->offset += size;
+    attend(place);
     return result == 0 ? 0 : PORT_ERR_STORE;
 }
 
 /* Sizes of header, segments and pieces are multiples of 8, and so is the image's. */
-static struct place after_image(unsigned bank, const struct program *program)
+static struct place after_image(unsigned bank, const struct program *program,
+                                struct program_table_user user)
 {
-    return (struct place){.bank = bank, .offset = program->header.image_size};
+    return (struct place){.bank = bank, .offset = program->header.image_size, .user = user};
 }
 
 static bool fits(unsigned bank, const struct program *program, const struct kernel *made_for)
@@ -48,10 +60,11 @@ static void attach(unsigned bank, struct program *program, const struct kernel *
     coefficients_attach(program, made_for, port_store_data(bank) + program->header.image_size);
 }
 
-int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
+int program_table_write(unsigned bank, struct program *program, uint32_t kernel,
+                        struct program_table_user user)
 {
     const struct kernel *made_for = kernel_find(kernel);
-    struct place place = after_image(bank, program);
+    struct place place = after_image(bank, program, user);
     if (made_for == NULL) {
         return PROGRAM_ERR_KERNEL;
     }
@@ -65,10 +78,11 @@ int program_table_write(unsigned bank, struct program *program, uint32_t kernel)
     return 0;
 }
 
-bool program_table_find(unsigned bank, struct program *program, uint32_t kernel)
+bool program_table_find(unsigned bank, struct program *program, uint32_t kernel,
+                        struct program_table_user user)
 {
     const struct kernel *made_for = kernel_find(kernel);
-    struct place place = after_image(bank, program);
+    struct place place = after_image(bank, program, user);
     if (made_for == NULL) {
         return false;
     }

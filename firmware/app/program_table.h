@@ -12,13 +12,21 @@
 
 #include "core/program.h"
 
+/* Called at each record: a board writes for seconds, and the drives wait for heartbeats. `attend` may be NULL. */
+struct program_table_user {
+    void (*attend)(void *self);
+    void *self;
+};
+
 /* Writes the records and gives them to the program. 0, PROGRAM_ERR_ROOM when image and records do not fit the bank,
  * PROGRAM_ERR_STORE, or PROGRAM_ERR_KERNEL when this image has no such kernel. The bank must be erased after the
  * image. */
-int program_table_write(unsigned bank, struct program *program, uint32_t kernel);
+int program_table_write(unsigned bank, struct program *program, uint32_t kernel,
+                        struct program_table_user user);
 
 /* Gives the stored records to the program, if it does not have them yet and every byte of them is right. True if it has
  * them now. */
-bool program_table_find(unsigned bank, struct program *program, uint32_t kernel);
+bool program_table_find(unsigned bank, struct program *program, uint32_t kernel,
+                        struct program_table_user user);
 
 #endif

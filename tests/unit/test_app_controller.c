@@ -456,19 +456,19 @@ static void test_a_busy_main_loop_ends_no_transfer(void)
     TEST_ASSERT_EQUAL_INT(SDO_CLIENT_DONE, bench.host.status);
 }
 
-/* A watchdog lives on it: at the segment, the piece, each of its stops, and, with limits of an axis, at each part of
- * it. */
+/* A watchdog lives on it: at the segment, the piece, each of its stops, at both records, and, with limits of an axis, at
+ * each part of it. */
 static void test_a_check_reports_its_progress_to_the_port(void)
 {
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     const unsigned before = fake_port_progress();
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
-    TEST_ASSERT_EQUAL_UINT(before + 4u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u, fake_port_progress());
     app_bench_periods(&bench, 100);
-    TEST_ASSERT_EQUAL_UINT(before + 4u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u, fake_port_progress());
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2030, 1, 20000, 4));
     (void)app_bench_read(&bench, 0x2000, 12); /* checks it anew */
-    TEST_ASSERT_EQUAL_UINT(before + 4u + 5u, fake_port_progress());
+    TEST_ASSERT_EQUAL_UINT(before + 6u + 5u, fake_port_progress());
 }
 
 static void test_simulated_drives_are_awaited_and_hurried_while_something_moves(void)
@@ -666,16 +666,19 @@ static void test_a_reset_gives_objects_their_defaults(void)
     (void)app_bench_until(&bench, MACHINE_OFF, 1000);
     values->producer_heartbeat_time = 77;
     values->configuration.start_tolerance_counts = tolerance + 1u;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2060, 16, 0, 1));
     nmt_master_command(NMT_RESET_COMMUNICATION, 1, &reset);
     fake_port_receive(&reset);
     app_bench_period(&bench);
     TEST_ASSERT_EQUAL_UINT16(od_controller_defaults.producer_heartbeat_time,
                              values->producer_heartbeat_time);
     TEST_ASSERT_EQUAL_UINT32(tolerance + 1u, bench.controller.config.start_tolerance_counts);
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2060, 16));
     nmt_master_command(NMT_RESET_NODE, 1, &reset);
     fake_port_receive(&reset);
     app_bench_period(&bench);
     TEST_ASSERT_EQUAL_UINT32(tolerance, bench.controller.config.start_tolerance_counts);
+    TEST_ASSERT_EQUAL_INT64(1, app_bench_read(&bench, 0x2060, 16));
     TEST_ASSERT_EQUAL_HEX32(0x81, values->cob_id_emcy);
 }
 

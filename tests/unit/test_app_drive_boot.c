@@ -183,6 +183,18 @@ static void test_an_offset_that_cannot_be_mapped_is_left_out(void)
     TEST_ASSERT_EQUAL_UINT32(0, drive(1)->velocities);
 }
 
+/* The controller was switched off in motion: the drive still has the offsets of that instant. */
+static void test_offsets_that_are_not_sent_are_cleared(void)
+{
+    drive(0)->values.velocity_offset = 100000;
+    drive(0)->values.torque_offset = -300;
+    drive(1)->lacks[0] = 0x60B1;
+    drive(1)->lacks[1] = 0x60B2;
+    boot();
+    TEST_ASSERT_EQUAL_INT32(0, drive(0)->values.velocity_offset);
+    TEST_ASSERT_EQUAL_INT16(0, drive(0)->values.torque_offset);
+}
+
 static void test_a_fixed_mapping_passes_if_it_is_the_right_one(void)
 {
     drive(0)->fixed_mapping = true;
@@ -240,6 +252,16 @@ static void test_looking_costs_little(void)
     const uint32_t before = drive(0)->reads;
     app_bench_periods(&bench, 1000);
     TEST_ASSERT_UINT32_WITHIN(2, 4, drive(0)->reads - before);
+}
+
+static void test_inputs_are_read_as_often(void)
+{
+    drive(0)->lacks[0] = 0x1802;
+    drive(1)->lacks[0] = 0x1802;
+    boot();
+    const uint32_t before = drive(0)->reads;
+    app_bench_periods(&bench, 2000);
+    TEST_ASSERT_UINT32_WITHIN(2, 16, drive(0)->reads - before);
 }
 
 static void test_objects_that_a_drive_may_lack(void)
@@ -358,10 +380,12 @@ int main(void)
     RUN_TEST(test_settings_of_an_axis_reach_its_drive_only);
     RUN_TEST(test_feedforward_changes_the_mapping);
     RUN_TEST(test_an_offset_that_cannot_be_mapped_is_left_out);
+    RUN_TEST(test_offsets_that_are_not_sent_are_cleared);
     RUN_TEST(test_a_fixed_mapping_passes_if_it_is_the_right_one);
     RUN_TEST(test_inputs_without_their_pdo);
     RUN_TEST(test_inputs_by_their_pdo);
     RUN_TEST(test_looking_costs_little);
+    RUN_TEST(test_inputs_are_read_as_often);
     RUN_TEST(test_objects_that_a_drive_may_lack);
     RUN_TEST(test_objects_that_it_must_have);
     RUN_TEST(test_a_window_that_is_wanted_must_be_there);

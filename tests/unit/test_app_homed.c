@@ -212,6 +212,33 @@ static void test_a_drive_that_restarts_loses_it(void)
     TEST_ASSERT_FALSE(homed(1));
 }
 
+/* Its boot-up message is received between the round of the main loop that takes frames and the end of its homing. */
+static void test_a_drive_that_restarts_as_its_homing_ends_loses_it(void)
+{
+    struct can_msg frame;
+    struct can_msg out;
+    bench.drives[0].homing_syncs = 5;
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_HOME));
+    while (!(bench.controller.homing.phase == HOMING_MOVE &&
+             (machine()->axes[0].statusword & CIA402_STATUS_HOMING_ATTAINED) != 0u)) {
+        app_bench_period_without_main_loop(&bench);
+        if (bench.controller.homing.phase != HOMING_MOVE || bench.drives[0].homing_left > 0u) {
+            app_bench_settle(&bench);
+        }
+    }
+    for (uint32_t k = 0; k < HOMING_SYNCS_BEFORE_ANSWER; ++k) {
+        app_bench_period_without_main_loop(&bench);
+    }
+    cob_frame(&frame, COB_HEARTBEAT + X_NODE, 1);
+    frame.data[0] = (uint8_t)NMT_INITIALISING;
+    fake_port_receive(&frame);
+    TEST_ASSERT_FALSE(machine()->axes[0].homed);
+    (void)homing_process(&bench.controller.homing, machine(), 0, &out);
+    TEST_ASSERT_EQUAL_INT(HOMING_DISABLE, bench.controller.homing.phase);
+    app_bench_period(&bench);
+    TEST_ASSERT_FALSE(homed(1));
+}
+
 /* In every state of the boot that a fault reset leads to. */
 static void test_a_drive_that_restarts_while_it_is_configured_loses_it(void)
 {
@@ -393,6 +420,7 @@ int main(void)
     RUN_TEST(test_an_interrupted_homing_affects_only_the_axis_under_way);
     RUN_TEST(test_a_homing_that_is_broken_off_loses_the_elder_zero);
     RUN_TEST(test_a_drive_that_restarts_loses_it);
+    RUN_TEST(test_a_drive_that_restarts_as_its_homing_ends_loses_it);
     RUN_TEST(test_a_drive_that_restarts_while_it_is_configured_loses_it);
     RUN_TEST(test_a_drive_that_was_away_loses_it);
     RUN_TEST(test_a_drive_that_was_away_in_boot_loses_it);

@@ -6,6 +6,7 @@
 #include "canopen/sdo_abort.h"
 
 #include "app_bench.h"
+#include "app_image.h"
 #include "fake_port.h"
 #include "unity.h"
 
@@ -49,6 +50,12 @@ static void expect_refusal(enum machine_refusal refusal)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_HOME));
     TEST_ASSERT_EQUAL_INT64(refusal, app_bench_read(&bench, 0x2003, 4));
     TEST_ASSERT_EQUAL_INT(before, machine()->state);
+}
+
+static void expect_start_refusal(enum machine_refusal refusal)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_START));
+    TEST_ASSERT_EQUAL_INT64(refusal, app_bench_read(&bench, 0x2003, 4));
 }
 
 static void test_axes_one_after_the_other_from_off_to_off(void)
@@ -269,6 +276,50 @@ static void test_an_old_success_is_not_taken_for_a_new_one(void)
     TEST_ASSERT_EQUAL_INT32(1000, bench.drives[0].position_counts);
 }
 
+static void raise_a_fault(void *context)
+{
+    (void)context;
+    port_lock();
+    machine_raise(machine(), EMCY_SOFTWARE, 0, 0);
+    port_unlock();
+}
+
+/* The tick raises a fault between two critical sections of the main loop: the goals of the fault stay. */
+static void test_a_fault_of_a_tick_is_not_undone(void)
+{
+    struct can_msg out;
+    want(1, 17, 0);
+    boot();
+    home();
+    for (unsigned k = 0; bench.controller.homing.phase != HOMING_ENABLE; ++k) {
+        TEST_ASSERT_TRUE(k < 100u);
+        app_bench_period(&bench);
+    }
+    fake_port_on_unlock(raise_a_fault, NULL);
+    (void)homing_process(&bench.controller.homing, machine(), 0, &out);
+    TEST_ASSERT_EQUAL_INT(MACHINE_FAULT, machine()->state);
+    TEST_ASSERT_EQUAL_INT(CIA402_GOAL_QUICK_STOP, machine()->axes[0].goal);
+}
+
+/* A program that was checked under another configuration; its check would keep the main loop from stop commands. */
+static void test_no_program_is_checked_meanwhile(void)
+{
+    static uint8_t image[APP_IMAGE_SIZE];
+    app_image_make(image, 10, -5);
+    want(1, 17, 10000000);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2004, 12, 249, 2));
+    boot();
+    home();
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2000, 12));
+    expect_start_refusal(MACHINE_MOVING);
+    TEST_ASSERT_FALSE(program_slot_is_checked(&bench.controller.slot, &bench.controller.config));
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT64(10000000, app_bench_read(&bench, 0x2000, 12));
+    TEST_ASSERT_TRUE(program_slot_is_checked(&bench.controller.slot, &bench.controller.config));
+    expect_start_refusal(MACHINE_DRIVES_OFF);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -285,5 +336,7 @@ int main(void)
     RUN_TEST(test_stop_and_quick_stop_break_it_off);
     RUN_TEST(test_time_for_the_whole_travel);
     RUN_TEST(test_an_old_success_is_not_taken_for_a_new_one);
+    RUN_TEST(test_a_fault_of_a_tick_is_not_undone);
+    RUN_TEST(test_no_program_is_checked_meanwhile);
     return UNITY_END();
 }

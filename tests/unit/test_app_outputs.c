@@ -332,6 +332,79 @@ static void test_module_that_restarts_stops_the_machine(void)
     TEST_ASSERT_EQUAL_HEX16(0, digital());
 }
 
+/* Its start command was lost, or it has left OPERATIONAL: its heartbeats come all the time. */
+static void test_module_that_is_not_operational_is_started_again(void)
+{
+    make_ready();
+    command(COMMAND_DISABLE);
+    bench.module.nmt.state = NMT_PRE_OPERATIONAL;
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1200);
+    (void)app_bench_until(&bench, MACHINE_OFF, 1000);
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.module.nmt.state);
+    app_bench_periods(&bench, 3000);
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, bench.controller.machine.state);
+}
+
+static void test_module_that_is_not_operational_stops_the_machine(void)
+{
+    make_ready();
+    bench.module.nmt.state = NMT_STOPPED;
+    app_bench_periods(&bench, 900);
+    TEST_ASSERT_EQUAL_INT(MACHINE_READY, bench.controller.machine.state);
+    (void)app_bench_until(&bench, MACHINE_FAULT, 300);
+    TEST_ASSERT_EQUAL_HEX16(EMCY_HEARTBEAT, app_bench_read(&bench, 0x2003, 1));
+    TEST_ASSERT_EQUAL_INT(MODULE, app_bench_read(&bench, 0x2003, 2));
+    TEST_ASSERT_EQUAL_HEX32(NMT_STOPPED, app_bench_read(&bench, 0x2003, 3));
+}
+
+/* It was configured and started, and is lost before its first heartbeat. */
+static void test_module_that_is_lost_before_its_first_heartbeat(void)
+{
+    while (bench.controller.machine.state != MACHINE_OFF) {
+        app_bench_period(&bench);
+        if (bench.module.nmt.state == NMT_OPERATIONAL) {
+            bench.module_dead = true;
+        }
+    }
+    bench.controller.monitor.consumers[BENCH_DRIVES].presence = HEARTBEAT_UNKNOWN;
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1200);
+}
+
+/* Kept at the fault; but in boot they are off, also while a drive is missing. */
+static void test_boot_that_waits_for_a_drive_switches_off(void)
+{
+    configure(4, KEPT_AT_FAULT, 1);
+    make_ready();
+    start();
+    app_bench_periods(&bench, 100);
+    bench.drives[1].dead = true;
+    (void)app_bench_until(&bench, MACHINE_FAULT, 100);
+    app_bench_periods(&bench, 2500);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital() & LAMP);
+    command(COMMAND_RESET);
+    (void)app_bench_until(&bench, MACHINE_BOOT, 1000);
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+}
+
+/* The power of the controller was off for less than the module waits for its heartbeat; a drive has lost it too. */
+static void test_controller_that_restarts_switches_off(void)
+{
+    make_ready();
+    start();
+    app_bench_periods(&bench, 100);
+    bench.drives[0].dead = true;
+    app_bench_power_cycle(&bench);
+    configure(1, MODULE, 1);
+    configure(2, 16, 1);
+    configure(3, 3, 1);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital() & LAMP);
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+    TEST_ASSERT_EQUAL_INT16(0, analogue(1));
+}
+
 static void test_module_that_is_missing_or_another_one(void)
 {
     bench.module_dead = true;
@@ -345,6 +418,8 @@ static void test_module_that_is_missing_or_another_one(void)
     TEST_ASSERT_EQUAL_HEX32(0x101802, app_bench_read(&bench, 0x2025, 2));
     configure(7, 3, 4);
     (void)app_bench_until(&bench, MACHINE_OFF, 2000);
+    TEST_ASSERT_EQUAL_INT64(2, app_bench_read(&bench, 0x2028, 2));
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2028, 3)); /* there is no third drive */
 }
 
 static void test_refused_values(void)
@@ -360,10 +435,14 @@ static void test_refused_values(void)
 
 static void test_module_without_its_controller_switches_off(void)
 {
+    for (unsigned i = 0; i < 3u; ++i) { /* it would keep them */
+        bench.module.values.analogue_output_error_mode[i] = 0;
+    }
     make_ready();
     start();
     app_bench_periods(&bench, 250);
     TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    TEST_ASSERT_EQUAL_INT16(-1234, analogue(2));
     for (uint32_t i = 0; i < 200u; ++i) {
         io_module_process(&bench.module, 11000);
     }
@@ -385,6 +464,11 @@ int main(void)
     RUN_TEST(test_delay_by_ticks);
     RUN_TEST(test_module_that_is_lost_stops_the_machine);
     RUN_TEST(test_module_that_restarts_stops_the_machine);
+    RUN_TEST(test_module_that_is_not_operational_is_started_again);
+    RUN_TEST(test_module_that_is_not_operational_stops_the_machine);
+    RUN_TEST(test_module_that_is_lost_before_its_first_heartbeat);
+    RUN_TEST(test_boot_that_waits_for_a_drive_switches_off);
+    RUN_TEST(test_controller_that_restarts_switches_off);
     RUN_TEST(test_module_that_is_missing_or_another_one);
     RUN_TEST(test_refused_values);
     RUN_TEST(test_module_without_its_controller_switches_off);

@@ -63,12 +63,70 @@ static void test_a_check_lets_the_main_loop_give_signs_of_life(void)
     slot.attend = count_call;
     slot.self = &calls;
     TEST_ASSERT_EQUAL_INT(0, upload());
-    TEST_ASSERT_EQUAL_UINT(4,
-                           calls); /* segment, piece, its stops of both kinds; no limits of axes */
+    /* segment, piece, its stops of both kinds, no limits of axes; records of a segment and a piece */
+    TEST_ASSERT_EQUAL_UINT(4 + 2, calls);
     limited.crc32++;
     program_slot_refresh(&slot, &limited);
     TEST_ASSERT_TRUE(slot.acceptable);
-    TEST_ASSERT_EQUAL_UINT(4 + 5, calls);
+    TEST_ASSERT_EQUAL_UINT(4 + 2 + 5, calls);
+}
+
+/* The longest piece of work of the store without a sign of life, in bytes. */
+static struct {
+    uint32_t bytes;
+    uint32_t most;
+} silent;
+
+static void note_life(void *self)
+{
+    (void)self;
+    silent.bytes = 0;
+}
+
+static uint8_t memory[PORT_STORE_BANKS][4096];
+
+static uint32_t memory_size(unsigned bank)
+{
+    return sizeof memory[bank];
+}
+
+static int memory_erase(unsigned bank)
+{
+    memset(memory[bank], 0xFF, sizeof memory[bank]);
+    return 0;
+}
+
+static int memory_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
+{
+    memcpy(&memory[bank][offset], data, size);
+    silent.bytes += size;
+    silent.most = silent.bytes > silent.most ? silent.bytes : silent.most;
+    return 0;
+}
+
+static const uint8_t *memory_data(unsigned bank)
+{
+    return memory[bank];
+}
+
+/* A board writes 100 KB in more than two seconds, after which drives that are on miss the heartbeat. */
+static void test_writing_lets_the_main_loop_give_signs_of_life(void)
+{
+    static const struct fake_port_store store = {memory_size, memory_erase, memory_write,
+                                                 memory_data};
+    struct config other = config;
+    fake_port_use_store(&store);
+    slot.attend = note_life;
+    other.kernel = 1;
+    other.crc32 = 2;
+    TEST_ASSERT_EQUAL_INT(0, upload());
+    silent.bytes = 0;
+    silent.most = 0;
+    program_slot_refresh(&slot, &other);
+    fake_port_use_store(NULL);
+    TEST_ASSERT_TRUE(slot.acceptable);
+    TEST_ASSERT_TRUE(silent.most > 0u);
+    TEST_ASSERT_TRUE(silent.most <= 300u);
 }
 
 static void test_a_good_image_becomes_the_program(void)
@@ -213,6 +271,32 @@ static void test_after_power_on_the_newest_program_is_there(void)
     TEST_ASSERT_EQUAL_INT(0, upload());
 }
 
+/* A firmware with stricter rules refuses the newer program of two, or both; then the first one is back. */
+static void test_an_upload_is_the_newest_for_each_firmware(void)
+{
+    for (unsigned refused = 1; refused <= 2u; ++refused) {
+        setUp();
+        for (int32_t x = 0; x < 4; ++x) {
+            app_image_make(image, x, 20);
+            TEST_ASSERT_EQUAL_INT(0, upload());
+        }
+        const unsigned banks[2] = {slot.bank, 1u - slot.bank};
+        for (unsigned i = 0; i < refused; ++i) {
+            fake_port_spoil_store(banks[i], 48);
+        }
+        power_on();
+        app_image_make(image, 9, 20);
+        TEST_ASSERT_EQUAL_INT(0, upload());
+        for (unsigned i = 0; i < refused; ++i) {
+            if (banks[i] != slot.bank) {
+                fake_port_spoil_store(banks[i], 48);
+            }
+        }
+        power_on();
+        expect_active(image);
+    }
+}
+
 static void test_a_program_without_its_record_is_refused(void)
 {
     TEST_ASSERT_EQUAL_INT(0, program_slot_begin(&slot, sizeof image));
@@ -231,6 +315,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_a_good_image_becomes_the_program);
     RUN_TEST(test_a_check_lets_the_main_loop_give_signs_of_life);
+    RUN_TEST(test_writing_lets_the_main_loop_give_signs_of_life);
     RUN_TEST(test_an_upload_may_break_off_anywhere);
     RUN_TEST(test_a_truncated_image_is_refused_though_the_bank_holds_more);
     RUN_TEST(test_a_refusal_names_error_and_place);
@@ -239,6 +324,7 @@ int main(void)
     RUN_TEST(test_the_records_are_those_of_the_kernel);
     RUN_TEST(test_no_room_for_the_records);
     RUN_TEST(test_after_power_on_the_newest_program_is_there);
+    RUN_TEST(test_an_upload_is_the_newest_for_each_firmware);
     RUN_TEST(test_a_program_without_its_record_is_refused);
     return UNITY_END();
 }

@@ -131,14 +131,20 @@ static void begin_drive(struct drive_boot *boot)
     boot->reads = 0;
 }
 
-/* The drive is configured: to the next one, or on to starting them all. */
+/* The I/O module comes first: its configuration switches its outputs off, and a drive may be missing for a long time. */
+static uint8_t first_node(const struct config *config)
+{
+    return config->outputs.node != 0u ? config->axis_count : 0u;
+}
+
+/* The drive, or the module, is configured: to the next drive, or on to starting them all. */
 static void finish_drive(struct drive_boot *boot)
 {
     const bool module = boot->axis >= boot->config.axis_count;
     boot->simulated =
         boot->simulated && (module || drive_is_simulated(&boot->properties[boot->axis]));
-    boot->axis++;
-    if (boot->axis == drive_configuration_nodes(&boot->config)) {
+    boot->axis = module ? 0u : (uint8_t)(boot->axis + 1u);
+    if (boot->axis == boot->config.axis_count) {
         boot->axis = 0;
         boot->phase = DRIVE_BOOT_START;
     } else {
@@ -230,7 +236,7 @@ static void begin_attempt(struct drive_boot *boot)
     if (nodes_clash(boot)) {
         return;
     }
-    boot->axis = 0;
+    boot->axis = first_node(&boot->config);
     boot->simulated = true;
     boot->phase = DRIVE_BOOT_CONFIGURE;
     begin_drive(boot);

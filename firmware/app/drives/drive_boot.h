@@ -28,7 +28,7 @@
 enum drive_boot_phase {
     DRIVE_BOOT_IDLE,
     DRIVE_BOOT_PAUSE,     /* before the first drive, or before the next attempt */
-    DRIVE_BOOT_CONFIGURE, /* the drive of `configuration` */
+    DRIVE_BOOT_CONFIGURE, /* the I/O module or the drive of `configuration` */
     DRIVE_BOOT_START,     /* all are configured; `axis` is to be started next */
     DRIVE_BOOT_DONE,
 };

@@ -34,9 +34,11 @@ enum drive_when {
     WHEN_FEED,
     WHEN_MODULE_VENDOR, /* the same of the I/O module */
     WHEN_MODULE_PRODUCT,
-    WHEN_DIGITAL, /* outputs 0 ... 7 of it are mapped, 8 ... 15, analogue ones */
+    WHEN_DIGITAL, /* outputs 0 ... 7 of it are mapped, 8 ... 15, analogue ones: one, two, three */
     WHEN_DIGITAL_HIGH,
     WHEN_ANALOGUE,
+    WHEN_ANALOGUE_2,
+    WHEN_ANALOGUE_3,
 };
 
 enum drive_row_kind {
@@ -211,6 +213,9 @@ static const struct drive_row drive_rows[] = {
     {WHEN_NO_TORQUE, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO1},
     {WHEN_VELOCITY, ROW_PDO_OFFSET, 0, 0, 0, FROM_ROW, RPDO2_VELOCITY},
     {WHEN_NO_VELOCITY, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
+    /* offsets that it received last, in motion, would act from the next enabling on */
+    {WHEN_NO_TORQUE, ROW_TRY, 0x60B2, 0, 2, FROM_ROW, 0},
+    {WHEN_NO_VELOCITY, ROW_TRY, 0x60B1, 0, 4, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO4_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, TPDO1},
@@ -275,6 +280,12 @@ static const struct drive_row module_rows[] = {
     {WHEN_ANALOGUE, ROW_MAY, 0x6443, 1, 1, FROM_ROW, 1},
     {WHEN_ANALOGUE, ROW_MAY, 0x6444, 1, 4, FROM_ROW, 0},
     {WHEN_ANALOGUE, ROW_MUST, 0x6411, 1, 2, FROM_ROW, 0},
+    {WHEN_ANALOGUE_2, ROW_MAY, 0x6443, 2, 1, FROM_ROW, 1},
+    {WHEN_ANALOGUE_2, ROW_MAY, 0x6444, 2, 4, FROM_ROW, 0},
+    {WHEN_ANALOGUE_2, ROW_MUST, 0x6411, 2, 2, FROM_ROW, 0},
+    {WHEN_ANALOGUE_3, ROW_MAY, 0x6443, 3, 1, FROM_ROW, 1},
+    {WHEN_ANALOGUE_3, ROW_MAY, 0x6444, 3, 4, FROM_ROW, 0},
+    {WHEN_ANALOGUE_3, ROW_MUST, 0x6411, 3, 2, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_PDO_OUTPUTS, 0, 0, 0, FROM_ROW, 0},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO2_OFF},
     {WHEN_ALWAYS, ROW_PDO, 0, 0, 0, FROM_ROW, RPDO3_OFF},
@@ -456,6 +467,10 @@ static bool concerns_module(const struct config_outputs *outputs, enum drive_whe
         return outputs->digital_count > 8u;
     case WHEN_ANALOGUE:
         return outputs->analogue_count > 0u;
+    case WHEN_ANALOGUE_2:
+        return outputs->analogue_count > 1u;
+    case WHEN_ANALOGUE_3:
+        return outputs->analogue_count > 2u;
     default:
         return when == WHEN_ALWAYS;
     }

@@ -48,6 +48,7 @@ static void begin_others(struct drive_monitor *monitor, const struct config *con
 void drive_monitor_begin(struct drive_monitor *monitor, const struct config *config,
                          const uint32_t entries[AXES_MAX])
 {
+    monitor->axis_count = config->axis_count;
     monitor->count = drive_configuration_nodes(config);
     for (uint8_t i = 0; i < monitor->count; ++i) {
         const uint8_t node = drive_configuration_node(config, i);
@@ -82,13 +83,13 @@ static bool is_heartbeat(const struct heartbeat_consumer *consumer, const struct
 }
 
 /* Drives that are off may come and go: they are found again. With power on it is a fault. */
-static void gone(struct machine *machine, uint16_t code, uint8_t node)
+static void gone(struct machine *machine, uint16_t code, uint8_t node, uint32_t detail)
 {
     const bool boots = machine->state == MACHINE_BOOT;
     if (machine->state == MACHINE_OFF || (boots && machine->configured)) {
         machine_enter_boot(machine);
     } else if (!boots) {
-        machine_raise(machine, code, node, 0);
+        machine_raise(machine, code, node, detail);
     }
 }
 
@@ -97,11 +98,12 @@ static void restarted(struct machine *machine, uint8_t node)
     struct axis *axis = machine_axis(machine, node);
     if (axis != NULL) {
         axis_restarted(axis);
+        axis->homed = false; /* also where homing has ended since the frame was received */
     }
     if (machine->state == MACHINE_BOOT) { /* it has lost its configuration */
         machine_enter_boot(machine);
     } else {
-        gone(machine, FAULT_REBOOTED, node);
+        gone(machine, FAULT_REBOOTED, node, 0);
     }
 }
 
@@ -112,7 +114,29 @@ static void take_event(struct machine *machine, const struct heartbeat_consumer 
     if (event == HEARTBEAT_BOOTED) {
         restarted(machine, consumer->node);
     } else if (event == HEARTBEAT_LOST) {
-        gone(machine, EMCY_HEARTBEAT, consumer->node);
+        gone(machine, EMCY_HEARTBEAT, consumer->node, 0);
+    }
+    port_unlock();
+}
+
+static bool is_module(const struct drive_monitor *monitor, uint8_t i)
+{
+    return i >= monitor->axis_count;
+}
+
+/* The I/O module sends no TPDO that would show that it takes the outputs: the start command may have been lost, or a
+ * boot-up message. So the time without OPERATIONAL is limited, from the end of BOOT on. */
+static void supervise_module(struct drive_monitor *monitor, struct machine *machine,
+                             const struct heartbeat_consumer *module, uint32_t elapsed_us)
+{
+    port_lock();
+    if (machine->state == MACHINE_BOOT) {
+        monitor->not_operational_us = 0;
+    } else if (monitor->not_operational_us <= module->time_us) {
+        monitor->not_operational_us += elapsed_us;
+    } else {
+        const bool present = module->presence == HEARTBEAT_PRESENT;
+        gone(machine, EMCY_HEARTBEAT, module->node, present ? (uint32_t)module->state : 0u);
     }
     port_unlock();
 }
@@ -156,6 +180,10 @@ void drive_monitor_receive(struct drive_monitor *monitor, struct machine *machin
             monitor->without_us[i] = 0;
         }
         take_event(machine, consumer, heartbeat_consumer_receive(consumer, in));
+        if (is_heartbeat(consumer, in) && is_module(monitor, i) &&
+            consumer->state == NMT_OPERATIONAL) {
+            monitor->not_operational_us = 0;
+        }
     }
     take_others(monitor, machine, in);
 }
@@ -167,6 +195,9 @@ void drive_monitor_process(struct drive_monitor *monitor, struct machine *machin
         struct heartbeat_consumer *consumer = &monitor->consumers[i];
         note_missing_heartbeats(monitor, machine, i, elapsed_us);
         take_event(machine, consumer, heartbeat_consumer_process(consumer, elapsed_us));
+        if (is_module(monitor, i)) {
+            supervise_module(monitor, machine, consumer, elapsed_us);
+        }
     }
     for (uint8_t i = 0; i < monitor->other_count; ++i) {
         struct heartbeat_consumer *consumer = &monitor->others[i];

@@ -3,6 +3,8 @@
  * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of
  * the host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
  *
+ * An I/O module that is not OPERATIONAL for its consumer time, as after a lost start command, counts as lost.
+ *
  * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS may have been switched off and on while its boot-up message was
  * lost. Its axis then counts as not homed, in every state.
  *
@@ -27,7 +29,9 @@ struct drive_monitor {
     struct heartbeat_consumer consumers[DRIVE_NODES];
     struct heartbeat_consumer others[AXES_MAX]; /* nodes in 0x1016 that are not drives: a host */
     uint32_t without_us[DRIVE_NODES]; /* since the last heartbeat; a new begin does not reset it */
-    uint8_t count;
+    uint32_t not_operational_us; /* I/O module: since its last heartbeat in OPERATIONAL, or BOOT */
+    uint8_t axis_count;
+    uint8_t count; /* with the I/O module */
     uint8_t other_count;
 };
 

@@ -41,13 +41,23 @@ static bool inputs_polled(const struct drive_properties *properties)
     return properties->known[DRIVE_INPUTS] && !properties->known[DRIVE_INPUTS_MAPPED];
 }
 
+/* How many objects are read in turn: each is to be read once in DRIVE_POLLING_US. */
+static uint32_t objects_polled(const struct drive_properties *properties, uint8_t axis_count)
+{
+    uint32_t objects = axis_count;
+    for (uint8_t i = 0; i < axis_count; ++i) {
+        objects += inputs_polled(&properties[i]) ? 1u : 0u;
+    }
+    return objects;
+}
+
 /* The configuration belongs to the main loop, so it is read without the lock. */
 static bool request_next(struct drive_polling *polling, const struct machine *machine,
                          const struct drive_properties *properties, struct can_msg *out)
 {
     const uint8_t count = machine->config.axis_count;
     polling->poll_index = (uint8_t)((polling->poll_index + 1u) % (count * OBJECTS));
-    polling->pause_us = DRIVE_POLLING_US / count;
+    polling->pause_us = DRIVE_POLLING_US / objects_polled(properties, count);
     const uint8_t axis = (uint8_t)(polling->poll_index % count);
     const bool inputs = polling->poll_index >= count;
     if (inputs && !inputs_polled(&properties[axis])) {

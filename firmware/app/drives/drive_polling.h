@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * drive_polling: reads values of the drives that are in no PDO, for display only: following error (0x60F4), and digital
- * inputs (0x60FD) of drives without a TPDO3 for them. It reads one object of one axis by SDO, then waits
- * DRIVE_POLLING_US.
+ * inputs (0x60FD) of drives without a TPDO3 for them. It reads one object of one axis by SDO after the other, each once
+ * in DRIVE_POLLING_US.
  *
  * Called by app/controller.c. Main loop; takes the port's lock where it writes to the axes.
  */

@@ -174,12 +174,14 @@ static void fail(struct homing *homing, struct machine *machine, uint16_t code, 
     port_unlock();
 }
 
-/* The steps that depend on process data of the drive. */
+/* The steps that depend on process data of the drive. A tick may have ended homing by a fault since the last critical
+ * section: then the goals of the axes are those of the fault. */
 static void step_drive(struct homing *homing, struct machine *machine)
 {
     port_lock();
     const uint16_t statusword = machine->axes[homing->axis].statusword;
-    const uint16_t code = follow_drive(homing, machine);
+    const bool goes_on = machine->state == MACHINE_HOMING;
+    const uint16_t code = goes_on ? follow_drive(homing, machine) : 0u;
     port_unlock();
     if (code != 0u) {
         fail(homing, machine, code, statusword);

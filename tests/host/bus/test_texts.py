@@ -144,6 +144,8 @@ def test_details() -> None:
     assert detail_text(0x8250, 0) == "the drive received no setpoints for setpoint_timeout_ms"
     assert detail_text(0x6100, 7) == "detail 0x7"
     assert detail_text(0x8130, 0) == ""
+    assert detail_text(0x8130, 4) == "it sends heartbeats, but its NMT state is stopped"
+    assert detail_text(0x8130, 0x0218) == "statusword 0x0218, fault"
 
 
 def test_boot_trouble_in_words() -> None:

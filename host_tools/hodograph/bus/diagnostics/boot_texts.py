@@ -71,6 +71,8 @@ _OBJECTS = {
     0x6098: ("homing method", "choose a homing method that the drive has"),
     0x6099: ("homing speed", "correct the homing speeds in the machine file"),
     0x609A: ("homing acceleration", "correct the homing acceleration in the machine file"),
+    0x60B1: ("velocity offset", "see the drive's manual"),
+    0x60B2: ("torque offset", "see the drive's manual"),
     0x60C2: ("interpolation period", "choose a period that the drive has ([bus] period_us)"),
     0x60FD: ("digital inputs", "see the drive's manual"),
     0x6206: ("error mode of the digital outputs", "see the I/O module's manual"),

@@ -284,6 +284,9 @@ _COUNTS = {
     0xFF0B: "us",
 }
 _PLAIN = (0x6100, 0xFF10)
+_HEARTBEAT = 0x8130
+_NMT_STATES = {0x04: "stopped", 0x7F: "pre-operational"}
+"""Detail of a heartbeat fault: the state that the I/O module reports. A drive's own fault has its statusword."""
 
 
 def detail_text(code: int, detail: int) -> str:
@@ -294,6 +297,8 @@ def detail_text(code: int, detail: int) -> str:
         return f"{detail} {_COUNTS[code]}"
     if not detail:
         return ""
+    if code == _HEARTBEAT and detail in _NMT_STATES:
+        return f"it sends heartbeats, but its NMT state is {_NMT_STATES[detail]}"
     if code in _PLAIN:
         return f"detail 0x{detail:X}"
     return f"statusword 0x{detail:04X}, {state_of_statusword(detail)}"
