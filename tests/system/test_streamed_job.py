@@ -122,6 +122,37 @@ def test_a_killed_host_leaves_the_machine_on_its_path(
     assert _at_the_end(bench)
 
 
+@pytest.mark.parametrize(
+    ("was", "now"), [("[0, 0, 0]", "[0, 1, 0]"), ("jerk_mm_s3 = 500000", "jerk_mm_s3 = 400000")]
+)
+def test_a_job_does_not_go_on_on_a_changed_machine(
+    bench: Bench, clock: VirtualClock, tmp_path: Path, was: str, now: str
+) -> None:
+    """Its work offset or a limit is another one: the rest would be cut at another place, or on another curve."""
+    machine, file = tmp_path / "mill.toml", tmp_path / "part.ngc"
+    text = MILL.read_text().replace("../drives", str(EXAMPLES / "drives"))
+    machine.write_text(text)
+    file.write_text(JOB)
+    with running(
+        clock,
+        *("stream", str(file), "--machine", str(machine)),
+        *("--journal", str(tmp_path / "stream.json")),
+        name="stream",
+    ) as command:
+        _await(clock, command, lambda: bench.controller.targets(2)[1] >= 4 * COUNTS_PER_MM)
+        command.signal(signal.SIGINT)
+        assert command.wait(WAIT_S) == 128 + signal.SIGINT
+    rests = bench.controller.targets(3)
+    machine.write_text(text.replace(was, now, 1))
+    done = run_command(clock, "stream", "--continue", "--journal", str(tmp_path / "stream.json"))
+    assert done.returncode == 2, (bench.controller.targets(3), done.stderr)
+    assert f"{machine}: its work offset, axes, limits or outputs have been changed" in done.stderr
+    assert bench.controller.targets(3) == rests
+    machine.write_text(text)
+    _continued(clock, tmp_path)
+    assert _at_the_end(bench)
+
+
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupt_rests_on_the_path(
     bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path, end: signal.Signals

@@ -8,6 +8,7 @@ import json
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -31,10 +32,18 @@ from hodograph.bus.sdo.stream_channel import (
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli import stream_command
 from hodograph.cli.stream_command import _free_rate, _rests_at, journal_file
-from hodograph.config import load_machine
+from hodograph.config import Homing, Machine, Supervision, load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError, RunError
 from hodograph.stream.chunk import largest_chunk
-from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
+from hodograph.stream.journal import (
+    Entry,
+    Journal,
+    journal_lock,
+    load,
+    machine_mark,
+    mark,
+    require_same_machine,
+)
 from hodograph.stream.plan import Place, PlannedSection
 from hodograph.stream.sender import Sender
 
@@ -183,6 +192,42 @@ def test_a_changed_file_is_not_continued(tmp_path: Path) -> None:
     part.write_text("G1 X2 F100 \n")
     with pytest.raises(InputError, match="has been changed"):
         load(journal.file)
+
+
+_MACHINE = load_machine(ROOT / "examples" / "machines" / "mill.toml")
+
+
+def _with_axis(**changes: Any) -> Machine:
+    return replace(_MACHINE, axes=(replace(_MACHINE.axes[0], **changes), *_MACHINE.axes[1:]))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        replace(_MACHINE, offset_mm=(0.0, 0.001, 0.0)),
+        replace(_MACHINE, jerk_mm_s3=400_000.0),
+        _with_axis(acceleration_mm_s2=1000.0),
+        _with_axis(counts_per_unit=100_000),
+        _with_axis(homing=Homing(35, 1.0)),
+    ],
+)
+def test_a_job_is_not_continued_on_another_machine(changed: Machine) -> None:
+    entry = Entry((), "mill.toml", {}, 100, machine_sha256=machine_mark(_MACHINE))
+    require_same_machine(entry, _MACHINE)
+    with pytest.raises(InputError, match=r"mill\.toml: its work offset, .* have been changed"):
+        require_same_machine(entry, changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        replace(_MACHINE, file=Path("other.toml"), start_tolerance_mm=0.1),
+        replace(_MACHINE, supervision=Supervision(missed_max=3)),
+        _with_axis(drive=None, following_timeout_ms=7),
+    ],
+)
+def test_a_machine_that_gives_the_same_path_continues_a_job(changed: Machine) -> None:
+    require_same_machine(Entry((), "", {}, 1, machine_sha256=machine_mark(_MACHINE)), changed)
 
 
 def test_a_job_that_is_done_is_not_continued(tmp_path: Path) -> None:
