@@ -16,7 +16,10 @@ from commands import Command, run_command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import READY, RUNNING
+from hodograph.bus.sdo.node import _Answers
+from hodograph.bus.sdo.objects import STATE, STREAM
 from hodograph.bus.sdo.stream_channel import ENDED, STOPPED, stream_status
+from hodograph.cli.main import main
 from hodograph.cli.monitor_command import machine_layout
 from hodograph.config import load_machine
 from hodograph.monitor.pump import Pump
@@ -237,3 +240,27 @@ def test_the_page_has_the_contour_error_of_a_job(
     assert len(moving) > 50
     assert all(contour is not None and contour < 100.0 for contour in moving)
     assert max(moving) > 0.01
+
+
+@pytest.mark.parametrize("index", [STATE, STREAM])
+def test_a_lost_answer_does_not_end_a_job(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, index: int
+) -> None:
+    """An answer to a read, lost while the axes move; no chunk is on its way."""
+    file = tmp_path / "part.ngc"
+    file.write_text(JOB)
+    put, lost = _Answers.put, list[bytes]()
+
+    def once(self: _Answers, answer: bytes) -> None:
+        if answer[0] & 0xE0 == 0x40 and answer[1:3] == index.to_bytes(2, "little"):
+            lost.append(answer)
+            if len(lost) == 40:
+                return
+        put(self, answer)
+
+    monkeypatch.setattr(_Answers, "put", once)
+    journal = ("--journal", str(tmp_path / "stream.json"))
+    assert main(["stream", str(file), "--machine", str(MILL), *journal]) == 0
+    assert len(lost) > 40
+    monkeypatch.undo()
+    assert _at_the_end(bench)
