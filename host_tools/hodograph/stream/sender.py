@@ -29,7 +29,6 @@ from ..bus.sdo.stream_channel import (
     send_chunk,
     stream_status,
 )
-from ..bus.signals import interrupts_ignored
 from ..config import Machine
 from ..errors import HodographError, PlanError, RunError
 from ..fixed_point import nearest_q40
@@ -138,13 +137,12 @@ class Sender:
 
     def run(self) -> StreamedJob:
         """Sends the whole job and returns at its end. Raises RefusedError, BusError, RunError, and errors of planning
-        once the motion has come to rest. Any exception first stops the axes on their path.
+        once the motion has come to rest. Any exception first stops the axes on their path, unless nothing was started.
         """
         try:
             return self._run()
-        except BaseException:
-            with interrupts_ignored(), suppress(HodographError):
-                self.at.controller.stop_and_wait()
+        except BaseException as error:
+            self.at.controller.stop_after(error)
             raise
 
     def _run(self) -> StreamedJob:

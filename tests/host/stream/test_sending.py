@@ -18,6 +18,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
+from hodograph.bus.sdo.controller import Controller
 from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, RUNNING, STOPPING, STREAM
 from hodograph.bus.sdo.stream_channel import (
     ABORT_NO_ROOM,
@@ -372,6 +373,9 @@ def test_a_journal_has_one_writer(tmp_path: Path) -> None:
 class Stopped:
     """A session whose controller notes that it was stopped."""
 
+    moved = True
+    stop_after = Controller.stop_after
+
     def __init__(self, controller: object = None) -> None:
         self.stops = 0
         self.controller = controller or self
@@ -397,6 +401,23 @@ def test_whatever_ends_a_job_stops_the_axes_first(
     with pytest.raises(type(error)):
         Sender(at, nothing, nothing, lambda *_: None).run()
     assert at.stops == 1
+
+
+@pytest.mark.parametrize(("error", "stops"), [(KeyboardInterrupt(), 1), (RefusedError("no"), 0)])
+def test_a_job_that_moved_nothing_stops_no_other_motion(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException, stops: int
+) -> None:
+    at: Any = Stopped()
+    at.moved = False
+    nothing: Any = None
+
+    def fail(_: Sender) -> None:
+        raise error
+
+    monkeypatch.setattr(Sender, "_run", fail)
+    with pytest.raises(type(error)):
+        Sender(at, nothing, nothing, lambda *_: None).run()
+    assert at.stops == stops
 
 
 def _status(state: int, underruns: int = 0) -> StreamStatus:
