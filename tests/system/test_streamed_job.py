@@ -24,6 +24,7 @@ from hodograph.cli.monitor_command import machine_layout
 from hodograph.config import load_machine
 from hodograph.monitor.pump import Pump
 from hodograph.monitor.source import open_source
+from hodograph.stream import chunks
 
 pytestmark = pytest.mark.long
 
@@ -240,6 +241,22 @@ def test_the_page_has_the_contour_error_of_a_job(
     assert len(moving) > 50
     assert all(contour is not None and contour < 100.0 for contour in moving)
     assert max(moving) > 0.01
+
+
+def test_a_long_job_goes_on_as_another_one_of_the_controller(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a rest after so much of it on; a controller takes no job of 4 km."""
+    monkeypatch.setattr(chunks, "ENOUGH_Q40", 20 << 40)
+    file = tmp_path / "part.ngc"
+    file.write_text(JOB)
+    journal = tmp_path / "stream.json"
+    words = ("stream", str(file), "--machine", str(MILL), "--journal", str(journal))
+    assert main(words) == 0
+    assert _at_the_end(bench)
+    kept = json.loads(journal.read_text())
+    assert (kept["first"], kept["section"], kept["done"]) == (2, 2, True)
+    assert stream_status(bench.controller).job == kept["job0"] + 2
 
 
 @pytest.mark.parametrize("index", [STATE, STREAM])
