@@ -7,7 +7,7 @@ import errno
 import json
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +19,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
 from hodograph.bus.sdo.controller import Controller
-from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, RUNNING, STOPPING, STREAM
+from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, READY, RUNNING, STOPPING, STREAM
 from hodograph.bus.sdo.stream_channel import (
     ABORT_NO_ROOM,
     OPEN,
@@ -598,6 +598,45 @@ def test_an_override_that_the_operator_raises_again_is_lowered() -> None:
     at.controller.read = lambda *_: 100
     sender._slow_down()
     assert at.percents == [25]
+
+
+@pytest.mark.parametrize(
+    ("before", "since", "state", "percents"),
+    [
+        (100, [], READY, [25, 100]),
+        (60, [], READY, [25, 60]),
+        (100, [10], READY, [25, 10]),  # by the operator
+        (100, [], RUNNING, [25]),
+        (10, [], READY, []),
+    ],
+)
+@pytest.mark.parametrize("error", [None, RunError("stopped")])
+def test_a_lowered_override_is_taken_back_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+    before: int,
+    since: list[int],
+    state: int,
+    percents: list[int],
+    error: Exception | None,
+) -> None:
+    """At standstill, and if it is still the one that the job set."""
+    at = Overridden(before)
+    at.controller.state = lambda: state
+    at.controller.stop_after = lambda _: None
+    plan: Any = SimpleNamespace(greatest_rate=lambda: 20_000.0)
+    known: Any = at
+    nothing: Any = None
+
+    def job(sender: Sender) -> None:
+        sender._slow_down()
+        at.percents.extend(since)
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr(Sender, "_run", job)
+    with nullcontext() if error is None else pytest.raises(RunError):
+        Sender(known, nothing, plan, lambda *_: None, slow=5_000.0).run()
+    assert at.percents == percents
 
 
 @pytest.mark.parametrize(
