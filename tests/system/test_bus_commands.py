@@ -11,6 +11,7 @@ import signal
 from collections.abc import Callable, Iterator
 from dataclasses import astuple
 from pathlib import Path
+from typing import Any
 
 import pytest
 from canopen.sdo.exceptions import SdoCommunicationError
@@ -19,6 +20,7 @@ from canopen_bench import program
 from bench import EXAMPLES, MakeAlpha, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
+from hodograph.bus.goto import line_image
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import END_S
 from hodograph.bus.sdo import actions
@@ -203,6 +205,64 @@ def test_nothing_is_left_running(
 def has_ended(process: int) -> bool:
     """Of a process that has left virtual time: the system may still be busy with its end."""
     return bool(select.select([process], [], [], 30.0)[0])
+
+
+@pytest.mark.parametrize("command", ["goto", "run"])
+def test_a_command_starts_no_program_of_another_one(
+    controller: Controller,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+) -> None:
+    """Another one is uploaded, with the same start, before the command starts its own."""
+    assert main(["goto", str(ALPHA)]) == 0
+    at = controller.targets(2)
+    place = at[0] / 1e6, at[1] / 1e6
+    other = line_image(place, (place[0] + 1.0, place[1]), load_pipeline(ALPHA).machine)
+    upload = Controller.upload
+
+    def overtaken(self: Controller, image: bytes, *more: Any) -> None:
+        upload(self, image, *more)
+        upload(controller, other)
+
+    monkeypatch.setattr(Controller, "upload", overtaken)
+    words = ("goto", str(ALPHA), "--to", "5", "5") if command == "goto" else ("run", str(ALPHA))
+    status, line = status_line(capsys, *words)
+    assert controller.targets(2) == at
+    assert (status, "another command has loaded another program" in line) == (5, True), line
+
+
+@pytest.mark.parametrize("command", [("goto", str(ALPHA), "--to", "5", "5"), ("run", str(ALPHA))])
+def test_a_command_that_comes_too_late_leaves_the_motion_of_another_one_alone(
+    controller: Controller,
+    slow_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+) -> None:
+    """The axes stood when it began."""
+    assert main(["goto", str(slow_file)]) == 0
+    enable = Controller.enable
+
+    def overtaken(self: Controller) -> None:
+        enable(self)
+        monkeypatch.undo()
+        controller.start()
+
+    monkeypatch.setattr(Controller, "enable", overtaken)
+    status, line = status_line(capsys, *command)
+    assert (status, "takes no program now (running)" in line) == (5, True), line
+    assert controller.state() == RUNNING
+
+
+def test_a_second_start_leaves_the_motion_alone(
+    controller: Controller, slow_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["goto", str(slow_file)]) == 0
+    assert main(["start"]) == 0
+    status, line = status_line(capsys, "start")
+    assert (status, "the program goes on" in line) == (4, True), line
+    assert controller.state() == RUNNING
 
 
 def test_tiny_goto_is_exact(controller: Controller) -> None:

@@ -16,11 +16,15 @@ from commands import Command, run_command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import READY, RUNNING
+from hodograph.bus.sdo.node import _Answers
+from hodograph.bus.sdo.objects import STATE, STREAM
 from hodograph.bus.sdo.stream_channel import ENDED, STOPPED, stream_status
+from hodograph.cli.main import main
 from hodograph.cli.monitor_command import machine_layout
 from hodograph.config import load_machine
 from hodograph.monitor.pump import Pump
 from hodograph.monitor.source import open_source
+from hodograph.stream import chunks
 
 pytestmark = pytest.mark.long
 
@@ -122,6 +126,37 @@ def test_a_killed_host_leaves_the_machine_on_its_path(
     assert _at_the_end(bench)
 
 
+@pytest.mark.parametrize(
+    ("was", "now"), [("[0, 0, 0]", "[0, 1, 0]"), ("jerk_mm_s3 = 500000", "jerk_mm_s3 = 400000")]
+)
+def test_a_job_does_not_go_on_on_a_changed_machine(
+    bench: Bench, clock: VirtualClock, tmp_path: Path, was: str, now: str
+) -> None:
+    """Its work offset or a limit is another one: the rest would be cut at another place, or on another curve."""
+    machine, file = tmp_path / "mill.toml", tmp_path / "part.ngc"
+    text = MILL.read_text().replace("../drives", str(EXAMPLES / "drives"))
+    machine.write_text(text)
+    file.write_text(JOB)
+    with running(
+        clock,
+        *("stream", str(file), "--machine", str(machine)),
+        *("--journal", str(tmp_path / "stream.json")),
+        name="stream",
+    ) as command:
+        _await(clock, command, lambda: bench.controller.targets(2)[1] >= 4 * COUNTS_PER_MM)
+        command.signal(signal.SIGINT)
+        assert command.wait(WAIT_S) == 128 + signal.SIGINT
+    rests = bench.controller.targets(3)
+    machine.write_text(text.replace(was, now, 1))
+    done = run_command(clock, "stream", "--continue", "--journal", str(tmp_path / "stream.json"))
+    assert done.returncode == 2, (bench.controller.targets(3), done.stderr)
+    assert f"{machine}: its work offset, axes, limits or outputs have been changed" in done.stderr
+    assert bench.controller.targets(3) == rests
+    machine.write_text(text)
+    _continued(clock, tmp_path)
+    assert _at_the_end(bench)
+
+
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupt_rests_on_the_path(
     bench: Bench, clock: VirtualClock, under_way: Command, tmp_path: Path, end: signal.Signals
@@ -206,3 +241,43 @@ def test_the_page_has_the_contour_error_of_a_job(
     assert len(moving) > 50
     assert all(contour is not None and contour < 100.0 for contour in moving)
     assert max(moving) > 0.01
+
+
+def test_a_long_job_goes_on_as_another_one_of_the_controller(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From a rest after so much of it on; a controller takes no job of 4 km."""
+    monkeypatch.setattr(chunks, "ENOUGH_Q40", 20 << 40)
+    file = tmp_path / "part.ngc"
+    file.write_text(JOB)
+    journal = tmp_path / "stream.json"
+    words = ("stream", str(file), "--machine", str(MILL), "--journal", str(journal))
+    assert main(words) == 0
+    assert _at_the_end(bench)
+    kept = json.loads(journal.read_text())
+    assert (kept["first"], kept["section"], kept["done"]) == (2, 2, True)
+    assert stream_status(bench.controller).job == kept["job0"] + 2
+
+
+@pytest.mark.parametrize("index", [STATE, STREAM])
+def test_a_lost_answer_does_not_end_a_job(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, index: int
+) -> None:
+    """An answer to a read, lost while the axes move; no chunk is on its way."""
+    file = tmp_path / "part.ngc"
+    file.write_text(JOB)
+    put, lost = _Answers.put, list[bytes]()
+
+    def once(self: _Answers, answer: bytes) -> None:
+        if answer[0] & 0xE0 == 0x40 and answer[1:3] == index.to_bytes(2, "little"):
+            lost.append(answer)
+            if len(lost) == 40:
+                return
+        put(self, answer)
+
+    monkeypatch.setattr(_Answers, "put", once)
+    journal = ("--journal", str(tmp_path / "stream.json"))
+    assert main(["stream", str(file), "--machine", str(MILL), *journal]) == 0
+    assert len(lost) > 40
+    monkeypatch.undo()
+    assert _at_the_end(bench)

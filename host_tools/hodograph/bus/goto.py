@@ -163,8 +163,9 @@ def goto(
             f"goto: the feed override of {controller.who()} is 0 %, nothing would move: hodograph override 100 first"
         )
     for a, b in moves:
-        controller.upload(line_image(a, b, machine))
-        controller.start(unhomed=unhomed)
+        image = line_image(a, b, machine)
+        controller.upload(image)
+        controller.start(unhomed=unhomed, image=image)
         controller.wait_for_end(tick=tick)
         _require_arrival(controller, machine, b)
         distance_mm += math.dist(a[:SPACE_AXES], b[:SPACE_AXES])

@@ -80,7 +80,7 @@ def run_session(
 
     `controller_program`: command of its controller in place of hodograph-controller.
 
-    On an error or an interrupt the axes are stopped, and started processes are ended.
+    On an interrupt, and on an error after a motion of this session, the axes are stopped. Started processes are ended.
     """
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
@@ -95,9 +95,8 @@ def run_session(
             note(f"node {machine.node} is on {address} already: using it and its drives")
         try:
             yield RunSession(controller, pace if rig is not None else None, rig, note)
-        except BaseException:
-            with interrupts_ignored(), suppress(HodographError):
-                controller.stop_and_wait()
+        except BaseException as error:
+            controller.stop_after(error)
             raise
         if rig is not None:
             with suppress(HodographError):
@@ -180,7 +179,7 @@ def record_program(
     with Recorder(controller.address) as recorder:
         _await_syncs(controller, _REST_TICKS)
         begun_s = controller.clock.now_s()
-        controller.start(unhomed=unhomed)
+        controller.start(unhomed=unhomed, image=image)
         _follow(at, progress)
         took_s = controller.clock.now_s() - begun_s
         after = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS

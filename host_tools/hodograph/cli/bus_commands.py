@@ -25,8 +25,7 @@ from ..bus.sdo.controller import (
 )
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.objects import HOLD, MOVING, STOP
-from ..bus.signals import interrupts_ignored
-from ..errors import BusyError, HodographError
+from ..errors import BusyError
 from .output import note
 from .targets import target
 
@@ -69,12 +68,11 @@ def commanded(
 
 @contextmanager
 def stopping(controller: Controller) -> Iterator[None]:
-    """Stops the axes if the context is interrupted or fails."""
+    """Stops the axes if the context is interrupted, or fails after it has moved axes."""
     try:
         yield
-    except BaseException:
-        with interrupts_ignored(), suppress(HodographError):
-            controller.stop_and_wait()
+    except BaseException as error:
+        controller.stop_after(error)
         raise
 
 

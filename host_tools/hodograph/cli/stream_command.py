@@ -40,7 +40,16 @@ from ..pipeline import Pipeline
 from ..program.inspection import RING_BYTES
 from ..stream.chunk import BLOCK_HEAD, largest_chunk
 from ..stream.chunks import CHUNK_BYTES
-from ..stream.journal import JOURNAL_ELSEWHERE, Entry, Journal, journal_lock, load, mark
+from ..stream.journal import (
+    JOURNAL_ELSEWHERE,
+    Entry,
+    Journal,
+    journal_lock,
+    load,
+    machine_mark,
+    mark,
+    require_same_machine,
+)
 from ..stream.output_check import require_outputs
 from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place, PlanRests
 from ..stream.resuming import nearest_place
@@ -162,7 +171,9 @@ def _entry(job: JobFiles, number: int) -> Entry | None:
         return None
     marks = tuple(mark(file) for file in job.files)
     own = {"tolerance_mm": job.tolerance_mm, "reading": asdict(job.reading)}
-    return Entry(marks, str(job.machine.file.resolve()), own, number)
+    machine = job.machine
+    file = str(machine.file.resolve())
+    return Entry(marks, file, own, number, machine_sha256=machine_mark(machine))
 
 
 def _continue(options: Namespace) -> None:
@@ -179,6 +190,7 @@ def _continue(options: Namespace) -> None:
         }
         files = tuple(Path(one.path) for one in entry.files)
         machine = load_machine(Path(entry.machine))
+        require_same_machine(entry, machine)
         job = JobFiles(files, machine, own["tolerance_mm"], ReadOptions(**given))
         _require_outputs(job)
         require_fit(job.machine)

@@ -35,6 +35,11 @@ LEAST_SHARED_PIECES = 16
 BLOCK_HEAD = 384
 """Most bytes of the ring that the controller uses for each chunk in addition to the chunk's own."""
 
+FARTHEST_Q40 = 1 << 62
+"""No chunk of a controller's job begins at this arc length or beyond."""
+ENOUGH_Q40 = 1 << 61
+"""A controller's job that is as long as this ends at the next rest, and another one continues from there."""
+
 _HEADER = struct.Struct("<4sHH I I I I I I I I q Q q I I II".replace(" ", ""))
 _CRC_FROM = 16
 

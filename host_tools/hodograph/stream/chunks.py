@@ -24,7 +24,15 @@ from ..program.codes import ProgramError
 from ..program.image import COMPACT_PIECE_BYTES, Program, encode, segment_size
 from ..program.stop_planning import with_bounds, without_long_stops
 from ..program.stops import no_stops
-from .chunk import HEADER_SIZE, LEAST_SHARED_PIECES, Chunk, ChunkHeader, Rest
+from .chunk import (
+    ENOUGH_Q40,
+    FARTHEST_Q40,
+    HEADER_SIZE,
+    LEAST_SHARED_PIECES,
+    Chunk,
+    ChunkHeader,
+    Rest,
+)
 from .geometry import Block
 from .stop_search import Codes, StopSearch, no_codes
 from .tails import Tails
@@ -389,17 +397,31 @@ class SectionChunks:
     def _in_job(self, header: ChunkHeader) -> ChunkHeader:
         """The header in the job of a header that counts from the start of the section."""
         place = self._place
-        if header.last and self._continues(self._feed.path.end_point_q40):
+        if header.last and self._job_continues():
             header = replace(header, last=False, joined=True)
         if place is None:
             return header
+        job_start_q40 = header.job_start_q40 + place.arc_q40
+        if job_start_q40 >= FARTHEST_Q40:
+            raise PlanError(
+                f"line {header.line}: the section is longer than 2 km, and 4 km with those before it: divide it by a "
+                "dwell (G4 P0)"
+            )
         return replace(
             header,
             first=False,
             rest=place.rest if header.first else header.rest,
             sequence=header.sequence + place.sequence,
-            job_start_q40=header.job_start_q40 + place.arc_q40,
+            job_start_q40=job_start_q40,
         )
+
+    def _job_continues(self) -> bool:
+        """Whether the controller's job continues after the section: unless it is long enough."""
+        before_q40 = 0 if self._place is None else self._place.arc_q40
+        path = self._feed.path
+        if before_q40 + int(path.start_q40[-1]) >= ENOUGH_Q40:
+            return False
+        return self._continues(path.end_point_q40)
 
     def _size_kept(self, window: Window, joint: int) -> int:
         """Bytes of a chunk with the kept pieces and no tail."""

@@ -8,6 +8,7 @@ A JSON document that is replaced atomically: after a loss of power the old or th
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 from collections.abc import Iterator
@@ -18,9 +19,10 @@ from typing import Any
 
 from filelock import lock_descriptor
 
+from ..config import Machine
 from ..errors import InputError
 
-VERSION = 3
+VERSION = 4
 
 _BESIDE_Q40 = 1 << 20
 """2^-20 mm: a rest this close before the start of a section counts as a rest at the start."""
@@ -47,6 +49,7 @@ class Entry:
     first                    the section that it begins with
     starts                   sections of it from the one in motion to the last one sent, each with its start in the job
     done                     the job came to its end
+    machine_sha256           `machine_mark` of the machine
     """
 
     files: tuple[FileMark, ...]
@@ -59,6 +62,7 @@ class Entry:
     done: bool = False
     first: int = 0
     starts: tuple[tuple[int, int], ...] = ()
+    machine_sha256: str = ""
 
     @property
     def job(self) -> int:
@@ -81,6 +85,37 @@ def mark(file: Path) -> FileMark:
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}") from None
     return FileMark(str(file.resolve()), found.st_size, found.st_mtime_ns)
+
+
+def machine_mark(machine: Machine) -> str:
+    """SHA-256 of what decides where a job's path is and how its curves run: work offset, outputs, the limits of the
+    motion, and of each path axis counts, homing, drive scaling and limits.
+    """
+    axes = tuple(
+        (
+            axis.name,
+            axis.unit,
+            axis.counts_per_unit,
+            axis.velocity_mm_s,
+            axis.acceleration_mm_s2,
+            axis.jerk_mm_s3,
+            axis.homing,
+            axis.scaling,
+        )
+        for axis in machine.path_axes
+    )
+    motion = (machine.feed_mm_s, machine.acceleration_mm_s2, machine.jerk_mm_s3)
+    text = repr((machine.offset_mm, machine.outputs, motion, axes))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def require_same_machine(entry: Entry, machine: Machine) -> None:
+    """Raises InputError: the rest of the job would be cut at another place, or on another curve."""
+    if machine_mark(machine) != entry.machine_sha256:
+        raise InputError(
+            f"{entry.machine}: its work offset, axes, limits or outputs have been changed since the job was streamed: "
+            "change them back, or stream the job from its start"
+        )
 
 
 JOURNAL_ELSEWHERE = "name another with hodograph stream --journal FILE, or set XDG_STATE_HOME"

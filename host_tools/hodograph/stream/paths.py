@@ -24,7 +24,7 @@ from ..spline import PHSpline
 from ..spline.build import FoundSpline
 from ..spline.spatial.curve import SpatialPHSpline
 from ..toolpath.moves import Command, Dwell, ProgramStop
-from .chunk import Chunk, ChunkHeader, Rest, make
+from .chunk import ENOUGH_Q40, Chunk, ChunkHeader, Rest, make
 from .chunks import JobPlace
 from .geometry import LEAST_REST_MM, curve_after
 
@@ -94,7 +94,8 @@ class PathsJob:
 
     def chunks(self, first: int, begin_q40: int) -> Iterator[PathChunk]:
         """The chunks from path number `first` on, which begins at this arc length. All chunks of a controller's job
-        move the same axes: a new job begins where the paths change to rotary axes alone, and back.
+        move the same axes: a new job begins where the paths change to rotary axes alone, and back, and where one is
+        long enough.
         """
         paths = load_paths(self.file)
         if first < len(paths) and begin_q40 and self._is_done(paths[first], begin_q40):
@@ -115,7 +116,12 @@ class PathsJob:
                 switched.act(self._events(pipeline))
             if end_q40 is not None:
                 self._require_meeting(number, pipeline, end_q40)
-            last = following is None or following.file.turns_alone != listed.file.turns_alone
+            arc_q40 = begin_q40 if place is None else place.arc_q40
+            last = (
+                following is None
+                or following.file.turns_alone != listed.file.turns_alone
+                or arc_q40 + nearest_q40(pipeline.curve.length_mm) >= ENOUGH_Q40
+            )
             made = self._chunk(
                 listed, pipeline, number, place, begin_q40, job=self.job + begun, last=last
             )

@@ -30,7 +30,6 @@ from ..bus.sdo.stream_channel import (
     send_chunk,
     stream_status,
 )
-from ..bus.signals import interrupts_ignored
 from ..config import Machine
 from ..errors import HodographError, PlanError, RunError
 from ..fixed_point import nearest_q40
@@ -59,6 +58,9 @@ _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
 
 _LONG_WAIT_S = 1.0
 """Longest wait for the plan to report whether a job is long."""
+
+_FULL = 100
+"""Feed override with which a job begins."""
 
 _IN_TIME = 0.7
 """A chunk is in time if its transfer takes at most this share of the motion that was sent before it."""
@@ -128,7 +130,10 @@ class Sender:
     _journal_s: float = field(default=-1e9)
     _kept_s: float = field(default=-1e9)
     _underrun_s: float = field(default=-1e9)
-    _percent: int = 100
+    _percent: int = _FULL
+    """The feed override to which the job was lowered."""
+    _operators_percent: int = _FULL
+    """The feed override before that."""
     _sending_s: float = 0.0
     """Time that the transfers of `_bytes` took."""
     _done_s: float = 0.0
@@ -139,14 +144,17 @@ class Sender:
 
     def run(self) -> StreamedJob:
         """Sends the whole job and returns at its end. Raises RefusedError, BusError, RunError, and errors of planning
-        once the motion has come to rest. Any exception first stops the axes on their path.
+        once the motion has come to rest. Any exception first stops the axes on their path, unless nothing was started.
         """
         try:
-            return self._run()
-        except BaseException:
-            with interrupts_ignored(), suppress(HodographError):
-                self.at.controller.stop_and_wait()
+            done = self._run()
+        except BaseException as error:
+            self.at.controller.stop_after(error)
+            with suppress(HodographError):
+                self._give_back_override()
             raise
+        self._give_back_override()
+        return done
 
     def _run(self) -> StreamedJob:
         begun_s = self.at.controller.clock.now_s()
@@ -365,14 +373,28 @@ class Sender:
         if needed * 0.01 * self._percent <= self.slow:
             return
         percent = max(int(100.0 * self.slow / needed), 1)
-        if self.at.controller.read(OVERRIDE, 1) <= percent:
+        present = self.at.controller.read(OVERRIDE, 1)
+        if present <= percent:
             return  # the operator has lowered it further
+        if present != self._percent:
+            self._operators_percent = present
         self._percent = percent
         self.at.controller.override(percent)
         self.at.note(
             f"the job needs up to {needed / 1000.0:.1f} kB/s and the bus has {self.slow / 1000.0:.1f} for it: "
             f"feed override set to {percent} %"
         )
+
+    def _give_back_override(self) -> None:
+        """Takes the lowered feed override back at standstill, unless another command has changed it since: it would
+        apply to later programs.
+        """
+        controller = self.at.controller
+        if self._percent >= _FULL or controller.state() in BUSY:
+            return
+        if controller.read(OVERRIDE, 1) == self._percent:
+            controller.override(self._operators_percent)
+            self.at.note(f"feed override set to {self._operators_percent} % again")
 
     def _report(self, status: StreamStatus) -> None:
         section = self._section

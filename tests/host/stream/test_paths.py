@@ -18,6 +18,7 @@ from hodograph.errors import InputError, PlanError
 from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeFault, NativeLimits
 from hodograph.program.inspection import end_point_q40
+from hodograph.stream import paths
 from hodograph.stream.chunk import Chunk, Rest
 from hodograph.stream.chunks import CHUNK_BYTES
 from hodograph.stream.journal import Entry
@@ -67,6 +68,23 @@ def test_paths_are_one_job(machine: Machine) -> None:
     run = simulate_chunks(chunks, limits, "fixed", machine.counts_per_mm)
     own = sum(-(-chunk.program.duration_q32_s * 1000 // 2**32) + 1 for chunk in chunks)
     assert (run.ticks, run.sections) == (own + 500 + 8, 3)
+
+
+def test_a_long_list_of_paths_goes_on_as_another_job(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paths, "ENOUGH_Q40", _planned(machine, Place())[1][1].header.job_start_q40)
+    found = _planned(machine, Place())
+    headers = [chunk.header for _, chunk, _ in found]
+    assert [(one.job, one.first, one.last) for one in headers] == [
+        (7, True, True),
+        (8, True, True),
+        (9, True, True),
+    ]
+    assert [before for _, _, before in found] == [(), (Dwell(2, 0.5),), (ProgramStop(3, False),)]
+    limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
+    for _, chunk, _ in found:
+        simulate_chunks([chunk], limits, "fixed", machine.counts_per_mm)
 
 
 def test_a_job_of_paths_goes_on_inside_a_path(machine: Machine) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict, replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,12 +12,22 @@ import numpy as np
 import pytest
 
 from hodograph.config import Machine, load_machine
-from hodograph.errors import InputError
+from hodograph.errors import InputError, PlanError
 from hodograph.machine_limits import program_limits
 from hodograph.native.program import NativeLimits
 from hodograph.native.stream import OfflineStream
 from hodograph.program.codes import ProgramError
-from hodograph.stream.chunk import REST_TICKS, Chunk, ChunkHeader, Rest, parse, shared_fault
+from hodograph.program.inspection import end_point_q40
+from hodograph.stream import chunks as chunks_module
+from hodograph.stream.chunk import (
+    FARTHEST_Q40,
+    REST_TICKS,
+    Chunk,
+    ChunkHeader,
+    Rest,
+    parse,
+    shared_fault,
+)
 from hodograph.stream.journal import Entry
 from hodograph.stream.plan import JobFiles, JobPlan, Place, dwell_s, rest_of
 from hodograph.stream.simulation import simulate_chunks
@@ -86,6 +97,58 @@ def test_a_file_is_one_job(jobs: list[list[Chunk]]) -> None:
             assert shared_fault(chunk, before) is None
             assert before.header.joined == (chunk.header.rest is not None)
         assert all(parse(chunk.encode()).header == chunk.header for chunk in chunks)
+
+
+def test_the_controller_takes_no_job_of_4_km(jobs: list[list[Chunk]], machine: Machine) -> None:
+    stream = OfflineStream("fixed", _limits(machine))
+    before_q40 = FARTHEST_Q40 - (20 << 40)
+    faults = []
+    for chunk in jobs[0][:3]:
+        header = replace(chunk.header, job_start_q40=chunk.header.job_start_q40 + before_q40)
+        faults.append(stream.give(replace(chunk, header=header).encode()))
+    assert faults[:2] == [None, None]
+    assert faults[2] is not None, "it begins at 27 mm, 7 mm beyond"
+
+
+def test_a_long_job_goes_on_as_another_one(
+    tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the first rest after so much of it, from where it ends, with the commands of the rest before it."""
+    monkeypatch.setattr(chunks_module, "ENOUGH_Q40", 20 << 40)
+    file = tmp_path / "part.ngc"
+    file.write_text(PART)
+    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    with JobPlan(job, MOST, 7, Place()) as plan:
+        found = []
+        with suppress(IndexError):
+            while (item := plan.item(len(found), 100.0)) is not None:
+                found.append(item)
+    firsts = [(section, chunk) for section, chunk, _ in found if chunk.header.first]
+    assert [chunk.header.job for _, chunk in firsts] == [7, 9, 11]
+    assert [dwell_s(section.before) for section, _ in firsts] == [0.0, 0.0305, 0.0]
+    assert [section.start_q40 for section, _ in firsts] == [0, 0, 0]
+    assert [chunk.header.last for _, chunk, _ in found] == [False, True] * 2 + [True]
+    limits = _limits(machine)
+    for begin, end in ((0, 2), (2, 4), (4, 5)):
+        own = [chunk for _, chunk, _ in found[begin:end]]
+        simulate_chunks(own, limits, "fixed", machine.counts_per_mm)
+    for (_, a, _), (_, b, _) in pairwise(found):
+        off = np.subtract(end_point_q40(a.program), b.program.point_q40[:, 0])
+        assert np.abs(off).max() < 1 << 20
+
+
+def test_a_section_that_ends_too_far_in_its_job_names_the_remedy(
+    tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(chunks_module, "FARTHEST_Q40", 20 << 40)
+    file = tmp_path / "part.ngc"
+    file.write_text(PART)
+    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    with (
+        JobPlan(job, MOST, 7, Place()) as plan,
+        pytest.raises(PlanError, match=r"line 8: .* divide it by a dwell"),
+    ):
+        plan.item(2, 100.0)
 
 
 def test_time_is_that_of_the_ticks(jobs: list[list[Chunk]], machine: Machine) -> None:

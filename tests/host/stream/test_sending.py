@@ -7,7 +7,8 @@ import errno
 import json
 from argparse import Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +18,8 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from hodograph.bus.address import parse_address
 from hodograph.bus.sdo import stream_channel
-from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, RUNNING, STOPPING, STREAM
+from hodograph.bus.sdo.controller import Controller
+from hodograph.bus.sdo.objects import OFF, QUICK_STOPPING, READY, RUNNING, STOPPING, STREAM
 from hodograph.bus.sdo.stream_channel import (
     ABORT_NO_ROOM,
     OPEN,
@@ -31,10 +33,18 @@ from hodograph.bus.sdo.stream_channel import (
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli import stream_command
 from hodograph.cli.stream_command import _free_rate, _rests_at, journal_file
-from hodograph.config import load_machine
+from hodograph.config import Homing, Machine, Supervision, load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError, RunError
 from hodograph.stream.chunk import largest_chunk
-from hodograph.stream.journal import Entry, Journal, journal_lock, load, mark
+from hodograph.stream.journal import (
+    Entry,
+    Journal,
+    journal_lock,
+    load,
+    machine_mark,
+    mark,
+    require_same_machine,
+)
 from hodograph.stream.plan import Place, PlannedSection
 from hodograph.stream.sender import Sender
 
@@ -185,6 +195,42 @@ def test_a_changed_file_is_not_continued(tmp_path: Path) -> None:
         load(journal.file)
 
 
+_MACHINE = load_machine(ROOT / "examples" / "machines" / "mill.toml")
+
+
+def _with_axis(**changes: Any) -> Machine:
+    return replace(_MACHINE, axes=(replace(_MACHINE.axes[0], **changes), *_MACHINE.axes[1:]))
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        replace(_MACHINE, offset_mm=(0.0, 0.001, 0.0)),
+        replace(_MACHINE, jerk_mm_s3=400_000.0),
+        _with_axis(acceleration_mm_s2=1000.0),
+        _with_axis(counts_per_unit=100_000),
+        _with_axis(homing=Homing(35, 1.0)),
+    ],
+)
+def test_a_job_is_not_continued_on_another_machine(changed: Machine) -> None:
+    entry = Entry((), "mill.toml", {}, 100, machine_sha256=machine_mark(_MACHINE))
+    require_same_machine(entry, _MACHINE)
+    with pytest.raises(InputError, match=r"mill\.toml: its work offset, .* have been changed"):
+        require_same_machine(entry, changed)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        replace(_MACHINE, file=Path("other.toml"), start_tolerance_mm=0.1),
+        replace(_MACHINE, supervision=Supervision(missed_max=3)),
+        _with_axis(drive=None, following_timeout_ms=7),
+    ],
+)
+def test_a_machine_that_gives_the_same_path_continues_a_job(changed: Machine) -> None:
+    require_same_machine(Entry((), "", {}, 1, machine_sha256=machine_mark(_MACHINE)), changed)
+
+
 def test_a_job_that_is_done_is_not_continued(tmp_path: Path) -> None:
     part = tmp_path / "part.ngc"
     part.write_text("G1 X1 F100\n")
@@ -327,6 +373,9 @@ def test_a_journal_has_one_writer(tmp_path: Path) -> None:
 class Stopped:
     """A session whose controller notes that it was stopped."""
 
+    moved = True
+    stop_after = Controller.stop_after
+
     def __init__(self, controller: object = None) -> None:
         self.stops = 0
         self.controller = controller or self
@@ -352,6 +401,23 @@ def test_whatever_ends_a_job_stops_the_axes_first(
     with pytest.raises(type(error)):
         Sender(at, nothing, nothing, lambda *_: None).run()
     assert at.stops == 1
+
+
+@pytest.mark.parametrize(("error", "stops"), [(KeyboardInterrupt(), 1), (RefusedError("no"), 0)])
+def test_a_job_that_moved_nothing_stops_no_other_motion(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException, stops: int
+) -> None:
+    at: Any = Stopped()
+    at.moved = False
+    nothing: Any = None
+
+    def fail(_: Sender) -> None:
+        raise error
+
+    monkeypatch.setattr(Sender, "_run", fail)
+    with pytest.raises(type(error)):
+        Sender(at, nothing, nothing, lambda *_: None).run()
+    assert at.stops == stops
 
 
 def _status(state: int, underruns: int = 0) -> StreamStatus:
@@ -532,6 +598,45 @@ def test_an_override_that_the_operator_raises_again_is_lowered() -> None:
     at.controller.read = lambda *_: 100
     sender._slow_down()
     assert at.percents == [25]
+
+
+@pytest.mark.parametrize(
+    ("before", "since", "state", "percents"),
+    [
+        (100, [], READY, [25, 100]),
+        (60, [], READY, [25, 60]),
+        (100, [10], READY, [25, 10]),  # by the operator
+        (100, [], RUNNING, [25]),
+        (10, [], READY, []),
+    ],
+)
+@pytest.mark.parametrize("error", [None, RunError("stopped")])
+def test_a_lowered_override_is_taken_back_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+    before: int,
+    since: list[int],
+    state: int,
+    percents: list[int],
+    error: Exception | None,
+) -> None:
+    """At standstill, and if it is still the one that the job set."""
+    at = Overridden(before)
+    at.controller.state = lambda: state
+    at.controller.stop_after = lambda _: None
+    plan: Any = SimpleNamespace(greatest_rate=lambda: 20_000.0)
+    known: Any = at
+    nothing: Any = None
+
+    def job(sender: Sender) -> None:
+        sender._slow_down()
+        at.percents.extend(since)
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr(Sender, "_run", job)
+    with nullcontext() if error is None else pytest.raises(RunError):
+        Sender(known, nothing, plan, lambda *_: None, slow=5_000.0).run()
+    assert at.percents == percents
 
 
 @pytest.mark.parametrize(

@@ -9,15 +9,16 @@ Each failure is a BusError (no answer, or a wrong one) or a RefusedError (the co
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...data import CONTROLLER_EDS, object_dictionary
-from ...errors import BusError, InputError, RefusedError, RunError, one_line
+from ...errors import BusError, HodographError, InputError, RefusedError, RunError, one_line
 from ...fixed_point import MM_PER_Q40, nearest_q40
 from ..address import BusAddress
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
@@ -29,6 +30,7 @@ from ..diagnostics.texts import (
     fault_text,
     fault_words,
 )
+from ..signals import interrupts_ignored
 from .configuration import configuration, configuration_crc32
 from .network import open_network
 from .node import IDENTITY_OBJECT, Node
@@ -50,6 +52,7 @@ from .objects import (
     HELD,
     HOLD,
     HOLDING,
+    HOME,
     LOAD,
     MOVING,
     NODE_NUMBER,
@@ -105,6 +108,9 @@ ROUNDING_MM = 1e-6
 
 class Controller(Node):
     """A connection to the controller node; made by `connect`."""
+
+    moved: bool = False
+    """Whether a command of this connection may have set axes in motion."""
 
     # -- configuration ------------------------------------------------------------------------
 
@@ -198,12 +204,14 @@ class Controller(Node):
         """Sends a command; raises RefusedError with the controller's reason. Commands to stop never wait for the
         channel.
         """
+        moved, self.moved = self.moved, self.moved or command in _SETS_IN_MOTION
         try:
             if command in AT_ONCE:
                 self.write_at_once(COMMAND, command)
             else:
                 self.patiently(COMMAND, None, lambda: self._give(command))
         except SdoAbortedError as error:
+            self.moved = moved
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
             if reason == 5:
@@ -301,14 +309,20 @@ class Controller(Node):
         self.wait_for((READY,), 10.0)
 
     def start(
-        self, wait_s: float = 10.0, from_mm: float | None = None, *, unhomed: bool = False
+        self,
+        wait_s: float = 10.0,
+        from_mm: float | None = None,
+        *,
+        unhomed: bool = False,
+        image: bytes | None = None,
     ) -> None:
         """Starts the program, after waiting while the controller reports that axes still move.
 
         from_mm  start at this arc length of the path, where the axes have to stand
         unhomed  also if axes with a homing method are not homed
+        image    the program that was uploaded to be started; None: any
 
-        Raises InputError: the path does not have the place.
+        Raises InputError: the path does not have the place. Raises RefusedError: another program is loaded.
         """
         if from_mm is not None:
             self._require_place(from_mm)
@@ -318,13 +332,23 @@ class Controller(Node):
             if unhomed:
                 self.write(UNHOMED_START, 1, 1)  # for one attempt
             try:
-                self.command(START if from_mm is None else START_FROM)
+                with self.turn():  # no other command of this computer uploads in between
+                    if image is not None:
+                        self._require_program(image)
+                    self.command(START if from_mm is None else START_FROM)
                 return
             except CommandRefusedError as error:
                 moving = self.state() in MOVING
                 if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
             self.clock.sleep(POLL_S)
+
+    def _require_program(self, image: bytes) -> None:
+        if self.program_crc() != zlib.crc32(image[_PREFIX:]):
+            raise RefusedError(
+                f"{self.who()}: another command has loaded another program meanwhile, nothing was started: "
+                "wait until it is done, then give this command again"
+            )
 
     def _require_place(self, arc_length_mm: float) -> None:
         """Checks a place on the path; the controller takes one just beyond an end of the path as this end."""
@@ -340,6 +364,15 @@ class Controller(Node):
         """Controlled stop on the path; returns when the axes stand."""
         self.command(STOP)  # without effect at standstill
         self.wait_for((BOOT, OFF, READY), wait_s)
+
+    def stop_after(self, error: BaseException) -> None:
+        """Stops the axes after an error or an interrupt. After an error without a motion of this connection nothing is
+        stopped: what moves then is the motion of another command.
+        """
+        if isinstance(error, HodographError) and not self.moved:
+            return
+        with interrupts_ignored(), suppress(HodographError):
+            self.stop_and_wait()
 
     def override(self, percent: int) -> None:
         """Sets the feed override, 0 to 200 per cent, for this and later programs."""
@@ -398,6 +431,9 @@ _PROGRAM = (
     ("end_x_counts", 14),
     ("end_y_counts", 15),
 )
+_SETS_IN_MOTION = (START, START_FROM, HOME, RESUME)
+_PREFIX = 16
+"""Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")
 """Of PROGRAM from sub 16 on for holds, from sub 20 on for fault stops."""
 

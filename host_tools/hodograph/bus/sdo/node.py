@@ -43,6 +43,8 @@ _SCS, _NAMING = 0xE0, (0x40, 0x60)
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
 _AGAIN_S = 0.25
+READ_AGAIN_S = 1.0
+"""A read without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
 _T = TypeVar("_T")
 
 
@@ -211,12 +213,17 @@ class Node:
         return _nowhere(int.from_bytes(os.urandom(3), "little"))
 
     def read(self, index: int, sub: int | None = None) -> int:
-        """An integer object."""
+        """An integer object. A lost answer is asked for again, once."""
 
         def action() -> int:
             return int(self._variable(index, sub).raw)
 
-        return self._guarded(action, index, sub)
+        def twice() -> int:
+            with suppress(SdoCommunicationError, _SilentError), self._patience(READ_AGAIN_S):
+                return self.patiently(index, sub, action)
+            return self.patiently(index, sub, action)
+
+        return self._guarded(twice, index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
         """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
@@ -224,14 +231,24 @@ class Node:
         def action() -> None:
             self._variable(index, sub).raw = value
 
-        self._guarded(action, index, sub)
+        self._guarded(lambda: self.patiently(index, sub, action), index, sub)
+
+    @contextmanager
+    def _patience(self, most_s: float) -> Iterator[None]:
+        """Waits for answers at most this long inside the context."""
+        patience = self.sdo.RESPONSE_TIMEOUT
+        self.sdo.RESPONSE_TIMEOUT = min(patience, most_s)
+        try:
+            yield
+        finally:
+            self.sdo.RESPONSE_TIMEOUT = patience
 
     def _variable(self, index: int, sub: int | None) -> Any:
         return self.sdo[index] if sub is None else self.sdo[index][sub]
 
     def _guarded(self, action: Callable[[], _T], index: int, sub: int | None) -> _T:
         try:
-            return self.patiently(index, sub, action)
+            return action()
         except SdoAbortedError as error:
             raise RefusedError(
                 f"{self.who()} refused object {_name(index, sub)}: {error}"
