@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
-from ..errors import InputError, RunError
+from ..errors import InputError, PlanError, RunError
 from ..events import SwitchedOutputs
 from ..fixed_point import MM_PER_Q40
 from ..names import STANDARD_INPUT, is_toolpath
@@ -106,6 +106,10 @@ class PlannedSection:
     start_q40: int = 0
     rest: Rest | None = None
     standing_mm: tuple[float, ...] = ()
+
+
+_LINE = "line "
+"""The beginning of errors in the plan of a section, which knows lines but not their file."""
 
 
 class _EndedError(Exception):
@@ -393,12 +397,18 @@ class JobPlan:
     ) -> Generator[tuple[PlannedSection, Chunk, float], None, JobPlace | None]:
         """The chunks of a section. Returns the place of the next section in the same job; None: the job ends."""
         last, counted = False, 0
-        for planned in chunks.chunks():
-            for line in chunks.rest_lines[counted:]:
-                self.rests = self.rests.plus(section.file, line)
-            counted = len(chunks.rest_lines)
-            last = planned.chunk.header.last
-            yield section, planned.chunk, planned.new_s
+        try:
+            for planned in chunks.chunks():
+                for line in chunks.rest_lines[counted:]:
+                    self.rests = self.rests.plus(section.file, line)
+                counted = len(chunks.rest_lines)
+                last = planned.chunk.header.last
+                yield section, planned.chunk, planned.new_s
+        except PlanError as error:
+            text = str(error)
+            if not text.startswith(_LINE):
+                raise
+            raise PlanError(f"{section.file}:{text.removeprefix(_LINE)}") from None
         return None if last else chunks.end
 
     def _skip(self, section: StreamSection, switched: SwitchedOutputs) -> bool:

@@ -261,7 +261,7 @@ def test_the_feed_is_lowered_where_outputs_are_dense(tmp_path: Path, machine: Ma
 
 def test_more_than_a_tick_takes_are_refused_with_the_line(tmp_path: Path, machine: Machine) -> None:
     lines = ["G1 X10", *(f"M{62 + k % 2} P{k % 3}" for k in range(17)), "G1 X20"]
-    with pytest.raises(PlanError, match=r"line \d+: more than 16 outputs switch"):
+    with pytest.raises(PlanError, match=r"job\.ngc:3: more than 16 outputs switch"):
         _chunks(_file(tmp_path, iter(lines)), machine)
 
 

@@ -146,7 +146,7 @@ def test_a_section_that_ends_too_far_in_its_job_names_the_remedy(
     job = JobFiles((file,), machine, 0.01, ReadOptions())
     with (
         JobPlan(job, MOST, 7, Place()) as plan,
-        pytest.raises(PlanError, match=r"line 8: .* divide it by a dwell"),
+        pytest.raises(PlanError, match=r"/part\.ngc:8: the section .* divide it by a dwell"),
     ):
         plan.item(2, 100.0)
 
