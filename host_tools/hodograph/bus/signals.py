@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Ignores Ctrl-C, SIGTERM and SIGHUP while commands stop the axes. Main thread; without effect in others. Used by
-bus/run, cli/bus_commands and stream/sender. Changes signal handlers of the process and restores them.
+bus/run and sdo/controller. Changes signal handlers of the process and restores them.
 """
 
 from __future__ import annotations
