@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Speed of `hodograph campaign`: 10^4 runs of the alpha on two cores, and on a cluster of two workers over loopback.
+"""Measures the speed of `hodograph campaign` (many simulated runs with varied parameters): 10^4 runs of examples/alpha
+on two cores, and on a cluster of two workers over loopback.
 
 Run by `make bench`. Starts processes; writes temporary files and the file of --json.
 
-Times are of the whole command: import, workers, program, runs, table, report. Processor time counts all its processes.
+Times are of the whole command: from the import of Python modules to the written report. Processor time counts all its
+processes.
 """
 
 from __future__ import annotations

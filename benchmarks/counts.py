@@ -3,13 +3,13 @@
 
     python benchmarks/counts.py [--json OUT] [--build BUILD]
 
-Run by `make bench`. Needs `make counter`. Starts the emulator, writes OUT. Prints the main figures of
-docs/validation/counts.md:
+Run by `make bench`. Needs the counting emulator (`make counter`). Starts the emulator, writes OUT. Prints the main figures
+of docs/validation/counts.md:
 
-- motion part of a tick and whole interrupt: for each core and kernel the median over the examples and the most over all
+- motion part of a tick, and whole interrupt, for each core and kernel: median over the examples and maximum over all
   programs, plain and with the override in use;
-- constant feed: median and most of a tick of the PH kernel and of the usual NURBS interpolator, and the ripple of the
-  feed of both;
+- constant feed: median and maximum of a tick of the PH kernel and of the usual NURBS interpolator, and the feed ripple
+  of both;
 - the cost of the check of a program;
 - the cost of the proof of its stops.
 """

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Streaming: ratio of motion to planning time, time to the first chunk, memory by length of the job, and motion ahead
-in a ring of 48 KiB.
+"""Measures streaming: ratio of motion to planning time, time to the first chunk, memory by length of the job, and the
+seconds of motion that a ring buffer of 48 KiB holds.
 
     python benchmarks/streaming.py [--json OUT] [--lines N…] [--fit-lines N…] [--files FILE…]
 
-Run by `make bench`. The time to the first chunk is taken with a simulated machine on a local bus. Prints to stdout;
-writes OUT and temporary files.
+Run by `make bench`. The time to the first chunk is taken with a simulated machine on a local bus. Starts
+processes; prints to stdout; writes OUT and temporary files.
 
 Jobs are a zigzag of short lines over a wavy surface, as finishing passes are, at 50 mm/s on
 examples/machines/mill.toml. Each is planned in a process of its own, by one thread; those of --fit-lines are only read
-and fitted; --files are planned too. Wall time has other work on the computer in it; processor time has less of that.
+and fitted; FILEs are planned too. Other work on the computer affects wall time, and processor time less.
 """
 
 from __future__ import annotations

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Contour error of the paper's and of tuned loops, at SYNCs and between them, and on plants that are not the modelled
-one; plants found from noisy reports.
+"""Measures the contour error of simulated drives with the loops of the paper and with tuned ones: at SYNCs, between
+SYNCs, where the plant differs from its model, and where the plant is identified from noisy positions.
 
 Run by `make bench`. Uses no bus; writes the file of --json and temporary path files.
 
-Paths: alpha and heart at the paper's feed and in the least time within all limits. Loops: the paper's; tuned
-(examples/machines/tuned.toml); in drives that join setpoints by straight lines, the same poles, and those that the
-search finds for them; the first in drives whose speed comes from differences of the encoder and whose volts come a
-servo sample late. Between SYNCs the drive is computed again here, servo sample by servo sample, which shows how many of
-them are at the voltage limit. Where the plant is another the optimal feeds are those for 4.5 V, as in the examples, and
-for 3.5 V.
+Paths: alpha and heart, at the paper's feed and in the least time within all limits. Loops:
+
+- the paper's
+- tuned: examples/machines/tuned.toml
+- the tuned poles, in drives that interpolate setpoints by straight lines
+- poles that `tune` finds for such drives
+- the tuned poles, in drives whose speed is a difference of encoder positions and whose voltage acts one servo sample
+  late
+
+Between SYNCs this file simulates the drives again, servo sample by servo sample, and counts the samples at the voltage
+limit. With another plant than the modelled one, optimal feeds are planned for 4.5 V, as in the examples, and for 3.5 V.
 """
 
 from __future__ import annotations
@@ -37,7 +42,7 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 MACHINES = EXAMPLES / "machines"
 PATHS = ("alpha", "heart", "alpha_optimal", "heart_optimal")
 TUNED_HZ, TUNED_DAMPING = 214.5, 0.85
-"""Of the example's loops, as the search found them."""
+"""Bandwidth and damping that `hodograph tune` found for tuned.toml."""
 LINES_HZ, LINES_DAMPING = 155.8, 0.6
 """The same for straight lines, on all four paths."""
 WEAKER_VOLTS = 3.5

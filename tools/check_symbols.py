@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""check_symbols.py ARCHIVE...: global names that two static libraries define. Prints them; exit status 1 then. Run by
-`make lint`. Starts nm, writes nothing.
+"""check_symbols.py ARCHIVE...: global names that two static libraries define. Prints them; the exit
+status is 1 if there are any. Run by `make lint`. Starts nm, which reads the archives; writes nothing.
 
 Programs and tests link several libraries at once. If two functions have one name, the linker takes the first without a
-message. Only what port.h declares may be defined by each port: a program links one of them.
+message. Only what port.h declares may be defined by each port: a program links one port.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Time-optimal feed without a limit of the jerk, by TOPP-RA: a bound from below for every planner that has one. Used by
-benchmarks/optimal. No I/O.
+"""Time-optimal feed without a jerk limit, by TOPP-RA: a lower bound of the time of every planner with a jerk limit.
+Used by benchmarks/optimal. No I/O.
 
-Besides its axes the path has a coordinate more, arc length itself, so that feed and tangential acceleration are limits
-like those of axes. Volts are left out (they mix speed and acceleration), which only lowers the bound.
+The path has one coordinate more than its axes, the arc length, so that feed and tangential acceleration are limits like
+those of axes. The voltage limit is left out (it mixes speed and acceleration), which only lowers the bound.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _PERIOD_S = 1e-3
 
 @dataclass(frozen=True)
 class Bound:
-    """The time, and the greatest third difference of an axis at 1 kHz."""
+    """The time, and the greatest jerk of an axis, as third difference of positions at 1 kHz."""
 
     duration_s: float
     axis_jerk_mm_s3: float

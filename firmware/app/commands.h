@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * commands: executes the commands of the operator, which are written to object 0x2001. Called by app/objects and
- * app/controller.
+ * app/controller. Changes the controller's state.
  *
  * Main loop: objects.c calls commands_execute for each write of 0x2001, controller.c calls it at shut-down. While a
- * chunk is checked, controller.c calls commands_execute_urgent. Receive interrupt: controller.c calls
- * command_urgent_request.
+ * chunk (a part of a streamed job) is checked, controller.c calls commands_execute_urgent. Receive interrupt:
+ * controller.c calls command_urgent_request.
  */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
@@ -36,7 +36,8 @@ static inline bool command_is_urgent(uint8_t number)
 /* Whether a frame is an SDO request to this node for an urgent command: an expedited write of one byte. Pure. */
 bool command_urgent_request(const struct can_msg *frame, uint8_t node);
 
-/* Executes the urgent commands of a set (bit: enum command), the most severe last. The caller holds port_lock(). */
+/* Executes the urgent commands of a set: bit n stands for command n. The most severe one is executed last, so that it
+ * prevails. The caller holds port_lock(). */
 void commands_execute_urgent(struct machine *machine, uint16_t set);
 
 /* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. Takes port_lock()

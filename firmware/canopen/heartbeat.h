@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* heartbeat: sends the heartbeat of a node (producer, 0x1017) and monitors those of others (consumer, 0x1016); CiA 301,
- * 7.2.8.3.2.2. Used by the controller and by each simulated node. No I/O: the caller sends.
+/* heartbeat: makes the heartbeat frames of a node (producer, 0x1017) and monitors those of others (consumer, 0x1016);
+ * CiA 301, 7.2.8.3.2.2. Used by the controller and by each simulated node. No I/O: the caller sends.
  *
- * All functions of one struct in one context: main loop or timer. They change this struct only. */
+ * Call all functions of one struct from the same context, main loop or timer. They change this struct only. */
 #ifndef CANOPEN_HEARTBEAT_H
 #define CANOPEN_HEARTBEAT_H
 
@@ -19,8 +19,8 @@ struct heartbeat_producer {
 
 void heartbeat_producer_init(struct heartbeat_producer *producer, uint8_t node);
 
-/* Lets time pass. `period_ms` is the present value of 0x1017, 0 switches off; nothing is sent in INITIALISING. Returns
- * true when *out is to be sent. Late calls give one frame, not several. */
+/* Lets time pass. `period_ms` is the present value of 0x1017; 0: no heartbeat. Nothing is sent in INITIALISING. Returns
+ * true when *out is to be sent. After a long pause that is one frame, not one for each period. */
 bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t period_ms,
                                 enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
 

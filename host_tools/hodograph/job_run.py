@@ -2,7 +2,7 @@
 """Runs a job on the bus: its sections one after the other, and the machine commands at rest between them.
 
 Used by cli/, by api/bus, and by stream/sender (the functions for rests). Reads and writes objects of the controller by
-SDO, receives frames, writes recordings, and waits in the time of the bus. Each section is one program: it is uploaded
+SDO, receives frames, writes recordings, and waits by the clock of the bus. Each section is one program: it is uploaded
 where the axes stand, started, recorded and analysed. At rest the job waits for dwells, waits for the operator at
 program stops and tool changes, and prints messages.
 """

@@ -12,7 +12,7 @@
 #define NODE_OPTIONS_AXES 6
 
 struct node_options_axis {
-    struct drive_config config; /* period 1000 us */
+    struct drive_config config; /* SYNC period: 1000 us */
     double position_mm;
     struct equipment equipment;
     uint8_t node;
@@ -21,7 +21,7 @@ struct node_options_axis {
 struct node_options {
     const char *bus;    /* points into argv */
     const char *faults; /* a file of fault rules, into argv; NULL: none */
-    uint8_t module;     /* node of an I/O module; 0: none */
+    uint8_t module;     /* node number of an I/O module; 0: none */
     size_t axis_count;
     struct node_options_axis axes[NODE_OPTIONS_AXES];
 };

@@ -3,10 +3,10 @@
 ends processes; keeps their logs and reports in the build folder.
 
 `free` tests run in parallel; those marked `serial` measure time and run alone; those marked `bus` run one at a time
-inside tools/with-vcan, which gives all of them one vcan0. Tests marked `long` are chosen only where all are wanted.
+inside tools/with-vcan, which gives all of them one vcan0. Tests marked `long` run only if all tests are requested.
 
-Importing all test files takes as long as many tests. So pytest gets only the files that name the mark of the group;
-`unnamed` finds those of which another group has seen that they have the mark without naming it.
+Importing all test files takes as long as many tests. So pytest gets only the files whose text contains the mark of the
+group. `unnamed` finds the files whose tests have the mark in another way, by what another group has recorded.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ MARKS = {
     "serial": "serial and not bus",
     "bus": "bus",
 }
-# pytest-timeout (pyproject.toml) ends a test that hangs. One that it cannot end, since it hangs outside Python or took
-# pytest down with it, is ended after this time, with the whole group.
+# pytest-timeout (pyproject.toml) ends a test that hangs. It cannot end a test that hangs outside Python: after this
+# time the whole group is ended.
 LAST_LIMIT_S = 1800.0
 _LOOK_S = 5.0
 

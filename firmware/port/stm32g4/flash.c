@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/flash.h (see there): erasing and programming pages of the second flash bank, while the
- * program runs from the first. Used by flash_store, port_stm32g4.c and faults. Main loop, except flash_take_ecc_error
+ * program runs from the first. Used by flash_store.c, port_stm32g4.c and faults.c. Main loop, except flash_take_ecc_error
  * (NMI). */
 #include "port/stm32g4/flash.h"
 
@@ -13,7 +13,7 @@
      FLASH_SR_PGSERR | FLASH_SR_MISERR | FLASH_SR_FASTERR)
 #define ERASED 0xFFu
 
-/* The chip aborts after 25 ms at the latest; this many polls take longer. */
+/* An erase or a write ends within 25 ms. So many polls take longer than that. */
 #define POLLS 2000000u
 
 static uint32_t get(uint32_t offset)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Machines on a bus: a local bus, and the controller as an object. Used by programs of users. Starts processes, reads
-and writes objects of the controller by SDO, receives frames, and waits in the time of the bus.
+and writes objects of the controller by SDO, receives frames, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

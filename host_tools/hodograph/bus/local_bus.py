@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The client of a local bus, which hodograph-hub (sim/hub) serves to processes of one computer without CAN in the Linux
-kernel. Used by sdo/network. Sends and receives frames, and waits in the time of the bus.
+kernel. Used by sdo/network. Sends and receives frames, and waits by the clock of the bus, real or virtual.
 
 A member sends struct can_frame of linux/can.h and receives the same with a time stamp, in virtual time several in a
 packet (firmware/port/linux/local_bus.h).

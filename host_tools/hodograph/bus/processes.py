@@ -33,8 +33,8 @@ _REPOSITORY = _PACKAGE.parents[1]
 
 
 def find_program(name: str) -> Path:
-    """An executable that was installed with this package, or of the build, or of $PATH. Raises BusError when there is
-    none.
+    """An executable that was installed with this package, or is in build/bin, or on $PATH. Raises BusError when there
+    is none.
     """
     for folder in (_PACKAGE / "bin", _REPOSITORY / "build" / "bin"):
         if os.access(folder / name, os.X_OK):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Runs a program on the bus: configures the machine, moves to the start, runs, records and analyses. Used by all
 modules that run programs on a bus. Starts processes, reads and writes objects of the controller by SDO, receives
-frames, writes recordings, and waits in the time of the bus.
+frames, writes recordings, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

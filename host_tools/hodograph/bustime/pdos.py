@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The PDOs of a drive as the controller maps them (docs/reference/protocol.md section 2); names and types from its EDS.
-Used by bustime/fit, bustime/traffic and dbc. Reads the EDS file.
+"""Which objects the PDOs of a drive carry (docs/reference/protocol.md section 2), for the bus load and for DBC files.
+Names and types are from the EDS of the drive. Used by bustime/fit, bustime/traffic and hodograph/dbc. Reads the EDS.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STATUSWORD, ACTUAL, VOLTS, INPUTS = 0x60410010, 0x60640020, 0x21000010, 0x60FD00
 
 @dataclass(frozen=True)
 class PdoChoice:
-    """The PDO contents of a drive in addition to setpoint (RPDO1) and position (TPDO1)."""
+    """Which optional objects the PDOs of a drive carry, beside setpoint (RPDO1) and position (TPDO1)."""
 
     torque: bool = False
     """A torque offset in RPDO1."""

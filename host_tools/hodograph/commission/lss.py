@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Layer setting services (CiA 305): finds drives without a node number by Fastscan, and gives them one. Used by
-cli/commission_commands. Sends and receives frames, and waits in the time of the bus.
+cli/commission_commands. Sends and receives frames, and waits by the clock of the bus, real or virtual.
 
 Fastscan reads the identities of all unconfigured nodes, bit by bit. A found node is then in the configuration state and
 takes no further part. Some devices do not follow this, so that an identity comes twice and hides later ones.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Finds the nodes on a bus and reads their objects by SDO, where no controller sends SYNC. Used by
-cli/commission_commands and commission/. Sends, receives, and waits in the time of the bus.
+cli/commission_commands and commission/. Sends, receives, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Runs fault cases (start, program, disturbance, recovery, the program again) and judges them. A case is one scenario
 with one seed. Called by cli/faults_command. Starts processes, reads and writes objects by SDO, receives frames, and
-waits in the time of the bus.
+waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

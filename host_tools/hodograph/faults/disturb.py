@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The first run of a fault case: starts machine and program, disturbs them, and waits until everything is at rest. Used
-by faults/case_runner. Starts and kills processes, reads and writes objects by SDO, and waits in the time of the bus.
+by faults/case_runner. Starts and kills processes, reads and writes objects by SDO, and waits by the clock of the bus,
+real or virtual.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Actions of the host in a fault case: kills processes, breaks off uploads, reads drives without a controller. Used by
-faults/disturb and faults/uploads. Starts processes, sends by SDO, and waits in the time of the bus.
+faults/disturb and faults/uploads. Starts processes, sends by SDO, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Cases in which an upload breaks off: the old program has to stay active. Used by faults/disturb. Starts and kills a
-process, reads and writes objects by SDO, and waits in the time of the bus.
+process, reads and writes objects by SDO, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Searches stop parameters ("numbers") in C (sim/offline/stop_search.h). Used by program/stop_planning and
-native/stop_trial. No I/O.
+"""Searches the stop parameters of feed pieces: the jerk and the deceleration with which a path stop brakes
+(docs/theory/feed.md section 7). Used by program/stop_planning and native/stop_trial. No I/O; the search is in C
+(sim/offline/stop_search.h).
 """
 
 from __future__ import annotations
@@ -24,12 +25,14 @@ class StopLimits:
     """The limits of a brake; inf: no limit. mm and s; limits of axes have one number for each path axis, missing ones:
     no limit.
 
-    feed, acceleration, jerk   along the path; the numbers of a brake never exceed the last two
-    reach                      of |velocity + time_constant * acceleration| of the axis
+    feed, acceleration, jerk   along the path; stop parameters never exceed the last two
+    centripetal, axis_…        acceleration across the path; velocity, acceleration and jerk of each axis
+    reach                      limit of |velocity + time_constant * acceleration| of each axis, mm/s
     zones                      (from_mm, to_mm, feed_mm_s) each
-    reach_at_rate_1            `reach` applies at the rate 1 only
-    rise_is_cut                a brake begins when a rising rate adds at most a quarter of its deceleration
-    quick                      few numbers are tried: for long programs
+    reach_at_rate_1            `reach` applies at a feed override of 100 % only
+    rise_is_cut                while the override rises, a stop waits until the rise adds at most a quarter of its
+                               deceleration to the acceleration along the path
+    quick                      few stop parameters are tried: for long programs
     """
 
     feed: float = inf

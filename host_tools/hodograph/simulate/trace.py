@@ -32,7 +32,7 @@ _CHUNK = 65536
 
 
 def write_trace(motion: Motion, file: Path) -> None:
-    """Write the program's ticks of a run whose rows were kept; floats in full precision.
+    """Writes one row for each tick of the program, of a run whose rows were kept; floats in full precision.
 
     t_s is tick * period; rows are aligned as in docs/reference/protocol.md section 2. Raises InputError when the
     file cannot be written.

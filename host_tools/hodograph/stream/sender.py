@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Sends a planned job to the controller: uploads chunks (parts of the job) in order as its ring buffer has room, starts
 the motion, executes commands at rest, and waits for the end. Used by cli/stream_command. Reads and writes objects of
-the controller by SDO, moves the axes, writes the journal and the recording, and waits in the time of the bus.
+the controller by SDO, moves the axes, writes the journal and the recording, and waits by the clock of the bus, real or
+virtual.
 """
 
 from __future__ import annotations

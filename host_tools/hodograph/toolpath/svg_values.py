@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Values of SVG attributes: path data, transforms, lengths, lists of points, style declarations and style sheets. Used
-by toolpath/svg. No I/O; changes the contours that it is given.
+by toolpath/svg. No I/O; path data is appended to the contours that are given.
 
 Each function raises ShapeError for text that the grammar of SVG 1.1 does not allow. Renderers draw a broken path up to
-its first error without a message; a part machined in this way would be wrong.
+its first error without a message; a part machined from such a path would be wrong.
 """
 
 from __future__ import annotations

@@ -15,4 +15,4 @@ RECORD_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_us", "<i8")])
 """A frame and when it came: microseconds since 1970 (UTC)."""
 
 Frames = NDArray[np.void]
-"""An array of `RECORD_DTYPE`, in the order of the bus; where times are not needed, also of `FRAME_DTYPE`."""
+"""An array of `RECORD_DTYPE`, in the order of the bus. Functions that need no times also take one of `FRAME_DTYPE`."""

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Measures the load of a bus from captured frames (docs/reference/bus-time.md section 3). Used by bus/status_text,
-cli/status_command and monitor/pump. Receives frames, and waits in the time of the bus; sends none.
+cli/status_command and monitor/pump. Receives frames, and waits by the clock of the bus, real or virtual; sends none.
 
 The load is the bits of all frames, with their computed stuff bits, divided by the bit rate and the time. Shown by
 `hodograph status` and the live page.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The SDO channel lock: connections of one computer use the one SDO channel of a controller one after the other. Used
-by sdo/node. Opens and locks files, and waits in the time of the bus.
+by sdo/node. Opens and locks files, and waits by the clock of the bus, real or virtual.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` during `hodograph run` is a second
 client. A lock file per bus and node lets them alternate, transfer by transfer. A client that gets the lock from another

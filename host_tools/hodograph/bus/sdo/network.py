@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Opens a bus by python-can and canopen; their errors become BusError. Used by sdo/controller, commission/,
-faults/fault_actions and monitor/link. Sends and receives frames, and waits in the time of the bus.
+faults/fault_actions and monitor/link. Sends and receives frames, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

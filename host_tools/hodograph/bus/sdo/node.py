@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""SDO access to one node: reads and writes objects under the channel lock, with errors as diagnostics texts. Used by
-sdo/configuration, sdo/controller, sdo/stream_channel and sdo/upload. Sends, receives, and waits in the time of the bus.
+"""SDO access to one node: reads and writes objects, one command of this computer at a time (sdo/channel_lock), with
+errors as diagnostics texts. Used by sdo/configuration, sdo/controller, sdo/stream_channel and sdo/upload. Sends,
+receives, and waits by the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from .objects import COMMAND, STATE
 
 IDENTITY_OBJECT = 0x1018
 IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
-"""Sub-index, name, low bits that may differ (the minor revision)."""
+"""Sub-index, name, number of low bits that may differ (the minor revision)."""
 
 NOWHERE = 0x5000
 """The first of the 4096 indices that no EDS uses."""
@@ -32,10 +33,10 @@ LET_PASS_S = 1.0
 ABORT, ABORT_BUSY = 0x80, 0x08000021
 """Command byte of an abort; the code with which a server refuses a second client during a transfer."""
 BUSY_S = 5.0
-"""Longest wait for that: after two seconds the server drops a client that is gone."""
+"""Longest wait while another client has a transfer open: after two seconds the server drops a client that is gone."""
 _BUSY_LOOK_S = 0.05
 _NOBODY = b"\xff\xff\xff"
-"""An object that no client reads."""
+"""In place of the object that this client reads: it waits for no answer."""
 _NO_OBJECT = bytes(3)
 _SDO_BYTES = 8
 _SCS, _NAMING = 0xE0, (0x40, 0x60)

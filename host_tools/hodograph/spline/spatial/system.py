@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The interpolation system in space: three equations and three unknowns a span; docs/theory/spatial-splines.md 3.
+"""Sets up and solves the equations of a spline in space: three equations and three unknowns for each span
+(docs/theory/spatial-splines.md section 3). Used by spatial/build. No I/O.
 
-Z_i = R_i (a + b j + c k), i = 1 … M, with a given frame R_i (quaternions, mm^(1/2)) and real unknowns a, b, c: Z_i does
-not turn in its fibre against R_i. The two values beyond the ends follow linearly:
+The curve's preimage A has one quaternion coefficient Z_i (mm^(1/2)) for each of the M spans. A frame R_i is given:
+Z_i = R_i (a + b j + c k) with the real unknowns a, b, c. The coefficients beyond the ends follow linearly from the two
+nearest ones (`SpaceEndRule`):
 
-    open    Z_0 = a Z_1 + b Z_2 + c     and the same, mirrored, at the end
-    closed  Z_0 = Z_M e^(-i phase),  Z_(M+1) = Z_1 e^(i phase)
-
-Used by spatial/build. No I/O.
+    open    Z_0 = first Z_1 + second Z_2 + constant     and the same, mirrored, at the end
+    closed  Z_0 = Z_M e^(-i phase),  Z_(M+1) = Z_1 e^(i phase)     phase: turn of the frame around the closed path
 """
 
 from __future__ import annotations

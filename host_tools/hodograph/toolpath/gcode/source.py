@@ -2,8 +2,8 @@
 """A line of G-code as it was written, and the compact text that is parsed. Used by toolpath/gcode. No I/O.
 
 RS274/NGC does not distinguish upper and lower case, and blanks have no meaning outside comments. The compact text is
-the line in lower case without blanks; a comment becomes one character (`COMMENT`). Places in the compact text turn
-back into columns of the line for messages.
+the line in lower case without blanks; a comment becomes one character (`COMMENT`). For messages,
+places in the compact text are converted back to columns of the line.
 """
 
 from __future__ import annotations
