@@ -3,8 +3,8 @@
 
     python benchmarks/counts.py [--json OUT] [--build BUILD]
 
-Run by `make bench`. Needs the counting emulator (`make counter`). Starts the emulator, writes OUT. Prints the main figures
-of docs/validation/counts.md:
+Run by `make bench`. Needs the counting emulator (`make counter`). Starts the emulator, writes OUT. Prints the main
+figures of docs/validation/counts.md:
 
 - motion part of a tick, and whole interrupt, for each core and kernel: median over the examples and maximum over all
   programs, plain and with the override in use;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Axes behind x, y, z: each over arc length, as the program has it, where the setpoints went, where the axis went.
+// Axes after x, y, z: each over arc length, as the program has it, where the setpoints went, where the axis went.
 
 import { digitsOf, prepare, roundUp, text } from "./scale.js";
 import { Ring } from "./store.js";
@@ -14,7 +14,7 @@ export class AxisCurves {
     this.setAxes([], []);
   }
 
-  /** Names and units of the axes behind x, y, z. */
+  /** Names and units of the axes after x, y, z. */
   setAxes(names, units) {
     this.names = names;
     this.units = units;

@@ -14,7 +14,7 @@ export function text(value, digits) {
   return Number(shown) === 0 ? (0).toFixed(digits) : shown; // not -0
 }
 
-/** Digits behind the point that steps of this size need. */
+/** Decimals that steps of this size need. */
 export function digitsOf(step) {
   return Math.max(0, Math.min(6, Math.ceil(-Math.log10(step) - 1e-9)));
 }
