@@ -163,9 +163,9 @@ class Pump:
         while not self._ending.is_set():
             begun_s = time.thread_time()
             taken = source.take()
+            self._draw_chunks(taken)  # before the rows: the motion of a chunk may be in the same frames
             if taken.frames.size:
                 self._pass_on(taken)
-            self._draw_chunks(taken)
             for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
             self._own_load.busy_s += time.thread_time() - begun_s
