@@ -1,13 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""count_til.py [--target TARGET] [--kernel KERNEL] FILE: instructions of the whole tick interrupt, on a bus of its own.
+"""count_til.py [--target TARGET] [--kernel KERNEL] FILE: counts the instructions of the tick interrupt of a whole
+controller on an emulated board, with simulated drives on a local bus.
 
-Run by hand. Starts a local bus, the simulated drives and the emulator; prints to stdout.
+Run by hand. Starts a local bus, the simulated drives and the emulator; uses a temporary folder; prints to stdout.
 
-The whole controller on an emulated board, with simulated drives, uploads and runs a path at full pace; every tick while
-setpoints come from the program is counted from the first instruction of the vector's handler to its last: the port's
-handler and clock are in it, as they are not in tests/target/isr.c. Only the exchange of frames with the bridge is left
-out, which stands for a bus and for which the board's clock stands still.
+The path of FILE is uploaded to the controller and runs as fast as the emulator can. Each tick that takes setpoints from
+the program is counted, from the first to the last instruction of the interrupt handler. Unlike tests/target/isr.c this
+includes the handler and the clock of the port. Left out is the exchange of frames with the gateway, which replaces a
+bus: the board's clock stands still meanwhile.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="count_til.py", description=__doc__.splitlines()[0])
     parser.add_argument("--target", choices=TARGETS, default="an386")
     parser.add_argument("--build", type=Path, default=ROOT / "build")
-    parser.add_argument("--kernel", choices=emulator.KERNELS, help="not that of the path's machine")
+    parser.add_argument(
+        "--kernel", choices=emulator.KERNELS, help="in place of the kernel of the path's machine"
+    )
     parser.add_argument("--worst", type=int, default=3, help="show so many of the worst ticks")
     parser.add_argument("file", metavar="FILE", type=Path)
     options = parser.parse_args(arguments)

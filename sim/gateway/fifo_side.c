@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements gateway/fifo_side.h (see there): serves the requests of an emulated board on two FIFOs
- * (port/mps2/exchange.h). Called by gateway/main. One thread, once: its state is static. */
+ * (port/mps2/exchange.h). Called by gateway/main. One thread, one call in a process: its state is
+ * static. It opens the FIFOs, and sends and receives on the CAN socket. */
 #define _GNU_SOURCE
 #include "gateway/fifo_side.h"
 
@@ -18,8 +19,8 @@
 
 static struct {
     struct can_socket *socket;
-    int out; /* as the board sees it */
-    int in;
+    int out; /* output of the board: read here */
+    int in;  /* input of the board: written here */
     struct pacing pacing;
     struct exchange_message request;
     struct exchange_message reply;
@@ -27,7 +28,8 @@ static struct {
 
 static const char gone[] = "the emulated board is gone";
 
-/* Waits until the board opens its end. A negative number: it did not; a line on stderr has the reason. */
+/* Waits until the board opens its end. A negative number: it did not. Unless a signal ended the wait, a line on stderr
+ * has the reason. */
 static int open_fifo(const char *path, int flags)
 {
     struct stat found;

@@ -2,7 +2,7 @@
 /* influence: all that acts on an axis in addition to its setpoints: offsets of a feedforward, load, friction, brake, a
  * weak supply, a faulty encoder. Used by sim/node/axis_motion and sim/offline. docs/theory/drives.md section 13.
  *
- * drive.h computes an axis without any of these. With all figures neutral influence_period gives the same bits. The
+ * drive.h computes an axis without any of these. After influence_none, influence_period gives the same bits as drive_period. The
  * functions change the given structs only; any thread.
  */
 #ifndef HODOGRAPH_PLANT_INFLUENCE_H
@@ -16,7 +16,7 @@
 struct influence {
     double speed_offset_rad_s; /* added to the loop's speed reference */
     double volts_offset;       /* added to the loop's output, before the limit */
-    double volts_limit;        /* in force */
+    double volts_limit;        /* of the output; less than configured with a weak supply */
     double
         load_volts; /* of the load torque; a positive one brakes a motion in positive direction */
     double friction_volts;    /* of Coulomb friction, 0 or more; holds a standing axis */
@@ -25,10 +25,10 @@ struct influence {
     bool encoder_frozen;
 };
 
-/* Sets no influence: the drive as configured. */
+/* Resets all influences: the drive acts as configured. */
 void influence_none(struct influence *influence, const struct drive_config *config);
 
-/* Whether something acts that drive_period does not compute. */
+/* Whether an influence acts, so that influence_period has to be called in place of drive_period. */
 bool influence_acts(const struct influence *influence, const struct drive *drive);
 
 /* The feedforward of the periods that follow: 0x60B1 in bus counts a second, 0x60B2 in per mille of

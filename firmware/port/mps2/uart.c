@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both directions by interrupt. Used
- * by link_slcan. Any context; uart_begin in the main loop. */
+ * by link_slcan. Any context; uart_begin in the main loop. `receive` is called in the receive interrupt. */
 #include "port/mps2/uart.h"
 
 #include "port/cortex_m/core.h"
@@ -8,7 +8,7 @@
 #include "port/mps2/board.h"
 #include "port/mps2/interrupts.h"
 
-#define RING_SIZE 8192u /* an SDO block of 127 segments and more */
+#define RING_SIZE 8192u /* more than an SDO block of 127 segments takes as text */
 
 struct uart_registers {
     uint32_t data;
@@ -37,7 +37,7 @@ static volatile struct uart_registers *registers(void)
 void uart_begin(void (*receive)(char character))
 {
     self.receive = receive;
-    registers()->divider = 16; /* the least; the emulator's line has no speed */
+    registers()->divider = 16; /* the least that it accepts; the emulator ignores the speed */
     registers()->control = CONTROL_OUT | CONTROL_IN | CONTROL_OUT_INTERRUPT | CONTROL_IN_INTERRUPT;
     core_enable(BOARD_UART_NUMBER, INTERRUPTS_UART_PRIORITY);
     core_enable(BOARD_UART_NUMBER + 1u, INTERRUPTS_UART_PRIORITY);

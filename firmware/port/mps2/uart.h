@@ -4,7 +4,7 @@
  *
  * The interrupt of the transmitter takes characters from a ring, so the sender does not wait. The other end controls
  * the flow: the emulator gives a character when the last one has been read. Used by link_slcan. Any context; uart_begin
- * in the main loop.
+ * in the main loop. It calls `receive` in the receive interrupt.
  */
 #ifndef PORT_MPS2_UART_H
 #define PORT_MPS2_UART_H

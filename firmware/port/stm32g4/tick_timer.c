@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/tick_timer.h (see there): the clocks of the port, and when the next tick is due. Used by
- * irq, fdcan and port_stm32g4.c. Main loop and tick; the times in any context. */
+ * irq.c, fdcan.c and port_stm32g4.c. Main loop and tick; the times in any context. */
 #include "port/stm32g4/tick_timer.h"
 
 #include "port/stm32g4/reg_io.h"

@@ -163,7 +163,8 @@ class Pump:
         while not self._ending.is_set():
             begun_s = time.thread_time()
             taken = source.take()
-            self._draw_chunks(taken)  # before the rows: the motion of a chunk may be in the same frames
+            # before the rows: the motion of a chunk may be in the same frames
+            self._draw_chunks(taken)
             if taken.frames.size:
                 self._pass_on(taken)
             for event in self._emergencies.feed(taken.frames, taken.now_us):

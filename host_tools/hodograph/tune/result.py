@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The results of a tuning, by axis and by path and case; as text and as JSON. Used by cli/tune_command,
-report/tune_report and tune/tuning. No I/O.
+"""The results of a tuning: gains and margins of each axis, contour errors of each path and case; as text and as JSON.
+Used by cli/tune_command, report/tune_report and tune/tuning. No I/O.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Searches the servo loop with the least contour error on given paths in the worst of fourteen plants, within margins
-that a real loop needs; docs/theory/drives.md section 17. Used by cli/tune_command and tune/tuning. Runs simulations in
-this process; no I/O.
+"""Searches for the servo loop (gains and feedforward) whose contour error on the given paths is least in the worst of
+the plants in `CASES`, among loops with enough stability margins; docs/theory/drives.md section 17. Used by
+cli/tune_command and tune/tuning. Runs simulations in this process; no I/O.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ BANDWIDTHS = 7
 SPAN = 8.0
 """Ratio of the least to the greatest bandwidth."""
 ENOUGH = 1.02
-"""Errors within this factor of the least count as equal: the slowest loop among them is taken."""
+"""Loops whose error is at most this factor times the least error are equally good: the slowest of them is taken."""
 _HALVINGS = 30
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Required margins with a dead time that the model does not have."""
+    """Margins that a loop must have with `delay_s` added to the dead time of the model."""
 
     modulus: float = 0.5
     phase_deg: float = 45.0

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The setpoint step check for frames as they come, in parts that overlap. Used by bus/capture/bus_recording,
-cli/record_command, cli/stream_command and monitor/pump. No I/O; changes its own object only.
+"""Checks the setpoints of each axis while frames arrive: finds the worst steps from SYNC to SYNC by the rules of
+setpoint_check, in windows that overlap. Used by bus/capture/bus_recording, cli/record_command, cli/stream_command and
+monitor/pump. No I/O; changes its own object only.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from .frames import Frames
 from .setpoint_check import Jump, Step, StepLimits, worst_steps
 
 WINDOW = 1000
-"""SYNCs that are checked together. A quarter of them at both ends only serve as context."""
+"""SYNCs that are checked together. The first and the last quarter are context only; the windows beside check them."""
 _STEP, _EDGE = WINDOW // 2, WINDOW // 4
 _MOST_FRAMES = 100_000
-"""Most frames kept without a SYNC."""
+"""If no SYNC comes, at most this many frames are kept."""
 _NODES = 0x7F
 
 

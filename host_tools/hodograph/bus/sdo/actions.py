@@ -28,11 +28,11 @@ from .objects import (
 )
 
 BOOT_S = 10.0
-"""Longest wait until drives are found and configured, switched on or off."""
+"""Longest wait for drives to be found and configured, or to be switched on or off."""
 
 
 def hold_reached(controller: Controller, wait_s: float = math.inf) -> bool:
-    """Waits for the standstill that HOLD commanded; False: the program ended before."""
+    """Waits for the standstill that HOLD commanded; False: the program ended before, or the drives are off."""
     return controller.wait_for((HELD, READY, OFF, BOOT), wait_s) == HELD
 
 

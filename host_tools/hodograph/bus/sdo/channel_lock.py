@@ -3,8 +3,9 @@
 by sdo/node. Opens and locks files, and waits by the clock of the bus, real or virtual.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` during `hodograph run` is a second
-client. A lock file per bus and node lets them alternate, transfer by transfer. A client that gets the lock from another
-one is informed, so that it can discard answers to the other. Two connections of one process count as different clients.
+client. A lock file per bus and node lets them alternate, transfer by transfer. A client learns whether another one had
+the lock before it: it then discards late answers to the other. Two connections of one process count as different
+clients.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Quaternions as preimages of space curves: r' = A i A*; docs/theory/spatial-splines.md 2.
+"""Quaternion arithmetic for PH curves in space: a quaternion polynomial A gives the derivative r' = A i A* of a curve;
+A is a preimage of r' (docs/theory/spatial-splines.md section 2).
 
-A quaternion A = u + v i + p j + q k is an array (…, 4) of u, v, p, q; a vector is (…, 3). A and its turns in the fibre,
-A e^(i phi), have the same image.
+A quaternion A = u + v i + p j + q k is an array (…, 4) of u, v, p, q; a vector is (…, 3). All A e^(i phi) have the same
+r'; they are the fibre of A.
 
 Used by spline/spatial, program/check and fit/chain. No I/O.
 """
@@ -17,7 +18,7 @@ from ..bernstein import Real
 
 
 def left(a: Real) -> Real:
-    """Matrices (…, 3, 4) with left(a) b = (a i b* + b i a*) / 2, the polar form of a i a*."""
+    """Matrices (…, 3, 4) with left(a) b = (a i b* + b i a*) / 2, the symmetric bilinear form of a i a*."""
     u, v, p, q = _components(a)
     out = np.empty((*a.shape[:-1], 3, 4))
     out[..., 0, 0], out[..., 0, 1], out[..., 0, 2], out[..., 0, 3] = u, v, -p, -q

@@ -5,10 +5,18 @@ changes its own object and the parameters that it was given.
     machine position = R (program position + G92 offset) + origin of the coordinate system + tool offset
 
 R turns x and y about z by the rotation of the coordinate system (G10 L2 R). Everything here is in mm and degrees; the
-interpreter converts units. Parameters hold the tables, so that a program can read them, with the numbers of RS274/NGC:
-5161 to 5166 and 5181 to 5186 the reference points of G28 and G30, 5210 whether the G92 offset is active, 5211 to 5216
-that offset, 5220 the number of the active coordinate system, and 5201 + 20 n to 5206 + 20 n the origin of system n with
-its rotation in 5210 + 20 n. A value that a program writes there takes effect when the system is next selected.
+interpreter converts units. The tables are in parameters with the numbers of RS274/NGC, so that a program can
+read them:
+
+    5161 to 5166                    reference point of G28
+    5181 to 5186                    reference point of G30
+    5210                            whether the G92 offset is active
+    5211 to 5216                    G92 offset
+    5220                            number n of the active coordinate system, 1 to 9
+    5201 + 20 n to 5206 + 20 n      origin of system n
+    5210 + 20 n                     rotation of system n
+
+A value that a program writes there takes effect when the system is next selected.
 """
 
 from __future__ import annotations
