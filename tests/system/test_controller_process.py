@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -155,6 +157,25 @@ def test_faults_are_one_line_and_a_status(
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
     assert part in done.stderr
+
+
+def ended_by(root: Path, end: signal.Signals, stderr: int) -> int:
+    """The status of a controller that gets a signal when it has booted, in real time."""
+    with LocalHub(virtual=False) as hub, LocalBus(hub.address.channel) as bus:
+        words = [str(root / CONTROLLER), "--bus", hub.address.channel, "--verbose"]
+        with subprocess.Popen(words, stderr=stderr) as controller:
+            while (frame := bus.recv(HANGS_S)) is None or frame.arbitration_id != 0x701:
+                assert frame is not None
+            time.sleep(1.2)  # it has written the first notes: no drive answers
+            controller.send_signal(end)
+            return controller.wait(HANGS_S)
+
+
+def test_messages_that_nobody_reads_do_not_end_it(root: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert ended_by(root, signal.SIGTERM, writer) == 0
+    os.close(writer)
 
 
 def test_a_program_runs_to_its_end(machine: Machine, image: bytes) -> None:

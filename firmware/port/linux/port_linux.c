@@ -45,6 +45,7 @@ static int set_signals(void (*handler)(int))
     memset(&action, 0, sizeof action);
     action.sa_handler = handler;
     (void)sigemptyset(&action.sa_mask);
+    (void)signal(SIGPIPE, SIG_IGN); /* a reader of stderr that ends must not end the stop of the axes */
     return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0
                ? 0
                : PORT_ERR_SYSTEM;
