@@ -178,6 +178,10 @@ def test_messages_that_nobody_reads_do_not_end_it(root: Path) -> None:
     os.close(writer)
 
 
+def test_a_closed_terminal_ends_it_like_sigterm(root: Path) -> None:
+    assert ended_by(root, signal.SIGHUP, subprocess.DEVNULL) == 0
+
+
 def test_a_program_runs_to_its_end(machine: Machine, image: bytes) -> None:
     machine.prepare(image)
     program = machine.sdo[0x2000]
@@ -257,7 +261,7 @@ def test_a_lost_drive_is_a_fault_that_a_reset_clears(
     assert machine.fault()[0] == 0
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 @pytest.mark.parametrize("after_s", [0.0, 0.0005, 0.1, 0.3, 0.8])
 def test_a_signal_stops_the_axes_and_ends(
     machine: Machine, image: bytes, end: signal.Signals, after_s: float
