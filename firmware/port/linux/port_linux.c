@@ -46,8 +46,7 @@ static int set_signals(void (*handler)(int))
     memset(&action, 0, sizeof action);
     action.sa_handler = handler;
     (void)sigemptyset(&action.sa_mask);
-    (void)signal(SIGPIPE,
-                 SIG_IGN); /* a reader of stderr that ends must not end the stop of the axes */
+    (void)signal(SIGPIPE, SIG_IGN); /* the reader of stderr may end before the axes stand */
     if (sigaction(SIGHUP, NULL, &before) != 0 ||
         (before.sa_handler != SIG_IGN && sigaction(SIGHUP, &action, NULL) != 0)) { /* nohup */
         return PORT_ERR_SYSTEM;
