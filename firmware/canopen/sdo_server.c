@@ -636,8 +636,9 @@ bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, str
     if (!sdo_server_wants(server, in)) {
         return false;
     }
-    const struct od_entry *urgent =
-        server->state == SDO_SERVER_IDLE ? NULL : urgent_entry(server, in->data);
+    /* After an aborted block also while idle: there it could be taken for a late segment. */
+    const bool idle = server->state == SDO_SERVER_IDLE && server->received == 0u;
+    const struct od_entry *urgent = idle ? NULL : urgent_entry(server, in->data);
     if (urgent != NULL) {
         return write_meanwhile(server, urgent, in->data, out);
     }

@@ -13,8 +13,8 @@
  * 
  * Stop commands are executed during a transfer: the hook `urgent` of the dictionary names them (expedited writes of one
  * byte). The server executes and answers such a write, and the transfer continues. The client of the transfer has to
- * ignore this response, which names another object. Within a block, all eight bytes of such a write distinguish it from
- * a segment.
+ * ignore this response, which names another object. Within a block, and after the abort of one, all eight bytes of such
+ * a write distinguish it from a segment.
  * 
  * Within a block, frames are segments with a number. A frame is refused as the request of another client if it has the
  * form of a request for an existing object and its number is not one of the next two. A frame of another client that

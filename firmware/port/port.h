@@ -43,7 +43,8 @@ int port_begin(int argc, char **argv);
  * has failed (the bus is gone); that has been reported. Main loop. */
 int port_end(void);
 
-/* True when the end of the controller is requested (SIGTERM, SIGINT); never on a board without such a request. */
+/* True when the end of the controller is requested (SIGTERM, SIGINT, SIGHUP); never on a board without such a
+ * request. */
 bool port_stop_requested(void);
 
 /* True when it has been requested a second time: the drives then stop by their own ramps, not along the path. */

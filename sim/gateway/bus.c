@@ -39,6 +39,7 @@ void bus_unblock_signals(void)
     (void)sigemptyset(&ends);
     (void)sigaddset(&ends, SIGINT);
     (void)sigaddset(&ends, SIGTERM);
+    (void)sigaddset(&ends, SIGHUP);
     (void)sigprocmask(SIG_UNBLOCK, &ends, NULL);
 }
 

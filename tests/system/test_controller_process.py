@@ -3,9 +3,11 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import struct
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -157,6 +159,29 @@ def test_faults_are_one_line_and_a_status(
     assert part in done.stderr
 
 
+def ended_by(root: Path, end: signal.Signals, stderr: int) -> int:
+    """The status of a controller that gets a signal when it has booted, in real time."""
+    with LocalHub(virtual=False) as hub, LocalBus(hub.address.channel) as bus:
+        words = [str(root / CONTROLLER), "--bus", hub.address.channel, "--verbose"]
+        with subprocess.Popen(words, stderr=stderr) as controller:
+            while (frame := bus.recv(HANGS_S)) is None or frame.arbitration_id != 0x701:
+                assert frame is not None
+            time.sleep(1.2)  # it has written the first notes: no drive answers
+            controller.send_signal(end)
+            return controller.wait(HANGS_S)
+
+
+def test_messages_that_nobody_reads_do_not_end_it(root: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    assert ended_by(root, signal.SIGTERM, writer) == 0
+    os.close(writer)
+
+
+def test_a_closed_terminal_ends_it_like_sigterm(root: Path) -> None:
+    assert ended_by(root, signal.SIGHUP, subprocess.DEVNULL) == 0
+
+
 def test_a_program_runs_to_its_end(machine: Machine, image: bytes) -> None:
     machine.prepare(image)
     program = machine.sdo[0x2000]
@@ -236,7 +261,7 @@ def test_a_lost_drive_is_a_fault_that_a_reset_clears(
     assert machine.fault()[0] == 0
 
 
-@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 @pytest.mark.parametrize("after_s", [0.0, 0.0005, 0.1, 0.3, 0.8])
 def test_a_signal_stops_the_axes_and_ends(
     machine: Machine, image: bytes, end: signal.Signals, after_s: float

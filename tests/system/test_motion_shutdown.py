@@ -186,6 +186,22 @@ def test_a_second_signal_stops_quickly_at_once(way: Way, after_s: float, again_s
         assert reported_us - at_us <= again_s * 1e6 + LATE_US
 
 
+@pytest.mark.parametrize("after_s", every(3, INSTANTS_S[1:-1]))
+def test_a_closed_terminal_stops_on_the_path_also_if_it_signals_twice(
+    way: Way, heart: Program, after_s: float
+) -> None:
+    """The shell and the kernel may each send SIGHUP."""
+    way.clock.sleep(after_s)
+    at_us, status = signalled(way, signal.SIGHUP, 0.004)
+    frames = way.frames()
+    assert status == 0
+    assert switched_off(frames, at_us)
+    for node in NODES:
+        axis = axis_frames(frames, node)
+        assert axis.last_step_us(at_us) - at_us <= heart.stops.worst_us[0] + LATE_US
+        assert axis.first_us(QUICK_STOP, at_us) is None
+
+
 HOST_NODE, BEAT_S, SILENT_MS = 127, 0.02, 100
 
 

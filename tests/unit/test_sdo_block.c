@@ -535,6 +535,21 @@ static void test_an_urgent_write_beside_a_block_download(void)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(image, talk.small.domain, 127 * 7);
 }
 
+/* The frame that would be the next segment of an aborted block, also long after the client has gone. */
+static void test_an_urgent_write_after_an_aborted_block(void)
+{
+    sdo_talk_init(&talk);
+    sdo_server_init(&talk.server, &talk.small.od, TALK_NODE, TALK_TIMEOUT_US, 127);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 127 * 7));
+    for (uint8_t sequence = 1; sequence < 0x2F; sequence++) {
+        sdo_talk_segment(&talk, sequence, image, 7);
+    }
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US, &talk.answer));
+    expect_abort(SDO_ABORT_TIMEOUT);
+    urgent();
+    TEST_ASSERT_FALSE(sdo_talk_segment(&talk, 0x2F, image, 7));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -564,5 +579,6 @@ int main(void)
     RUN_TEST(test_upload_refusals);
     RUN_TEST(test_upload_times_out);
     RUN_TEST(test_an_urgent_write_beside_a_block_download);
+    RUN_TEST(test_an_urgent_write_after_an_aborted_block);
     return UNITY_END();
 }

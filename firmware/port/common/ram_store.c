@@ -21,14 +21,21 @@ uint32_t port_store_size(unsigned bank)
     return bank < PORT_STORE_BANKS ? ram_store.bank_bytes : PORT_STORE_PARAMETER_BYTES;
 }
 
+__attribute__((weak)) int ram_store_put(uint8_t *at, const uint8_t *data, uint32_t size)
+{
+    memcpy(at, data, size);
+    return 0;
+}
+
 /* Clearing the commit record is enough; and on a host, pages that were never written cost nothing. */
 int port_store_erase(unsigned bank)
 {
     if (bank >= PORT_STORE_BANKS_ALL) {
         return PORT_ERR_STORE;
     }
-    memset(bank_at(bank) + port_store_size(bank) - RECORD_BYTES, 0xFF, RECORD_BYTES);
-    return 0;
+    uint8_t none[RECORD_BYTES];
+    memset(none, 0xFF, sizeof none);
+    return ram_store_put(bank_at(bank) + port_store_size(bank) - RECORD_BYTES, none, RECORD_BYTES);
 }
 
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size)
@@ -37,8 +44,7 @@ int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32
         size > port_store_size(bank) - offset) {
         return PORT_ERR_STORE;
     }
-    memcpy(bank_at(bank) + offset, data, size);
-    return 0;
+    return ram_store_put(bank_at(bank) + offset, data, size);
 }
 
 const uint8_t *port_store_data(unsigned bank)

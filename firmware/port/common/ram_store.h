@@ -33,4 +33,8 @@ struct ram_store {
 /* The port fills it before the first function port_store_... is called. */
 extern struct ram_store ram_store;
 
+/* Every write to that memory: memcpy(), unless the port has its own function of this name, because a write may fail. 0
+ * or PORT_ERR_STORE. */
+int ram_store_put(uint8_t *at, const uint8_t *data, uint32_t size);
+
 #endif

@@ -5,8 +5,8 @@
  * and sim/.
  *
  * The state is one for the whole process. One thread uses all functions in virtual time, except clock_note_signal
- * (signal handlers). It sleeps in clock_poll() only: what it does between two calls takes no virtual time. SIGINT and
- * SIGTERM arrive while it sleeps there. A process that lets them arrive at other times reports each with
+ * (signal handlers). It sleeps in clock_poll() only: what it does between two calls takes no virtual time. SIGINT,
+ * SIGTERM and SIGHUP arrive while it sleeps there. A process that lets them arrive at other times reports each with
  * clock_note_signal(). In real time clock_ns and clock_poll may be called from any thread. Users define _GNU_SOURCE
  * first.
  */

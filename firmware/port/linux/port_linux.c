@@ -34,17 +34,23 @@ static struct {
 
 static void on_signal(int number)
 {
-    (void)number;
-    self.stop = self.stop < 2 ? self.stop + 1 : 2;
+    const int most = number == SIGHUP ? 1 : 2; /* shell and kernel may both send SIGHUP */
+    self.stop = self.stop < most ? self.stop + 1 : self.stop;
     port_wake();
 }
 
 static int set_signals(void (*handler)(int))
 {
     struct sigaction action;
+    struct sigaction before;
     memset(&action, 0, sizeof action);
     action.sa_handler = handler;
     (void)sigemptyset(&action.sa_mask);
+    (void)signal(SIGPIPE, SIG_IGN); /* the reader of stderr may end before the axes stand */
+    if (sigaction(SIGHUP, NULL, &before) != 0 ||
+        (before.sa_handler != SIG_IGN && sigaction(SIGHUP, &action, NULL) != 0)) { /* nohup */
+        return PORT_ERR_SYSTEM;
+    }
     return sigaction(SIGTERM, &action, NULL) == 0 && sigaction(SIGINT, &action, NULL) == 0
                ? 0
                : PORT_ERR_SYSTEM;
