@@ -20,6 +20,9 @@ from .dxf_tags import Entity, ezdxf_module, number_of
 
 _MOST_DEGREE = 15
 
+_ROUNDED_TURN = 1e-4
+"""By how many rad a whole ellipse may seem longer than a turn: programs write 2π as 6.28319 or 6.2832."""
+
 
 def entity_system(entity: Entity) -> Affine:
     """The map from the coordinate system of an entity, which its extrusion direction gives, to the world's."""
@@ -67,6 +70,7 @@ def _ellipse(entity: Entity, contours: Contours) -> None:
     start = entity.number(41, 0.0) % math.tau
     sweep = entity.number(42, math.tau) - entity.number(41, 0.0)
     is_whole = abs(abs(sweep) - math.tau) < 1e-9 or not sweep
+    is_whole = is_whole or math.tau < sweep < math.tau + _ROUNDED_TURN
     sweep = math.tau if is_whole else sweep % math.tau
     axes = (major, (float(minor[0]), float(minor[1]), float(minor[2])))
 

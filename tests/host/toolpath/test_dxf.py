@@ -113,6 +113,13 @@ def test_arcs_and_circles_are_arcs(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("turn", ["6.283185307179586", "6.283186", "6.28319", "6.2832"])
+def test_an_ellipse_over_a_rounded_turn_is_whole(tmp_path: Path, turn: str) -> None:
+    ellipse = f"0 ELLIPSE 8 0 10 0 20 0 11 10 21 0 40 0.5 41 0 42 {turn}"
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(ellipse))))
+    assert length_of(contour) == pytest.approx(48.4422, abs=0.02)
+
+
 def test_bulges_are_arcs(tmp_path: Path) -> None:
     document = new()
     document.modelspace().add_lwpolyline(
