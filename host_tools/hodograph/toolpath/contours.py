@@ -26,7 +26,7 @@ Point = tuple[float, float, float]
 MOST_MM = 1e9
 """Greatest coordinate of a drawing."""
 
-_FLAT_MM = 1e-9
+FLAT_MM = 1e-9
 """An arc that is nowhere farther from its chord is a line."""
 
 _ROUND = 1e-9
@@ -205,7 +205,7 @@ class Contours:
         u, v = (self.affine.direction(axis) for axis in axes)
         stop = self.pen if end is None else self._mapped(end)
         size = max(math.hypot(*u), math.hypot(*v))
-        if 2.0 * size * math.sin(min(abs(sweep), math.tau) / 4) ** 2 < _FLAT_MM or (
+        if 2.0 * size * math.sin(min(abs(sweep), math.tau) / 4) ** 2 < FLAT_MM or (
             stop == self.pen and end is not None and abs(sweep) < math.pi
         ):
             return self._line_to(stop, line)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from .contours import Affine, Contours, Point, ShapeError, Spline
+from .contours import FLAT_MM, MOST_MM, Affine, Contours, Point, ShapeError, Spline
 from .dxf_tags import Entity, ezdxf_module, number_of
 
 _MOST_DEGREE = 15
@@ -140,12 +140,35 @@ def _polyline_through(
         if bulge == 0.0 or start == end:
             contours.line_to(end, line)
             continue
+        if _is_slight(contours, start, end, bulge):
+            _slight_arc(contours, start, end, bulge, line)
+            continue
         dx, dy, away = end[0] - start[0], end[1] - start[1], (1.0 / bulge - bulge) / 4.0
         x = (start[0] + end[0]) / 2.0 - away * dy
         y = (start[1] + end[1]) / 2.0 + away * dx
         u = (start[0] - x, start[1] - y, 0.0)
         axes = (u, (-u[1], u[0], 0.0))
         contours.ellipse_to((x, y, start[2]), axes, 0.0, 4.0 * math.atan(bulge), end, line)
+
+
+def _is_slight(contours: Contours, start: Point, end: Point, bulge: float) -> bool:
+    """Whether an arc is so nearly straight that its centre may be too far away."""
+    chord = contours.affine.direction((end[0] - start[0], end[1] - start[1], 0.0))
+    return abs(bulge) < 1e-3 and math.hypot(*chord) > abs(bulge) * MOST_MM / 10.0
+
+
+def _slight_arc(contours: Contours, start: Point, end: Point, bulge: float, line: int) -> None:
+    """The arc as a rational spline, which needs no centre; a line if it is nowhere farther from it."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    if math.hypot(*contours.affine.direction((dx, dy, 0.0))) * abs(bulge) / 2.0 < FLAT_MM:
+        contours.line_to(end, line)
+        return
+    height = bulge / (1.0 - bulge * bulge)  # of the tangents' intersection, as a share of the chord
+    tip = ((start[0] + end[0]) / 2 + height * dy, (start[1] + end[1]) / 2 - height * dx, start[2])
+    weights = np.array([1.0, math.cos(2.0 * math.atan(bulge)), 1.0])
+    contours.spline_to(
+        Spline(np.array([start, tip, end]), weights, np.repeat([0.0, 1.0], 3), 2), line
+    )
 
 
 def _spline(entity: Entity, contours: Contours) -> None:

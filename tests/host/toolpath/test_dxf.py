@@ -134,6 +134,16 @@ def test_bulges_are_arcs(tmp_path: Path) -> None:
     assert found[2].end[:2] == (0.0, 0.0)
 
 
+@pytest.mark.parametrize("bulge", [1e-300, 1e-14, -1e-9, 1e-8, -1e-7, 1e-6, 1e-4])
+def test_slight_bulges_are_drawn(tmp_path: Path, bulge: float) -> None:
+    line = f"0 LWPOLYLINE 8 0 90 2 70 0 10 0 20 0 42 {bulge:g} 10 100 20 0"
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(line))))
+    (points,) = contour
+    assert points[[0, -1], :2] == pytest.approx(np.array([[0.0, 0.0], [100.0, 0.0]]))
+    lowest = points[np.abs(points[:, 1]).argmax(), 1]
+    assert lowest == pytest.approx(-50.0 * bulge, rel=1e-2, abs=1e-9)
+
+
 def test_a_rational_spline_is_kept_exactly(tmp_path: Path) -> None:
     document = new()
     points, weights = [(0, 0, 0), (5, 5, 1), (10, 0, 2), (15, 6, 3), (20, 1, 4)], [1, 2, 1, 3, 1]
