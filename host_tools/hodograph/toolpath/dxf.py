@@ -75,7 +75,9 @@ class _Layer:
 
 @dataclass(frozen=True, slots=True)
 class _Insert:
-    """A copy of a block: the maps from the block to the drawing, one for each place of a grid."""
+    """A copy of a block, which may follow in the file: the maps from the block to the drawing, without its base point,
+    one for each place of a grid.
+    """
 
     block: str
     maps: tuple[Affine, ...]
@@ -260,6 +262,11 @@ class _Reader:
                 self._add_to_block(block, self._entity(tags))
             self._record(tags)
             self._blocks[name] = block
+        for block in self._blocks.values():
+            for insert in block.inserts:
+                if insert.block.lower() not in self._blocks:
+                    text = f'INSERT: block "{insert.block}" is not in the file'
+                    raise tags.error(insert.line, text)
 
     def _add_to_block(self, block: _Block, entity: Entity) -> None:
         with _Place(self._drawing, entity):
@@ -275,12 +282,8 @@ class _Reader:
     def _insert(self, entity: Entity, left_out: list[tuple[str, int]]) -> _Insert:
         left_out += [(part.kind, part.line) for part in entity.parts]
         name = "".join(self._text(tag) for tag in entity.all(2)[:1])
-        block = self._blocks.get(name.lower())
-        if block is None:
-            raise ShapeError(f'block "{name}" is not in the file before this place')
-        x, y, z = (-each for each in block.base)
         scale = [entity.number(code, 1.0) for code in (41, 42, 43)]
-        inner = Affine.scaling(scale[0], scale[1], scale[2]).after(Affine.translation(x, y, z))
+        inner = Affine.scaling(scale[0], scale[1], scale[2])
         outer = entity_system(entity).after(Affine.translation(*entity.point(10)))
         outer = outer.after(Affine.rotation(entity.number(50, 0.0)))
         columns, rows = max(1, entity.integer(70, 1)), max(1, entity.integer(71, 1))
@@ -291,7 +294,7 @@ class _Reader:
             for row in range(rows)
             for column in range(columns)
         )
-        return _Insert(name.lower(), maps, self._style(entity), _handle(entity), entity.line)
+        return _Insert(name, maps, self._style(entity), _handle(entity), entity.line)
 
     # ---- entities
 
@@ -321,7 +324,10 @@ class _Reader:
             elif entity.integer(67, 0):
                 drawing.leave_out("entity of a layout (paper space)", entity.line)
             elif entity.kind == "INSERT":
-                self._copy(self._insert(entity, left_out), self._placement, None, (), 1)
+                insert = self._insert(entity, left_out)
+                if insert.block.lower() not in self._blocks:
+                    raise ShapeError(f'block "{insert.block}" is not in the file')
+                self._copy(insert, self._placement, None, (), 1)
             elif entity.kind not in CURVES:
                 left_out.append((entity.kind, entity.line))
             elif self._begin(self._style(entity), (_handle(entity),), entity.line):
@@ -349,13 +355,14 @@ class _Reader:
         depth: int,
     ) -> None:
         """Draw a copy of a block, and of those in it."""
-        drawing, block = self._drawing, self._blocks[insert.block]
+        drawing, block = self._drawing, self._blocks[insert.block.lower()]
         if depth > _DEEPEST_INSERT:
             raise ShapeError(f'block "{insert.block}" is inside more than {_DEEPEST_INSERT} others')
         style = insert.style.inside(above)
         handles = (*handles, insert.handle)
+        x, y, z = (-each for each in block.base)
         for each in insert.maps:
-            affine = outer.after(each)
+            affine = outer.after(each).after(Affine.translation(x, y, z))
             for what, line in block.left_out:
                 drawing.leave_out(what, line)
             for index in range(len(block.contours)):

@@ -278,6 +278,25 @@ def test_blocks_within_blocks_are_bounded(tmp_path: Path, monkeypatch: pytest.Mo
     assert "copies add more than" in str(refusal_of(tmp_path, grid))
 
 
+def text_with_blocks(blocks: dict[str, str], entities: str, tables: str = "") -> str:
+    body = "".join(f"0 BLOCK 2 {name} 10 1 20 0 {text} 0 ENDBLK " for name, text in blocks.items())
+    sections = f"0 SECTION 2 TABLES {tables} 0 ENDSEC 0 SECTION 2 BLOCKS {body}0 ENDSEC ".split()
+    text = text_of(entities)
+    at = text.index("0\nSECTION\n2\nENTITIES")
+    return text[:at] + "\n".join(sections) + "\n" + text[at:]
+
+
+def test_a_block_may_follow_the_one_that_it_is_inserted_in(tmp_path: Path) -> None:
+    insert = "0 INSERT 2 Later 10 3 20 0"
+    text = text_with_blocks({"First": insert, "LATER": LINE}, "0 INSERT 2 First 10 0 20 0")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text)))
+    assert contour[0][[0, -1], :2] == pytest.approx(np.array([[1.0, 0.0], [4.0, 4.0]]))
+    missing = text_with_blocks({"First": insert}, LINE)
+    assert 'INSERT: block "Later" is not in the file' in str(refusal_of(tmp_path, missing))
+    loop = text_with_blocks({"A": "0 INSERT 2 A 10 0 20 0"}, "0 INSERT 2 A 10 0 20 0")
+    assert 'block "A" is inside more than 32 others' in str(refusal_of(tmp_path, loop))
+
+
 @pytest.mark.parametrize(
     ("text", "message", "line"),
     [
