@@ -151,6 +151,23 @@ def test_copies_are_drawn_where_they_are_used(tmp_path: Path) -> None:
     assert [length_of(contour) for contour in found] == pytest.approx([2.0, 1.0, 1.0, 20.0])
 
 
+def test_a_symbol_has_a_style(tmp_path: Path) -> None:
+    def symbol(attributes: str) -> str:
+        text = f'<symbol id="s" {attributes}><path d="M0 0h1"/></symbol><use href="#s"/>'
+        return svg_page(f"<style>symbol.wide {{ transform: scale(3) }}</style>{text}")
+
+    for attributes in ('style="transform: scale(3)"', 'class="wide"', 'transform="scale(3)"'):
+        (contour,) = contours_of(svg_commands(tmp_path, symbol(attributes)))
+        assert length_of(contour) == pytest.approx(3.0)
+    red = svg_commands(tmp_path, symbol('stroke="red" display="none"'), feeds={"red": 7.0})
+    assert {move.feed.feed_mm_s for move in moves_in(red) if move.feed} == {7.0}
+    assert len(contours_of(svg_commands(tmp_path, symbol(""), ids=["s"]))) == 1
+    assert "no line or curve" in str(refusal_of(tmp_path, symbol('visibility="hidden"')))
+    hidden = '<svg id="s" display="none"><g><path d="M0 0h1"/></g></svg><use href="#s"/>'
+    found = svg_commands(tmp_path, svg_page(f'{hidden}<path d="M0 0h2"/>'))
+    assert [length_of(contour) for contour in contours_of(found)] == pytest.approx([2.0])
+
+
 def test_copies_of_copies_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hodograph.toolpath.drawing.MOST_COPIES", 20_000)  # else it takes seconds
     rows = ['<g id="g0"><path d="M0 0h1"/></g>']
