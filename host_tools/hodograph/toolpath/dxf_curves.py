@@ -257,9 +257,14 @@ def _with_knot(
 def _through_fit_points(entity: Entity) -> Spline | None:
     """The spline that CAD systems draw through fit points; None if they have no length.
 
-    It is cubic, its knots are chord lengths, and its ends have the tangents given, else no curvature.
+    It is cubic, its knots are chord lengths, and its ends have the tangents given, else no curvature. A closed one
+    returns to its first point, with the direction and the curvature that it has there.
     """
     points = np.array(entity.points(11)).reshape(-1, 3)
+    is_closed = bool(entity.integer(70, 0) & 1) and len(points) > 1
+    if is_closed:
+        is_there = np.abs(points[-1] - points[0]).max() <= 1e-9 * np.ptp(points, axis=0).max()
+        points = np.concatenate([points[:-1] if is_there else points, points[:1]])
     if len(points):
         points = points[np.append(True, (points[1:] != points[:-1]).any(axis=1))]
     if len(points) < 2:
@@ -269,7 +274,11 @@ def _through_fit_points(entity: Entity) -> Spline | None:
     if not (whole < 1e12 and (np.diff(lengths) > 1e-12 * whole).all()):
         raise ShapeError("fit points too near to each other, or too far apart")
     ends: Any = tuple(_end_condition(entity, code, whole) for code in (12, 13))
+    if is_closed and not (entity.all(12) or entity.all(13)):
+        ends = "periodic"
     found = make_interp_spline(lengths / whole, points, k=3, bc_type=ends)
+    if is_closed:
+        return clamped(Spline(found.c, np.ones(len(found.c)), found.t, 3))
     return Spline(found.c, np.ones(len(found.c)), found.t, 3)
 
 

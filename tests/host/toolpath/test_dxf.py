@@ -192,6 +192,23 @@ def test_a_spline_through_fit_points_is_that_of_cad(tmp_path: Path, tangents: An
     )
 
 
+@pytest.mark.parametrize("again", ["", " 11 1e-13 21 0"])
+def test_a_closed_spline_through_fit_points_is_smooth_everywhere(
+    tmp_path: Path, again: str
+) -> None:
+    square = "11 0 21 0 11 10 21 0 11 10 21 10 11 0 21 10"
+    text = text_of(f"0 SPLINE 8 0 70 1 71 3 {square}{again}")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text)))
+    (points,) = contour
+    assert points[0] == pytest.approx(points[-1], abs=1e-9)
+    for corner in ((0, 0), (10, 0), (10, 10), (0, 10)):
+        assert np.hypot(*(points[:, :2] - corner).T).min() < 0.2
+    # It has the symmetry of the square.
+    radii = np.hypot(*(points[:, :2] - 5.0).T)
+    assert radii.max() - radii.min() < 0.2
+    assert np.ptp(points[:, 0]) == pytest.approx(np.ptp(points[:, 1]), abs=1e-2)
+
+
 def test_layers_colours_and_blocks_choose_feeds(tmp_path: Path) -> None:
     document = new()
     document.layers.add("Cut", color=1)
