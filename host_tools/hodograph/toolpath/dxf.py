@@ -65,12 +65,15 @@ class _Style(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """A layer of the table. Its name as it is spelled there, colour, and whether it is on."""
+    """A layer of the table. Its name as it is spelled there, colour, whether it is on, and whether it hides blocks that
+    are inserted on it.
+    """
 
     name: str
     colour: int
     rgb: str
     is_hidden: bool
+    is_frozen: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,9 +222,10 @@ class _Reader:
     def _add_layer(self, record: Entity) -> None:
         name = "".join(self._text(tag) for tag in record.all(2)[:1])
         colour = record.integer(62, _WHITE)
-        is_hidden = colour < 0 or bool(record.integer(70, 0) & 1) or name.lower() == "defpoints"
+        is_frozen = bool(record.integer(70, 0) & 1)
+        is_hidden = colour < 0 or is_frozen or name.lower() == "defpoints"
         is_hidden = is_hidden or record.integer(290, 1) == 0
-        self._layers[name.lower()] = _Layer(name, abs(colour), _rgb(record), is_hidden)
+        self._layers[name.lower()] = _Layer(name, abs(colour), _rgb(record), is_hidden, is_frozen)
 
     def _style(self, entity: Entity) -> _Style:
         layer = "".join(self._text(tag) for tag in entity.all(8)[:1]) or "0"
@@ -359,6 +363,10 @@ class _Reader:
         if depth > _DEEPEST_INSERT:
             raise ShapeError(f'block "{insert.block}" is inside more than {_DEEPEST_INSERT} others')
         style = insert.style.inside(above)
+        layer = self._layers.get(style.layer.lower())
+        if layer is not None and layer.is_frozen:
+            drawing.leave_out(f'block on the frozen layer "{layer.name}"', insert.line)
+            return
         handles = (*handles, insert.handle)
         x, y, z = (-each for each in block.base)
         for each in insert.maps:

@@ -266,6 +266,23 @@ def test_hidden_layers_layouts_and_text_are_named(tmp_path: Path) -> None:
         commands_of(tmp_path, document, strict=True)
 
 
+def test_a_frozen_layer_hides_blocks_with_all_of_their_layers(tmp_path: Path) -> None:
+    document = new()
+    document.layers.add("Frozen").freeze()
+    document.layers.add("Off").off()
+    document.layers.add("Cut")
+    document.blocks.new("Inner").add_line((0, 0), (1, 0), dxfattribs={"layer": "Cut"})
+    block = document.blocks.new("B")
+    block.add_line((0, 0), (2, 0), dxfattribs={"layer": "Cut"})
+    block.add_line((0, 0), (4, 0))
+    block.add_blockref("Inner", (0, 0), dxfattribs={"layer": "Frozen"})
+    for layer in ("Off", "Frozen"):
+        document.modelspace().add_blockref("B", (0, 0), dxfattribs={"layer": layer})
+    found = commands_of(tmp_path, document)
+    assert sum(map(length_of, contours_of(found))) == pytest.approx(2.0)
+    assert 'block on the frozen layer "Frozen", 2 times' in "; ".join(messages_in(found))
+
+
 def test_entities_are_chosen_by_handle(tmp_path: Path) -> None:
     document = new()
     lines = [document.modelspace().add_line((0, k), (k, k)) for k in (1, 2, 4)]
