@@ -266,8 +266,12 @@ class _Reader:
             text = given.get(name, "")
             sizes.append(whole if is_relative(text) else length_px(text, 0.0))
         width, height = sizes
-        if all(is_relative(given.get(name, "")) for name in ("width", "height")):
+        is_open = [is_relative(given.get(name, "")) for name in ("width", "height")]
+        if all(is_open):
             self._drawing.assume_unit(element.line)
+        elif box is not None and any(is_open):  # the page has the shape of its viewBox
+            ratio = box[2] / box[3]
+            width, height = (height * ratio, height) if is_open[0] else (width, width / ratio)
         if box is not None and (self._options.unit_mm is not None):
             width, height = box[2], box[3]
         if width < 0 or height < 0 or (box is not None and not (width and height)):

@@ -59,6 +59,10 @@ def test_a_line_is_a_rapid_move_and_a_move_at_feed(tmp_path: Path) -> None:
         ('viewBox="0 0 960 480"', 25.4 / 96),
         ('width="100%" height="100%" viewBox="0 0 960 480"', 25.4 / 96),
         ('width="72pt" height="6pc"', 25.4 / 96),
+        ('width="200mm" viewBox="0 0 100 50"', 2.0),
+        ('height="100mm" viewBox="0 0 100 50"', 2.0),
+        ('width="200mm" height="auto" viewBox="0 0 100 50"', 2.0),
+        ('width="100%" height="100mm" viewBox="0 0 100 50" preserveAspectRatio="none"', 2.0),
     ],
 )
 def test_units(tmp_path: Path, head: str, size: float) -> None:
