@@ -122,6 +122,12 @@ def test_an_ellipse_is_exact(tmp_path: Path) -> None:
     assert np.hypot(x / 20.0, y / 3.0) == pytest.approx(np.ones(len(x)), abs=1e-13)
 
 
+def test_no_transform(tmp_path: Path) -> None:
+    body = '<g transform="none"><path style="transform: none" d="M1 1h3"/></g>'
+    (contour,) = contours_of(svg_commands(tmp_path, svg_page(body)))
+    assert length_of(contour) == pytest.approx(3.0)
+
+
 def test_repeated_and_mirrored_commands(tmp_path: Path) -> None:
     short = "M0 0 1 1 2 0 m1 0 1 1 c1 0 2 1 2 2s1 2 2 2S9 9 9 8Q1 2 3 4T5 6t1 1h1v1H9V9z"
     long = "M0 0L1 1L2 0M3 0L4 1C5 1 6 2 6 3C6 4 7 5 8 5C9 5 9 9 9 8Q1 2 3 4Q5 6 5 6Q5 6 6 7L7 7L7 8L9 8L9 9Z"
