@@ -27,6 +27,21 @@ from .moves import Command
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST_INSERT = 32
 
+_SURVEY_FOOT_MM = 1.2e6 / 3937.0
+_INCH_UNITS_MM = {
+    1: 25.4,
+    2: 304.8,
+    3: 1_609_344.0,
+    8: 25.4e-6,
+    9: 25.4e-3,
+    10: 914.4,
+    21: _SURVEY_FOOT_MM,
+    22: _SURVEY_FOOT_MM / 12.0,
+    23: 3.0 * _SURVEY_FOOT_MM,
+    24: 5280.0 * _SURVEY_FOOT_MM,
+}
+"""Units by inches, feet, yards and miles, by their number in $INSUNITS. ezdxf has not all of them, and rounds them."""
+
 _BY_BLOCK, _BY_LAYER = 0, 256
 _WHITE = 7
 
@@ -315,6 +330,8 @@ class _Reader:
         if not 1 <= self._units <= max(enums.InsertUnits):
             text = "the drawing does not say its unit ($INSUNITS): give it, as by --unit mm"
             raise InputError(f"{self._file}: {text}")
+        if self._units in _INCH_UNITS_MM:
+            return _INCH_UNITS_MM[self._units]
         return float(
             units.conversion_factor(enums.InsertUnits(self._units), enums.InsertUnits.Millimeters)
         )

@@ -69,6 +69,16 @@ def refusal_of(folder: Path, text: str | bytes, **options: Any) -> ToolpathError
     return refusal.value
 
 
+@pytest.mark.parametrize(
+    ("units", "size"),
+    [(3, 1609344.0), (8, 2.54e-5), (9, 0.0254), (21, 304.800609601219), (24, 1609347.21869444)],
+)
+def test_units_that_ezdxf_does_not_convert(tmp_path: Path, units: int, size: float) -> None:
+    line = text_of("0 LINE 10 0 20 0 11 400 21 0", header=f"9\n$INSUNITS\n70\n{units}\n")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, line), gap_mm=0.0))
+    assert length_of(contour) == pytest.approx(400 * size, rel=1e-12)
+
+
 def test_a_line(tmp_path: Path) -> None:
     found = moves_in(dxf_commands(write(tmp_path, text_of("0 LINE 8 0 10 1 20 2 30 3 11 4 21 5"))))
     assert [(move.end[:3], move.line) for move in found] == [
