@@ -21,7 +21,7 @@ from .dxf_tags import Entity, ezdxf_module, number_of
 _MOST_DEGREE = 15
 
 _ROUNDED_TURN = 1e-4
-"""By how many rad a whole ellipse may seem longer than a turn: programs write 2π as 6.28319 or 6.2832."""
+"""By how many rad a whole circle or ellipse may seem longer than a turn: programs write 2π as 6.28319 or 6.2832."""
 
 
 def entity_system(entity: Entity) -> Affine:
@@ -50,7 +50,9 @@ def _circle(entity: Entity, contours: Contours) -> None:
     start, sweep_deg = 0.0, 360.0
     if entity.kind == "ARC":
         start = entity.number(50)
-        sweep_deg = (entity.number(51) - start) % 360.0 or 360.0
+        sweep_deg = entity.number(51) - start
+        is_whole = 0.0 < sweep_deg - 360.0 < math.degrees(_ROUNDED_TURN)
+        sweep_deg = 360.0 if is_whole else sweep_deg % 360.0 or 360.0
     first, last = (
         Affine.rotation(angle % 360.0).direction((radius, 0.0, 0.0))
         for angle in (start, start + sweep_deg)

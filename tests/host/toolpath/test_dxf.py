@@ -130,6 +130,13 @@ def test_an_ellipse_over_a_rounded_turn_is_whole(tmp_path: Path, turn: str) -> N
     assert length_of(contour) == pytest.approx(48.4422, abs=0.02)
 
 
+def test_an_arc_over_a_rounded_turn_is_whole(tmp_path: Path) -> None:
+    for begin, end in ((0.0, 360.00000000000006), (0.1 + 0.2, 0.3 + 360.000001)):
+        arc = f"0 ARC 10 0 20 0 40 10 50 {begin} 51 {end}"
+        (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(arc))))
+        assert length_of(contour) == pytest.approx(20.0 * math.pi, abs=0.02)
+
+
 def test_bulges_are_arcs(tmp_path: Path) -> None:
     document = new()
     document.modelspace().add_lwpolyline(
