@@ -312,6 +312,16 @@ class Contours:
             self._ends = np.stack([triples[first], triples[last]], axis=1)
         return self._ends
 
+    def highest(self) -> float:
+        """The greatest z of all points and control points; curves are nowhere higher."""
+        triples = np.frombuffer(self._triples, dtype=np.float64).reshape(-1, 3)
+        kinds = np.frombuffer(self._kinds, dtype=np.uint8)
+        is_point = np.full(len(triples), True)
+        ends = np.cumsum(np.array(_TRIPLES)[kinds]) - 1
+        is_point[ends[kinds == ARC] - 1] = False  # centres
+        heights = [float(spline.points[:, 2].max()) for spline in self._splines]
+        return max([float(triples[is_point, 2].max()), *heights])
+
     def corners(self, index: int) -> NDArray[np.float64]:
         """The starts of the steps of a contour, shape (steps, 3)."""
         places = self._triple_places(index)

@@ -226,6 +226,20 @@ def test_a_closed_spline_through_fit_points_is_smooth_everywhere(
     assert np.ptp(points[:, 0]) == pytest.approx(np.ptp(points[:, 1]), abs=1e-2)
 
 
+def test_rapid_moves_are_lifted_above_the_middle_of_contours(tmp_path: Path) -> None:
+    document = new()
+    space = document.modelspace()
+    space.add_circle((0, 0, -9), 1)  # an arc has its direction where points have z
+    space.add_line((5, 0, -9), (6, 0, -9))
+    assert max(move.end[2] for move in moves_in(commands_of(tmp_path, document, lift_mm=2.0))) == -7
+    space.add_polyline3d([(0, 5, 0), (5, 5, 10), (9, 5, 0)])
+    found = moves_in(commands_of(tmp_path, document, lift_mm=2.0))
+    assert max(move.end[2] for move in found if move.feed is None) == 12.0
+    space.add_open_spline([(0, 7, 0), (1, 7, 30), (2, 7, 30), (3, 7, 0)])
+    found = moves_in(commands_of(tmp_path, document, lift_mm=2.0))
+    assert max(move.end[2] for move in found if move.feed is None) == 32.0
+
+
 def test_layers_colours_and_blocks_choose_feeds(tmp_path: Path) -> None:
     document = new()
     document.layers.add("Cut", color=1)
