@@ -202,8 +202,7 @@ class EventMaker:
         for command in commands:
             for channel, event in self._events(place_q40, command):
                 found.pop(channel.name, None)
-                found[channel.name] = event
-        self.last |= found
+                found[channel.name] = self.last[channel.name] = event
         return list(found.values())
 
     def _events(self, place_q40: int, command: Command) -> list[tuple[Channel, Event]]:

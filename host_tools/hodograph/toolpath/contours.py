@@ -26,7 +26,7 @@ Point = tuple[float, float, float]
 MOST_MM = 1e9
 """Greatest coordinate of a drawing."""
 
-_FLAT_MM = 1e-9
+FLAT_MM = 1e-9
 """An arc that is nowhere farther from its chord is a line."""
 
 _ROUND = 1e-9
@@ -205,7 +205,7 @@ class Contours:
         u, v = (self.affine.direction(axis) for axis in axes)
         stop = self.pen if end is None else self._mapped(end)
         size = max(math.hypot(*u), math.hypot(*v))
-        if 2.0 * size * math.sin(min(abs(sweep), math.tau) / 4) ** 2 < _FLAT_MM or (
+        if 2.0 * size * math.sin(min(abs(sweep), math.tau) / 4) ** 2 < FLAT_MM or (
             stop == self.pen and end is not None and abs(sweep) < math.pi
         ):
             return self._line_to(stop, line)
@@ -311,6 +311,16 @@ class Contours:
             last = np.append(first[1:], len(triples)) - 1
             self._ends = np.stack([triples[first], triples[last]], axis=1)
         return self._ends
+
+    def highest(self) -> float:
+        """The greatest z of all points and control points; curves are nowhere higher."""
+        triples = np.frombuffer(self._triples, dtype=np.float64).reshape(-1, 3)
+        kinds = np.frombuffer(self._kinds, dtype=np.uint8)
+        is_point = np.full(len(triples), True)
+        ends = np.cumsum(np.array(_TRIPLES)[kinds]) - 1
+        is_point[ends[kinds == ARC] - 1] = False  # centres
+        heights = [float(spline.points[:, 2].max()) for spline in self._splines]
+        return max([float(triples[is_point, 2].max()), *heights])
 
     def corners(self, index: int) -> NDArray[np.float64]:
         """The starts of the steps of a contour, shape (steps, 3)."""

@@ -292,7 +292,7 @@ class Drawing:
         self, visits: Sequence[Visit], feeds: Sequence[Feed], here: Point
     ) -> Iterator[Command]:
         others = self.options.start[3:]
-        up = self._height() + self.options.lift_mm
+        up = self.contours.highest() + self.options.lift_mm
         for visit in visits:
             feed = feeds[self.contours.group_of(visit.chain.pieces[0][0])]
             for number, step in enumerate(steps_of(self.contours, visit)):
@@ -302,9 +302,6 @@ class Drawing:
                 here = step.end
         if self.options.lift_mm and here[2] != up:
             yield StraightMove(self.last_line, _position((here[0], here[1], up), others), None)
-
-    def _height(self) -> float:
-        return float(self.contours.ends()[:, :, 2].max())
 
     def _approach(self, here: Point, step: Step, up: float, feed: Feed) -> Iterator[Command]:
         """From `here` to the start of a step: rapid, with a lift up, over and down at the feed."""

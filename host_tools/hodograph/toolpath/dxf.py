@@ -27,6 +27,21 @@ from .moves import Command
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST_INSERT = 32
 
+_SURVEY_FOOT_MM = 1.2e6 / 3937.0
+_INCH_UNITS_MM = {
+    1: 25.4,
+    2: 304.8,
+    3: 1_609_344.0,
+    8: 25.4e-6,
+    9: 25.4e-3,
+    10: 914.4,
+    21: _SURVEY_FOOT_MM,
+    22: _SURVEY_FOOT_MM / 12.0,
+    23: 3.0 * _SURVEY_FOOT_MM,
+    24: 5280.0 * _SURVEY_FOOT_MM,
+}
+"""Units by inches, feet, yards and miles, by their number in $INSUNITS. ezdxf has not all of them, and rounds them."""
+
 _BY_BLOCK, _BY_LAYER = 0, 256
 _WHITE = 7
 
@@ -65,17 +80,22 @@ class _Style(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Layer:
-    """A layer of the table. Its name as it is spelled there, colour, and whether it is on."""
+    """A layer of the table. Its name as it is spelled there, colour, whether it is on, and whether it hides blocks that
+    are inserted on it.
+    """
 
     name: str
     colour: int
     rgb: str
     is_hidden: bool
+    is_frozen: bool
 
 
 @dataclass(frozen=True, slots=True)
 class _Insert:
-    """A copy of a block: the maps from the block to the drawing, one for each place of a grid."""
+    """A copy of a block, which may follow in the file: the maps from the block to the drawing, without its base point,
+    one for each place of a grid.
+    """
 
     block: str
     maps: tuple[Affine, ...]
@@ -217,9 +237,10 @@ class _Reader:
     def _add_layer(self, record: Entity) -> None:
         name = "".join(self._text(tag) for tag in record.all(2)[:1])
         colour = record.integer(62, _WHITE)
-        is_hidden = colour < 0 or bool(record.integer(70, 0) & 1) or name.lower() == "defpoints"
+        is_frozen = bool(record.integer(70, 0) & 1)
+        is_hidden = colour < 0 or is_frozen or name.lower() == "defpoints"
         is_hidden = is_hidden or record.integer(290, 1) == 0
-        self._layers[name.lower()] = _Layer(name, abs(colour), _rgb(record), is_hidden)
+        self._layers[name.lower()] = _Layer(name, abs(colour), _rgb(record), is_hidden, is_frozen)
 
     def _style(self, entity: Entity) -> _Style:
         layer = "".join(self._text(tag) for tag in entity.all(8)[:1]) or "0"
@@ -260,6 +281,11 @@ class _Reader:
                 self._add_to_block(block, self._entity(tags))
             self._record(tags)
             self._blocks[name] = block
+        for block in self._blocks.values():
+            for insert in block.inserts:
+                if insert.block.lower() not in self._blocks:
+                    text = f'INSERT: block "{insert.block}" is not in the file'
+                    raise tags.error(insert.line, text)
 
     def _add_to_block(self, block: _Block, entity: Entity) -> None:
         with _Place(self._drawing, entity):
@@ -275,12 +301,8 @@ class _Reader:
     def _insert(self, entity: Entity, left_out: list[tuple[str, int]]) -> _Insert:
         left_out += [(part.kind, part.line) for part in entity.parts]
         name = "".join(self._text(tag) for tag in entity.all(2)[:1])
-        block = self._blocks.get(name.lower())
-        if block is None:
-            raise ShapeError(f'block "{name}" is not in the file before this place')
-        x, y, z = (-each for each in block.base)
         scale = [entity.number(code, 1.0) for code in (41, 42, 43)]
-        inner = Affine.scaling(scale[0], scale[1], scale[2]).after(Affine.translation(x, y, z))
+        inner = Affine.scaling(scale[0], scale[1], scale[2])
         outer = entity_system(entity).after(Affine.translation(*entity.point(10)))
         outer = outer.after(Affine.rotation(entity.number(50, 0.0)))
         columns, rows = max(1, entity.integer(70, 1)), max(1, entity.integer(71, 1))
@@ -291,7 +313,7 @@ class _Reader:
             for row in range(rows)
             for column in range(columns)
         )
-        return _Insert(name.lower(), maps, self._style(entity), _handle(entity), entity.line)
+        return _Insert(name, maps, self._style(entity), _handle(entity), entity.line)
 
     # ---- entities
 
@@ -308,6 +330,8 @@ class _Reader:
         if not 1 <= self._units <= max(enums.InsertUnits):
             text = "the drawing does not say its unit ($INSUNITS): give it, as by --unit mm"
             raise InputError(f"{self._file}: {text}")
+        if self._units in _INCH_UNITS_MM:
+            return _INCH_UNITS_MM[self._units]
         return float(
             units.conversion_factor(enums.InsertUnits(self._units), enums.InsertUnits.Millimeters)
         )
@@ -321,7 +345,10 @@ class _Reader:
             elif entity.integer(67, 0):
                 drawing.leave_out("entity of a layout (paper space)", entity.line)
             elif entity.kind == "INSERT":
-                self._copy(self._insert(entity, left_out), self._placement, None, (), 1)
+                insert = self._insert(entity, left_out)
+                if insert.block.lower() not in self._blocks:
+                    raise ShapeError(f'block "{insert.block}" is not in the file')
+                self._copy(insert, self._placement, None, (), 1)
             elif entity.kind not in CURVES:
                 left_out.append((entity.kind, entity.line))
             elif self._begin(self._style(entity), (_handle(entity),), entity.line):
@@ -349,13 +376,18 @@ class _Reader:
         depth: int,
     ) -> None:
         """Draw a copy of a block, and of those in it."""
-        drawing, block = self._drawing, self._blocks[insert.block]
+        drawing, block = self._drawing, self._blocks[insert.block.lower()]
         if depth > _DEEPEST_INSERT:
             raise ShapeError(f'block "{insert.block}" is inside more than {_DEEPEST_INSERT} others')
         style = insert.style.inside(above)
+        layer = self._layers.get(style.layer.lower())
+        if layer is not None and layer.is_frozen:
+            drawing.leave_out(f'block on the frozen layer "{layer.name}"', insert.line)
+            return
         handles = (*handles, insert.handle)
+        x, y, z = (-each for each in block.base)
         for each in insert.maps:
-            affine = outer.after(each)
+            affine = outer.after(each).after(Affine.translation(x, y, z))
             for what, line in block.left_out:
                 drawing.leave_out(what, line)
             for index in range(len(block.contours)):

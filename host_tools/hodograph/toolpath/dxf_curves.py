@@ -15,10 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
-from .contours import Affine, Contours, Point, ShapeError, Spline
+from .contours import FLAT_MM, MOST_MM, Affine, Contours, Point, ShapeError, Spline
 from .dxf_tags import Entity, ezdxf_module, number_of
 
 _MOST_DEGREE = 15
+
+_ROUNDED_TURN = 1e-4
+"""By how many rad a whole circle or ellipse may seem longer than a turn: programs write 2π as 6.28319 or 6.2832."""
 
 
 def entity_system(entity: Entity) -> Affine:
@@ -47,7 +50,9 @@ def _circle(entity: Entity, contours: Contours) -> None:
     start, sweep_deg = 0.0, 360.0
     if entity.kind == "ARC":
         start = entity.number(50)
-        sweep_deg = (entity.number(51) - start) % 360.0 or 360.0
+        sweep_deg = entity.number(51) - start
+        is_whole = 0.0 < sweep_deg - 360.0 < math.degrees(_ROUNDED_TURN)
+        sweep_deg = 360.0 if is_whole else sweep_deg % 360.0 or 360.0
     first, last = (
         Affine.rotation(angle % 360.0).direction((radius, 0.0, 0.0))
         for angle in (start, start + sweep_deg)
@@ -67,6 +72,7 @@ def _ellipse(entity: Entity, contours: Contours) -> None:
     start = entity.number(41, 0.0) % math.tau
     sweep = entity.number(42, math.tau) - entity.number(41, 0.0)
     is_whole = abs(abs(sweep) - math.tau) < 1e-9 or not sweep
+    is_whole = is_whole or math.tau < sweep < math.tau + _ROUNDED_TURN
     sweep = math.tau if is_whole else sweep % math.tau
     axes = (major, (float(minor[0]), float(minor[1]), float(minor[2])))
 
@@ -136,12 +142,35 @@ def _polyline_through(
         if bulge == 0.0 or start == end:
             contours.line_to(end, line)
             continue
+        if _is_slight(contours, start, end, bulge):
+            _slight_arc(contours, start, end, bulge, line)
+            continue
         dx, dy, away = end[0] - start[0], end[1] - start[1], (1.0 / bulge - bulge) / 4.0
         x = (start[0] + end[0]) / 2.0 - away * dy
         y = (start[1] + end[1]) / 2.0 + away * dx
         u = (start[0] - x, start[1] - y, 0.0)
         axes = (u, (-u[1], u[0], 0.0))
         contours.ellipse_to((x, y, start[2]), axes, 0.0, 4.0 * math.atan(bulge), end, line)
+
+
+def _is_slight(contours: Contours, start: Point, end: Point, bulge: float) -> bool:
+    """Whether an arc is so nearly straight that its centre may be too far away."""
+    chord = contours.affine.direction((end[0] - start[0], end[1] - start[1], 0.0))
+    return abs(bulge) < 1e-3 and math.hypot(*chord) > abs(bulge) * MOST_MM / 10.0
+
+
+def _slight_arc(contours: Contours, start: Point, end: Point, bulge: float, line: int) -> None:
+    """The arc as a rational spline, which needs no centre; a line if it is nowhere farther from it."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    if math.hypot(*contours.affine.direction((dx, dy, 0.0))) * abs(bulge) / 2.0 < FLAT_MM:
+        contours.line_to(end, line)
+        return
+    height = bulge / (1.0 - bulge * bulge)  # of the tangents' intersection, as a share of the chord
+    tip = ((start[0] + end[0]) / 2 + height * dy, (start[1] + end[1]) / 2 - height * dx, start[2])
+    weights = np.array([1.0, math.cos(2.0 * math.atan(bulge)), 1.0])
+    contours.spline_to(
+        Spline(np.array([start, tip, end]), weights, np.repeat([0.0, 1.0], 3), 2), line
+    )
 
 
 def _spline(entity: Entity, contours: Contours) -> None:
@@ -230,9 +259,14 @@ def _with_knot(
 def _through_fit_points(entity: Entity) -> Spline | None:
     """The spline that CAD systems draw through fit points; None if they have no length.
 
-    It is cubic, its knots are chord lengths, and its ends have the tangents given, else no curvature.
+    It is cubic, its knots are chord lengths, and its ends have the tangents given, else no curvature. A closed one
+    returns to its first point, with the direction and the curvature that it has there.
     """
     points = np.array(entity.points(11)).reshape(-1, 3)
+    is_closed = bool(entity.integer(70, 0) & 1) and len(points) > 1
+    if is_closed:
+        is_there = np.abs(points[-1] - points[0]).max() <= 1e-9 * np.ptp(points, axis=0).max()
+        points = np.concatenate([points[:-1] if is_there else points, points[:1]])
     if len(points):
         points = points[np.append(True, (points[1:] != points[:-1]).any(axis=1))]
     if len(points) < 2:
@@ -242,7 +276,11 @@ def _through_fit_points(entity: Entity) -> Spline | None:
     if not (whole < 1e12 and (np.diff(lengths) > 1e-12 * whole).all()):
         raise ShapeError("fit points too near to each other, or too far apart")
     ends: Any = tuple(_end_condition(entity, code, whole) for code in (12, 13))
+    if is_closed and not (entity.all(12) or entity.all(13)):
+        ends = "periodic"
     found = make_interp_spline(lengths / whole, points, k=3, bc_type=ends)
+    if is_closed:
+        return clamped(Spline(found.c, np.ones(len(found.c)), found.t, 3))
     return Spline(found.c, np.ones(len(found.c)), found.t, 3)
 
 

@@ -179,7 +179,7 @@ class _Reader:
         for number, position, given in self._rows(lines):
             if feed is None or (given is not None and given != speed):
                 speed = given if given is not None else speed
-                feed = Feed(FeedMode.PER_MINUTE, feed_mm_s=speed or 0.0)
+                feed = Feed(FeedMode.PER_MINUTE, feed_mm_s=speed or 0.0, feed_deg_s=speed or 0.0)
             if first is None:
                 first = position
                 if position != here:

@@ -202,7 +202,7 @@ class _Reader:
 
     def _begin_drawn(self, name: str, element: _Element) -> bool:
         style = self._style(name, element)
-        if style.get("display") == "none":
+        if style.get("display") == "none" and name != "symbol":
             self._drawing.leave_out("hidden element", element.line, element.column)
             return False
         for what in ("clip-path", "mask"):
@@ -234,8 +234,8 @@ class _Reader:
         if self._states:
             affine = state.affine.after(transform(style.get("transform", "")))
             state = replace(state, affine=affine, depth=state.depth + 1)
-            if name == "svg":
-                state = self._viewport(state, element, given)
+            if name in ("svg", "symbol"):
+                state = self._viewport(state, given)
         layer = state.layer
         if given.get(f"{_INKSCAPE} groupmode") == "layer":
             layer = given.get(f"{_INKSCAPE} label", given.get("id", ""))
@@ -266,8 +266,12 @@ class _Reader:
             text = given.get(name, "")
             sizes.append(whole if is_relative(text) else length_px(text, 0.0))
         width, height = sizes
-        if all(is_relative(given.get(name, "")) for name in ("width", "height")):
+        is_open = [is_relative(given.get(name, "")) for name in ("width", "height")]
+        if all(is_open):
             self._drawing.assume_unit(element.line)
+        elif box is not None and any(is_open):  # the page has the shape of its viewBox
+            ratio = box[2] / box[3]
+            width, height = (height * ratio, height) if is_open[0] else (width, width / ratio)
         if box is not None and (self._options.unit_mm is not None):
             width, height = box[2], box[3]
         if width < 0 or height < 0 or (box is not None and not (width and height)):
@@ -280,19 +284,19 @@ class _Reader:
         affine = self._drawing.placement(PX_MM).after(flip.after(inner))
         return _State(affine, *(box[2:] if box else (width, height)))
 
-    def _viewport(self, state: _State, element: _Element, given: Mapping[str, str]) -> _State:
-        """The state inside of a nested `svg`, or of a `symbol` that is used; `given` may have another size."""
+    def _viewport(self, state: _State, given: Mapping[str, str]) -> _State:
+        """The state inside of a nested `svg`, or of a `symbol` that is used, with these attributes."""
         width = length_px(given.get("width", "100%").replace("auto", "100%"), state.width)
         height = length_px(given.get("height", "100%").replace("auto", "100%"), state.height)
-        x = length_px(element.attributes.get("x", "0"), state.width)
-        y = length_px(element.attributes.get("y", "0"), state.height)
+        x = length_px(given.get("x", "0"), state.width)
+        y = length_px(given.get("y", "0"), state.height)
         affine = state.affine.after(Affine.translation(x, y))
-        if "viewBox" not in element.attributes:
+        if "viewBox" not in given:
             return replace(state, affine=affine, width=width, height=height)
-        box = view_box(element.attributes["viewBox"])
+        box = view_box(given["viewBox"])
         if not (box[2] and box[3] and width > 0 and height > 0):
             raise ShapeError("a viewport without width or height")
-        fitted = fit_box(box, width, height, element.attributes.get("preserveAspectRatio", ""))
+        fitted = fit_box(box, width, height, given.get("preserveAspectRatio", ""))
         return replace(state, affine=affine.after(fitted), width=box[2], height=box[3])
 
     # ---- copies
@@ -319,7 +323,8 @@ class _Reader:
         root = copied[0]
         if root.name in ("symbol", "svg"):
             sizes = {name: given[name] for name in ("width", "height") if name in given}
-            self._begin_viewport(root, {**root.attributes, **sizes})
+            root = replace(root, attributes={**root.attributes, **sizes})
+            self._skipped += not self._begin_drawn(root.name or "", root)
             copied = copied[1:]
         for each in copied:
             self._drawing.count_copies(0, element.line, element.column)
@@ -328,13 +333,6 @@ class _Reader:
             else:
                 self._start(each)
         self._uses -= 1
-
-    def _begin_viewport(self, root: _Element, given: Mapping[str, str]) -> None:
-        state = self._states[-1]
-        styled = replace(
-            state, affine=state.affine.after(transform(root.attributes.get("transform", "")))
-        )
-        self._states.append(self._viewport(styled, root, given))
 
     # ---- shapes
 

@@ -78,6 +78,8 @@ def _after_separator(text: str, at: int) -> int:
 def transform(text: str) -> Affine:
     """The transformation of the attribute `transform`."""
     whole = Affine()
+    if text.strip() == "none":
+        return whole
     at = _after_separator(text, 0)
     while at < len(text):
         found = _FUNCTION.match(text, at)

@@ -69,6 +69,16 @@ def refusal_of(folder: Path, text: str | bytes, **options: Any) -> ToolpathError
     return refusal.value
 
 
+@pytest.mark.parametrize(
+    ("units", "size"),
+    [(3, 1609344.0), (8, 2.54e-5), (9, 0.0254), (21, 304.800609601219), (24, 1609347.21869444)],
+)
+def test_units_that_ezdxf_does_not_convert(tmp_path: Path, units: int, size: float) -> None:
+    line = text_of("0 LINE 10 0 20 0 11 400 21 0", header=f"9\n$INSUNITS\n70\n{units}\n")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, line), gap_mm=0.0))
+    assert length_of(contour) == pytest.approx(400 * size, rel=1e-12)
+
+
 def test_a_line(tmp_path: Path) -> None:
     found = moves_in(dxf_commands(write(tmp_path, text_of("0 LINE 8 0 10 1 20 2 30 3 11 4 21 5"))))
     assert [(move.end[:3], move.line) for move in found] == [
@@ -113,6 +123,20 @@ def test_arcs_and_circles_are_arcs(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("turn", ["6.283185307179586", "6.283186", "6.28319", "6.2832"])
+def test_an_ellipse_over_a_rounded_turn_is_whole(tmp_path: Path, turn: str) -> None:
+    ellipse = f"0 ELLIPSE 8 0 10 0 20 0 11 10 21 0 40 0.5 41 0 42 {turn}"
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(ellipse))))
+    assert length_of(contour) == pytest.approx(48.4422, abs=0.02)
+
+
+def test_an_arc_over_a_rounded_turn_is_whole(tmp_path: Path) -> None:
+    for begin, end in ((0.0, 360.00000000000006), (0.1 + 0.2, 0.3 + 360.000001)):
+        arc = f"0 ARC 10 0 20 0 40 10 50 {begin} 51 {end}"
+        (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(arc))))
+        assert length_of(contour) == pytest.approx(20.0 * math.pi, abs=0.02)
+
+
 def test_bulges_are_arcs(tmp_path: Path) -> None:
     document = new()
     document.modelspace().add_lwpolyline(
@@ -125,6 +149,16 @@ def test_bulges_are_arcs(tmp_path: Path) -> None:
     assert (found[1].centre, found[1].turns) == (pytest.approx((15.0, -5.0)), -1)
     assert isinstance(found[2], StraightMove)
     assert found[2].end[:2] == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("bulge", [1e-300, 1e-14, -1e-9, 1e-8, -1e-7, 1e-6, 1e-4])
+def test_slight_bulges_are_drawn(tmp_path: Path, bulge: float) -> None:
+    line = f"0 LWPOLYLINE 8 0 90 2 70 0 10 0 20 0 42 {bulge:g} 10 100 20 0"
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text_of(line))))
+    (points,) = contour
+    assert points[[0, -1], :2] == pytest.approx(np.array([[0.0, 0.0], [100.0, 0.0]]))
+    lowest = points[np.abs(points[:, 1]).argmax(), 1]
+    assert lowest == pytest.approx(-50.0 * bulge, rel=1e-2, abs=1e-9)
 
 
 def test_a_rational_spline_is_kept_exactly(tmp_path: Path) -> None:
@@ -173,6 +207,37 @@ def test_a_spline_through_fit_points_is_that_of_cad(tmp_path: Path, tangents: An
     assert [point[:3] for point in move.points] == pytest.approx(
         [pytest.approx(point.xyz, abs=1e-9) for point in expected.control_points]
     )
+
+
+@pytest.mark.parametrize("again", ["", " 11 1e-13 21 0"])
+def test_a_closed_spline_through_fit_points_is_smooth_everywhere(
+    tmp_path: Path, again: str
+) -> None:
+    square = "11 0 21 0 11 10 21 0 11 10 21 10 11 0 21 10"
+    text = text_of(f"0 SPLINE 8 0 70 1 71 3 {square}{again}")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text)))
+    (points,) = contour
+    assert points[0] == pytest.approx(points[-1], abs=1e-9)
+    for corner in ((0, 0), (10, 0), (10, 10), (0, 10)):
+        assert np.hypot(*(points[:, :2] - corner).T).min() < 0.2
+    # It has the symmetry of the square.
+    radii = np.hypot(*(points[:, :2] - 5.0).T)
+    assert radii.max() - radii.min() < 0.2
+    assert np.ptp(points[:, 0]) == pytest.approx(np.ptp(points[:, 1]), abs=1e-2)
+
+
+def test_rapid_moves_are_lifted_above_the_middle_of_contours(tmp_path: Path) -> None:
+    document = new()
+    space = document.modelspace()
+    space.add_circle((0, 0, -9), 1)  # an arc has its direction where points have z
+    space.add_line((5, 0, -9), (6, 0, -9))
+    assert max(move.end[2] for move in moves_in(commands_of(tmp_path, document, lift_mm=2.0))) == -7
+    space.add_polyline3d([(0, 5, 0), (5, 5, 10), (9, 5, 0)])
+    found = moves_in(commands_of(tmp_path, document, lift_mm=2.0))
+    assert max(move.end[2] for move in found if move.feed is None) == 12.0
+    space.add_open_spline([(0, 7, 0), (1, 7, 30), (2, 7, 30), (3, 7, 0)])
+    found = moves_in(commands_of(tmp_path, document, lift_mm=2.0))
+    assert max(move.end[2] for move in found if move.feed is None) == 32.0
 
 
 def test_layers_colours_and_blocks_choose_feeds(tmp_path: Path) -> None:
@@ -232,6 +297,23 @@ def test_hidden_layers_layouts_and_text_are_named(tmp_path: Path) -> None:
         commands_of(tmp_path, document, strict=True)
 
 
+def test_a_frozen_layer_hides_blocks_with_all_of_their_layers(tmp_path: Path) -> None:
+    document = new()
+    document.layers.add("Frozen").freeze()
+    document.layers.add("Off").off()
+    document.layers.add("Cut")
+    document.blocks.new("Inner").add_line((0, 0), (1, 0), dxfattribs={"layer": "Cut"})
+    block = document.blocks.new("B")
+    block.add_line((0, 0), (2, 0), dxfattribs={"layer": "Cut"})
+    block.add_line((0, 0), (4, 0))
+    block.add_blockref("Inner", (0, 0), dxfattribs={"layer": "Frozen"})
+    for layer in ("Off", "Frozen"):
+        document.modelspace().add_blockref("B", (0, 0), dxfattribs={"layer": layer})
+    found = commands_of(tmp_path, document)
+    assert sum(map(length_of, contours_of(found))) == pytest.approx(2.0)
+    assert 'block on the frozen layer "Frozen", 2 times' in "; ".join(messages_in(found))
+
+
 def test_entities_are_chosen_by_handle(tmp_path: Path) -> None:
     document = new()
     lines = [document.modelspace().add_line((0, k), (k, k)) for k in (1, 2, 4)]
@@ -259,6 +341,25 @@ def test_blocks_within_blocks_are_bounded(tmp_path: Path, monkeypatch: pytest.Mo
         "0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nB\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES",
     )
     assert "copies add more than" in str(refusal_of(tmp_path, grid))
+
+
+def text_with_blocks(blocks: dict[str, str], entities: str, tables: str = "") -> str:
+    body = "".join(f"0 BLOCK 2 {name} 10 1 20 0 {text} 0 ENDBLK " for name, text in blocks.items())
+    sections = f"0 SECTION 2 TABLES {tables} 0 ENDSEC 0 SECTION 2 BLOCKS {body}0 ENDSEC ".split()
+    text = text_of(entities)
+    at = text.index("0\nSECTION\n2\nENTITIES")
+    return text[:at] + "\n".join(sections) + "\n" + text[at:]
+
+
+def test_a_block_may_follow_the_one_that_it_is_inserted_in(tmp_path: Path) -> None:
+    insert = "0 INSERT 2 Later 10 3 20 0"
+    text = text_with_blocks({"First": insert, "LATER": LINE}, "0 INSERT 2 First 10 0 20 0")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text)))
+    assert contour[0][[0, -1], :2] == pytest.approx(np.array([[1.0, 0.0], [4.0, 4.0]]))
+    missing = text_with_blocks({"First": insert}, LINE)
+    assert 'INSERT: block "Later" is not in the file' in str(refusal_of(tmp_path, missing))
+    loop = text_with_blocks({"A": "0 INSERT 2 A 10 0 20 0"}, "0 INSERT 2 A 10 0 20 0")
+    assert 'block "A" is inside more than 32 others' in str(refusal_of(tmp_path, loop))
 
 
 @pytest.mark.parametrize(

@@ -191,3 +191,13 @@ def test_laser_mode_needs_an_output_for_the_power(tmp_path: Path) -> None:
         InputError, match='laser_mode needs an analogue output for the power: add speed = "NAME"'
     ):
         load_machine(file)
+
+
+def test_the_end_of_the_program_switches_off_what_the_same_rest_switches_on(
+    tmp_path: Path, machine: Machine
+) -> None:
+    (events_before,) = events(job(tmp_path, machine, "G1 X10\nM3 S50 M8"))
+    state = {}
+    for _, kind, channel, mask, value in events_before:
+        state[kind, channel, mask] = value
+    assert set(state.values()) == {0}

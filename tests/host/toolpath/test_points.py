@@ -87,6 +87,11 @@ def test_a_column_of_feeds() -> None:
     assert [move.end[5] for move in found] == [0.0, 90.0, 180.0]
 
 
+def test_rotary_axes_alone_turn_at_the_feed() -> None:
+    found = moves_in(commands_of("x,c,feed\n0,0,60\n0,90,600\n5,90,60\n", feed_mm_s=None))
+    assert [move.feed and move.feed.feed_deg_s for move in found] == [10.0, 1.0]
+
+
 def test_units_and_scale_are_for_lengths_alone() -> None:
     text = "x,y [mm],c\n1,1,1\n2,2,2\n"
     assert moves_in(commands_of(text, unit_mm=25.4, scale=2.0))[0].end == (

@@ -59,6 +59,10 @@ def test_a_line_is_a_rapid_move_and_a_move_at_feed(tmp_path: Path) -> None:
         ('viewBox="0 0 960 480"', 25.4 / 96),
         ('width="100%" height="100%" viewBox="0 0 960 480"', 25.4 / 96),
         ('width="72pt" height="6pc"', 25.4 / 96),
+        ('width="200mm" viewBox="0 0 100 50"', 2.0),
+        ('height="100mm" viewBox="0 0 100 50"', 2.0),
+        ('width="200mm" height="auto" viewBox="0 0 100 50"', 2.0),
+        ('width="100%" height="100mm" viewBox="0 0 100 50" preserveAspectRatio="none"', 2.0),
     ],
 )
 def test_units(tmp_path: Path, head: str, size: float) -> None:
@@ -118,6 +122,12 @@ def test_an_ellipse_is_exact(tmp_path: Path) -> None:
     assert np.hypot(x / 20.0, y / 3.0) == pytest.approx(np.ones(len(x)), abs=1e-13)
 
 
+def test_no_transform(tmp_path: Path) -> None:
+    body = '<g transform="none"><path style="transform: none" d="M1 1h3"/></g>'
+    (contour,) = contours_of(svg_commands(tmp_path, svg_page(body)))
+    assert length_of(contour) == pytest.approx(3.0)
+
+
 def test_repeated_and_mirrored_commands(tmp_path: Path) -> None:
     short = "M0 0 1 1 2 0 m1 0 1 1 c1 0 2 1 2 2s1 2 2 2S9 9 9 8Q1 2 3 4T5 6t1 1h1v1H9V9z"
     long = "M0 0L1 1L2 0M3 0L4 1C5 1 6 2 6 3C6 4 7 5 8 5C9 5 9 9 9 8Q1 2 3 4Q5 6 5 6Q5 6 6 7L7 7L7 8L9 8L9 9Z"
@@ -149,6 +159,23 @@ def test_copies_are_drawn_where_they_are_used(tmp_path: Path) -> None:
     starts = [tuple(round(float(each), 9) for each in contour[0][0, :2]) for contour in found]
     assert starts == [(20.0, 50.0), (30.0, 50.0), (30.0, 45.0), (50.0, 50.0)]
     assert [length_of(contour) for contour in found] == pytest.approx([2.0, 1.0, 1.0, 20.0])
+
+
+def test_a_symbol_has_a_style(tmp_path: Path) -> None:
+    def symbol(attributes: str) -> str:
+        text = f'<symbol id="s" {attributes}><path d="M0 0h1"/></symbol><use href="#s"/>'
+        return svg_page(f"<style>symbol.wide {{ transform: scale(3) }}</style>{text}")
+
+    for attributes in ('style="transform: scale(3)"', 'class="wide"', 'transform="scale(3)"'):
+        (contour,) = contours_of(svg_commands(tmp_path, symbol(attributes)))
+        assert length_of(contour) == pytest.approx(3.0)
+    red = svg_commands(tmp_path, symbol('stroke="red" display="none"'), feeds={"red": 7.0})
+    assert {move.feed.feed_mm_s for move in moves_in(red) if move.feed} == {7.0}
+    assert len(contours_of(svg_commands(tmp_path, symbol(""), ids=["s"]))) == 1
+    assert "no line or curve" in str(refusal_of(tmp_path, symbol('visibility="hidden"')))
+    hidden = '<svg id="s" display="none"><g><path d="M0 0h1"/></g></svg><use href="#s"/>'
+    found = svg_commands(tmp_path, svg_page(f'{hidden}<path d="M0 0h2"/>'))
+    assert [length_of(contour) for contour in contours_of(found)] == pytest.approx([2.0])
 
 
 def test_copies_of_copies_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
