@@ -283,6 +283,7 @@ def test_drives_watch_the_controller_whatever_its_node(hub: LocalHub, clock: Vir
     with drive_node(hub, 2) as first, drive_node(hub, 3) as second:
         with controller_node(hub, 5) as node:
             until(node.network, lambda: node.sdo[0x2002].raw == 1)
+        clock.sleep(0.1)  # drives may still answer the controller's last request
         for drive in (first, second):
             assert drive.sdo[0x1016][1].raw >> 16 == 5
 
