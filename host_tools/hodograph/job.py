@@ -261,7 +261,7 @@ def load_job(
     maker = SectionMaker(file, machine, reading.feed_mm_s, notes, EqualSections())
     sections = tuple(made for section in path.sections for made in maker.made(section))
     notes += _ignored_commands(path, file, machine.outputs)
-    sections = _with_outputs(sections, path.after, machine, file)
+    sections = _with_outputs(sections, path.after, machine, file, notes)
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
@@ -276,13 +276,17 @@ def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Ite
 
 
 def _with_outputs(
-    sections: tuple[JobSection, ...], after: tuple[Command, ...], machine: Machine, file: Path
+    sections: tuple[JobSection, ...],
+    after: tuple[Command, ...],
+    machine: Machine,
+    file: Path,
+    notes: list[str],
 ) -> tuple[JobSection, ...]:
     """The sections, with the switched outputs as events of their programs."""
     if machine.outputs is None:
         return sections
     commands = [section_commands(one) for one in sections]
-    every = section_events(commands, after, machine.outputs, file)
+    every = section_events(commands, after, machine.outputs, file, notes)
     return tuple(
         replace(one, pipeline=replace(one.pipeline, given_events=events))
         for one, events in zip(sections, every, strict=True)

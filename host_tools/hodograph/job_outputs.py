@@ -95,8 +95,11 @@ def section_events(
     after: tuple[Command, ...],
     outputs: Outputs,
     file: Path,
+    notes: list[str],
 ) -> list[Events]:
-    """The events of each section's program. Raises InputError: the machine lacks an output, or a value is too large."""
+    """The events of each section's program; `notes` grows by one line if outputs are switched and then switched again
+    after a wait, before the axes move. Raises InputError: the machine lacks an output, or a value is too large.
+    """
     maker = EventMaker(outputs, file)
     found = []
     for i, section in enumerate(sections):
@@ -104,6 +107,12 @@ def section_events(
         following = after if last else sections[i + 1].before
         own = maker.section(section, following, is_first=i == 0, is_last=last)
         found.append(events_of([*own.repeated, *own.events]))
+    if maker.lost:
+        more = f" and {len(maker.lost) - 1} more" if len(maker.lost) > 1 else ""
+        notes.append(
+            f"{file}:{maker.lost[0]}: output switched without effect{more}: it is switched again after a wait, "
+            "with no move between"
+        )
     return found
 
 
@@ -132,6 +141,8 @@ class EventMaker:
     feed: ProgrammedFeed | None = None
     power: float | None = None
     """S while its output follows the feed; None: it does not."""
+    lost: list[int] = field(default_factory=list)
+    """Lines of commands that have no effect, since another one after a wait takes their place."""
 
     def section(
         self,
@@ -199,9 +210,18 @@ class EventMaker:
     def changed(self, place_q40: int, commands: Iterable[Command]) -> list[Event]:
         """Events of commands at one place; if several switch one output, the last one counts."""
         found: dict[str, Event] = {}
+        since: dict[str, tuple[int, int]] = {}
+        waits = 0
         for command in commands:
+            waits += isinstance(command, WAITS)
             for channel, event in self._events(place_q40, command):
                 found.pop(channel.name, None)
+                passed, line = since.pop(channel.name, (waits, 0))
+                state = self.last.get(channel.name)
+                if passed < waits and state is not None and state[1:] != event[1:]:
+                    self.lost.append(line)
+                if event.value if state is None else state[1:] != event[1:]:
+                    since[channel.name] = waits, command.line
                 found[channel.name] = self.last[channel.name] = event
         return list(found.values())
 

@@ -201,3 +201,22 @@ def test_the_end_of_the_program_switches_off_what_the_same_rest_switches_on(
     for _, kind, channel, mask, value in events_before:
         state[kind, channel, mask] = value
     assert set(state.values()) == {0}
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("M64 P0\nG4 P1\nM65 P0\nG1 X10", 3),
+        ("G1 X10\nM64 P0\nG4 P1\nM65 P0", 4),
+        ("G1 X10\nM64 P0\nG4 P1\nM65 P0\nG4 P1\nM64 P0\nG4 P1\nM65 P0\nG1 X20", 6),
+        ("G1 X10\nM64 P0\nG4 P1\nM65 P0\nG1 X20", None),
+        ("G1 X10\nM64 P0\nM65 P0\nG4 P1\nG1 X20", None),
+        ("M5\nM6 T1\nM3 S20\nG1 X10\nM5\nM6 T2\nM3 S20\nG1 X20\nM5\nM6 T0", None),
+    ],
+)
+def test_a_switch_that_another_one_replaces_after_a_wait_is_noted(
+    tmp_path: Path, machine: Machine, text: str, line: int | None
+) -> None:
+    notes = [note for note in job(tmp_path, machine, text).notes if "without effect" in note]
+    assert len(notes) == (line is not None)
+    assert all(f":{line}: output switched without effect" in note for note in notes)
