@@ -4,10 +4,10 @@
 
 Run by `make til`. Used by tools/count_til. Starts processes, sends to the controllers, receives the frames of the bus.
 
-Runs paths on the bus with hodograph-controller and with the controller on one or more emulated boards, against the same
-simulated drives; prints all, with the ticks per second. Exit status 1 when a hash differs. On vcan0 it is to be run
-under tools/with-vcan; --local makes a bus of its own (hodograph-hub): in virtual time, or in real time with --link
-slcan.
+Compares the setpoints of emulated boards with those of hodograph-controller. Runs each path with hodograph-controller
+and with each board, against the same simulated drives, and prints the hash of the setpoints and the ticks per second of
+each run. Exit status 1 if the hash of a board differs. On vcan0 run it under tools/with-vcan. --local makes a bus of
+its own (hodograph-hub), in virtual time, or in real time with --link slcan.
 """
 
 from __future__ import annotations

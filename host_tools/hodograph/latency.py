@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """How late the ticks of a controller are on this computer, from the time stamps of its SYNC frames; `hodograph
-latency`. Used by cli/latency_command. Starts a hub and a controller or uses a bus, receives frames, and waits in real
-time.
+latency`. Used by cli/latency_command. Receives frames of the bus that it is given, in real time, and sends nothing
+there; without a bus it starts a hub and a controller.
 
-On SocketCAN the Linux kernel stamps the frames. On a local bus the hub does, so that its own wake-up latency is
-included.
+On SocketCAN the Linux kernel stamps the frames. On a local bus the hub stamps them, so the figures also contain the
+time that the hub takes to wake up.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Shows on a terminal while a command computes: its name and its running time, from AFTER_S on. Used by
-cli/demo_command, cli/main and cli/output. A thread writes to stderr; sys.stdout is replaced meanwhile.
+"""Shows a line with the name and the running time of a command on the terminal while it computes, from AFTER_S on. Used
+by cli/demo_command, cli/main and cli/output. A thread writes to stderr; sys.stdout is replaced meanwhile.
 
 The line disappears before other output is written. It is never written to files and pipes.
 """

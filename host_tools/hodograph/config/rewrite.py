@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The texts of machine and drive files with other figures; all other text stays, also comments and order. Used by
+"""Replaces numbers in the texts of machine and drive files; all other text stays, also comments and order. Used by
 cli/tune_command and cli/identify_command. Reads these files, and writes none.
 """
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Greatest curvature of PH quintic segments, at the true extremum; docs/theory/numerics.md 4.4. Used by spline/. No
-I/O.
+"""The greatest curvature of PH quintic segments, found by bounds and not by samples; docs/theory/numerics.md 4.4. Used
+by spline/. No I/O.
 """
 
 from __future__ import annotations

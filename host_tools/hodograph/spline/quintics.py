@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Parts of quintics in Bezier form, which are the extra axes of a path, in the parameter of its segments. Pure
-functions. Used by spline/splitting and stream/geometry. No I/O.
+"""Cuts quintics in Bezier form into parts. Such quintics are the extra axes of a path, in the parameter of its
+segments. Used by spline/splitting and stream/geometry. Pure functions.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from hodograph.feed import AxisLimits, FeedRequest, Limits
 from hodograph.feed.optimal import plan_optimal
 from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.toolpath.fit import fitting
-from hodograph.toolpath.fit.certificate import certify
+from hodograph.toolpath.fit.certificate import ROUNDING_MM, certify
 from hodograph.toolpath.fit.chain import Segments, with_lines
 from hodograph.toolpath.fit.corners import SHAPES, SHARPEST_RAD, corners, extent
 from hodograph.toolpath.fit.fitting import FittedPath, Tolerance, fit
@@ -158,7 +158,7 @@ def test_random_paths_are_smooth_and_certified(seed: int, space: bool) -> None:
 def test_a_single_line_is_kept_exactly() -> None:
     found = fitted(np.array([[0.0, 0.0, 1.0], [3.0, 4.0, 13.0]]))
     assert found.curve.segment_count == 1
-    assert found.deviation_mm < 1e-7
+    assert found.deviation_mm < 1.001 * ROUNDING_MM
     assert found.curve.length_mm == pytest.approx(13.0, rel=1e-14)
 
 

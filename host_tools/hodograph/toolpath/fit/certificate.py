@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Proves a bound of the distance between a curve and the programmed path, for every point of both. Used by fit/fitting
-and fit/turning. No I/O.
+"""Proves that each point of a curve is within a bound of the programmed path, and each point of the path within it of
+the curve. Used by fit/fitting and fit/turning. No I/O.
 
 docs/theory/toolpath-fitting.md section 6. Chords with an error bound replace the curve. The distance of a point from a
 chord is convex, so a whole chord is no farther from another chord than the farther one of its ends. Chords whose bound
@@ -34,8 +34,8 @@ _MOST_PAIRS = 100_000
 _SURE = 4
 """Halvings after which the compared chords certainly include the nearest one."""
 
-ROUNDING_MM = 5e-9
-"""Allowance for the rounding of a program (2^-34 mm), of its kernel (1 nm) and of this proof."""
+ROUNDING_MM = 5e-6
+"""Allowance of 5 nm for the rounding of a program (2^-34 mm), of its kernel (1 nm) and of this proof."""
 
 
 @dataclass(frozen=True, eq=False)
