@@ -121,8 +121,8 @@ void controller_init(struct controller *controller, uint8_t node)
     frame_queue_init(&controller->queue);
     program_slot_init(&controller->slot);
     program_slot_recover(&controller->slot);
-    controller->slot.attend = controller_beat;
-    controller->slot.self = controller;
+    controller->slot.user.attend = controller_beat;
+    controller->slot.user.self = controller;
     stream_init(&controller->stream);
     controller->stream.attend = beat_in_stream;
     controller->stream.self = controller;

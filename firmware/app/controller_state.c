@@ -13,6 +13,14 @@ bool controller_configured(const struct controller *controller)
     return controller->configured.known && controller->configured.crc32 == controller->config.crc32;
 }
 
+bool controller_moving(const struct controller *controller)
+{
+    port_lock();
+    const bool result = machine_moving(&controller->machine);
+    port_unlock();
+    return result;
+}
+
 void controller_send(const struct can_msg *message)
 {
     for (unsigned i = 0; i < SEND_TRIES && port_can_send(message) != 0; ++i) {

@@ -73,6 +73,9 @@ struct controller {
 /* Whether the present configuration is the one that was confirmed or restored. Otherwise nothing may be switched on. */
 bool controller_configured(const struct controller *controller);
 
+/* Whether axes move (machine_moving). Takes the port's lock. */
+bool controller_moving(const struct controller *controller);
+
 /* Sends the heartbeat if it is due. elapsed_us: since the last call. */
 void controller_heartbeat(struct controller *controller, uint32_t elapsed_us);
 

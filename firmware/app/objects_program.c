@@ -11,19 +11,11 @@
 
 /* ---- Sub 1: the image ---- */
 
-static bool moving(struct controller *controller)
-{
-    port_lock();
-    const bool result = machine_moving(&controller->machine);
-    port_unlock();
-    return result;
-}
-
 uint32_t object_program_begin(void *context, const struct od_entry *entry, uint32_t size)
 {
     struct controller *controller = context;
     (void)entry;
-    if (moving(controller)) {
+    if (controller_moving(controller)) {
         controller->refusal = MACHINE_MOVING;
         return SDO_ABORT_STATE;
     }
@@ -154,7 +146,7 @@ static uint64_t stop_number(const struct program *p, uint8_t sub)
 static uint64_t place_number(struct controller *controller, uint8_t sub)
 {
     struct program_slot *slot = &controller->slot;
-    if (!program_slot_is_checked(slot, &controller->config) && moving(controller)) {
+    if (!program_slot_is_checked(slot, &controller->config) && controller_moving(controller)) {
         return 0;
     }
     program_slot_refresh(slot, &controller->config);

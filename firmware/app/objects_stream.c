@@ -8,14 +8,6 @@
 
 /* ---- Sub 1: a chunk ---- */
 
-static bool moving(struct controller *controller)
-{
-    port_lock();
-    const bool result = machine_moving(&controller->machine);
-    port_unlock();
-    return result;
-}
-
 static bool is_under_way(const struct stream *stream)
 {
     return stream->state == STREAM_UNDERRUN || stream->state == STREAM_PROGRAM_STOP ||
@@ -26,7 +18,7 @@ uint32_t object_chunk_begin(struct controller *controller, uint32_t size)
 {
     struct stream *stream = &controller->stream;
     stream_process(stream, &controller->machine);
-    if (moving(controller) && !is_under_way(stream)) {
+    if (controller_moving(controller) && !is_under_way(stream)) {
         controller->refusal = MACHINE_MOVING;
         return SDO_ABORT_STATE;
     }

@@ -81,8 +81,8 @@ static int check(const struct program_slot *slot, const struct program *program,
         return fault->code;
     }
     config_limits(config, first_axis(&program->header), &limits);
-    limits.attend = slot->attend;
-    limits.self = slot->self;
+    limits.attend = slot->user.attend;
+    limits.self = slot->user.self;
     return program_check(program, &limits, fault);
 }
 
@@ -96,18 +96,13 @@ static void adopt(struct program_slot *slot, const struct program *program, unsi
     slot->present = true;
 }
 
-static struct program_table_user user_of(const struct program_slot *slot)
-{
-    return (struct program_table_user){.attend = slot->attend, .self = slot->self};
-}
-
 /* Makes the image in a bank the active program: coefficient records for the kernel, then the commit record. */
 static int seal(struct program_slot *slot, struct program *program, unsigned bank,
                 const struct config *config)
 {
     const struct bank_record record = {
         .sequence = slot->sequence + 1u, .size = program->header.image_size, .tag = config->crc32};
-    const int result = program_table_write(bank, program, config->kernel, user_of(slot));
+    const int result = program_table_write(bank, program, config->kernel, slot->user);
     if (result != 0) {
         return result;
     }
@@ -199,9 +194,7 @@ static int copy_image(const struct program_slot *slot, unsigned bank)
         const uint32_t left = size - at;
         result = port_store_write(bank, at, slot->program.image + at,
                                   left < COPY_BYTES ? left : COPY_BYTES);
-        if (slot->attend != NULL) {
-            slot->attend(slot->self);
-        }
+        program_table_attend(&slot->user);
     }
     return result;
 }
@@ -220,8 +213,7 @@ static int move(struct program_slot *slot, const struct config *config)
 
 static int prepare(struct program_slot *slot, const struct config *config)
 {
-    const bool found =
-        program_table_find(slot->bank, &slot->program, config->kernel, user_of(slot));
+    const bool found = program_table_find(slot->bank, &slot->program, config->kernel, slot->user);
     return found ? 0 : move(slot, config);
 }
 

@@ -19,6 +19,7 @@
 #include <stdint.h>
 
 #include "app/machine/config.h"
+#include "app/program_table.h"
 #include "core/program.h"
 #include "core/program_rules.h"
 
@@ -30,10 +31,9 @@ enum program_slot_state {
 };
 
 struct program_slot {
-    /* Called with `self` at each step of the check of a program, and while one is copied or its records are written, so
-     * that the main loop can send heartbeats. May be NULL. */
-    void (*attend)(void *self);
-    void *self;
+    /* Its `attend` is called at each step of the check of a program, and while one is copied or its records are written,
+     * so that the main loop can send heartbeats. */
+    struct program_table_user user;
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */
     int32_t start_counts

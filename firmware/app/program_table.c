@@ -3,7 +3,6 @@
  * after its image, for the kernel that the tick uses. Used by app/program_slot. Main loop. */
 #include "app/program_table.h"
 
-#include <stddef.h>
 #include <string.h>
 
 #include "app/bank_record.h"
@@ -17,19 +16,12 @@ struct place {
     struct program_table_user user;
 };
 
-static void attend(const struct place *place)
-{
-    if (place->user.attend != NULL) {
-        place->user.attend(place->user.self);
-    }
-}
-
 static int put_records(void *context, const uint8_t *bytes, uint32_t size)
 {
     struct place *place = context;
     const int result = port_store_write(place->bank, place->offset, bytes, size);
     place->offset += size;
-    attend(place);
+    program_table_attend(&place->user);
     return result;
 }
 
@@ -38,7 +30,7 @@ static int compare_records(void *context, const uint8_t *bytes, uint32_t size)
     struct place *place = context;
     const int result = memcmp(port_store_data(place->bank) + place->offset, bytes, size);
     place->offset += size;
-    attend(place);
+    program_table_attend(&place->user);
     return result == 0 ? 0 : PORT_ERR_STORE;
 }
 

@@ -8,15 +8,24 @@
 #define APP_PROGRAM_TABLE_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "core/program.h"
 
-/* Called at each record: a board writes for seconds, and the drives wait for heartbeats. `attend` may be NULL. */
+/* `attend` is called at each record: a board writes for seconds, and the drives wait for heartbeats. It may be NULL. */
 struct program_table_user {
     void (*attend)(void *self);
     void *self;
 };
+
+/* Calls `attend`, if there is one. */
+static inline void program_table_attend(const struct program_table_user *user)
+{
+    if (user->attend != NULL) {
+        user->attend(user->self);
+    }
+}
 
 /* Writes the records and gives them to the program. 0, PROGRAM_ERR_ROOM when image and records do not fit the bank,
  * PROGRAM_ERR_STORE, or PROGRAM_ERR_KERNEL when this image has no such kernel. The bank must be erased after the

@@ -60,8 +60,8 @@ static void test_a_check_lets_the_main_loop_give_signs_of_life(void)
     struct config limited = config;
     unsigned calls = 0;
     limited.axis[0].velocity_limit_um_s = 20000;
-    slot.attend = count_call;
-    slot.self = &calls;
+    slot.user.attend = count_call;
+    slot.user.self = &calls;
     TEST_ASSERT_EQUAL_INT(0, upload());
     /* segment, piece, its stops of both kinds, no limits of axes; records of a segment and a piece */
     TEST_ASSERT_EQUAL_UINT(4 + 2, calls);
@@ -116,7 +116,7 @@ static void test_writing_lets_the_main_loop_give_signs_of_life(void)
                                                  memory_data};
     struct config other = config;
     fake_port_use_store(&store);
-    slot.attend = note_life;
+    slot.user.attend = note_life;
     other.kernel = 1;
     other.crc32 = 2;
     TEST_ASSERT_EQUAL_INT(0, upload());
