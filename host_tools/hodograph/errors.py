@@ -34,6 +34,15 @@ class PlanError(HodographError):
     exit_status = 3
 
 
+class SectionPlanError(PlanError):
+    """A section of a toolpath cannot be planned at this line. The plan of the job, which knows the file, adds it."""
+
+    def __init__(self, line: int, text: str) -> None:
+        super().__init__(f"line {line}: {text}")
+        self.line = line
+        self.text = text
+
+
 class BusError(HodographError):
     """No bus, no node that answers, or an answer that breaks the protocol."""
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine
-from ..errors import PlanError
+from ..errors import SectionPlanError
 from ..events import EVENT
 from ..feed.pieces import FeedPieces, joined_pieces
 from ..fixed_point import nearest_q40
@@ -178,7 +178,7 @@ class _Kept:
         return kept, shift, int(times[shift])
 
 
-class _RefusedPartError(PlanError):
+class _RefusedPartError(SectionPlanError):
     """The controller would refuse each chunk with the next part of the path."""
 
 
@@ -205,17 +205,19 @@ class _Tried:
 
 
 def _require_accepted(fault: NativeFault | None, line: int) -> None:
-    """Raises PlanError: the controller would refuse a chunk for this fault."""
+    """Raises SectionPlanError: the controller would refuse a chunk for this fault."""
     if fault is None:
         return
     if fault.code == ProgramError.EVENT_DENSE:
-        raise PlanError(
-            f"line {line}: more than 16 outputs switch within the distance of a tick at 200 %: "
-            "lower the feed there, or switch fewer outputs at one place"
+        raise SectionPlanError(
+            line,
+            "more than 16 outputs switch within the distance of a tick at 200 %: "
+            "lower the feed there, or switch fewer outputs at one place",
         )
     raise _RefusedPartError(
-        f"line {line}: the controller would refuse this part: {fault.text} "
-        f"(code {fault.code}): lower the feed there, and please report this file"
+        line,
+        f"the controller would refuse this part: {fault.text} "
+        f"(code {fault.code}): lower the feed there, and please report this file",
     )
 
 
@@ -264,7 +266,7 @@ class SectionChunks:
         """Source lines at which the axes come to rest within the section; grows with the chunks."""
 
     def chunks(self) -> Iterator[PlannedChunk]:
-        """The chunks in order. Raises InputError and PlanError."""
+        """The chunks in order. Raises InputError and SectionPlanError."""
         for window in self._feed.windows():
             first, joints = 0, list(window.joints)
             while joints:
@@ -317,7 +319,7 @@ class SectionChunks:
 
     def _next(self, window: Window, first: int, joints: list[int]) -> tuple[PlannedChunk, int]:
         """The chunk whose new pieces go from knot `first` to the last of these joints for which there is room, and the
-        number of joints that it uses. Raises PlanError.
+        number of joints that it uses. Raises SectionPlanError.
         """
         tried = self._largest(window, first, joints)
         program, joint = tried.program, joints[tried.used - 1]
@@ -403,9 +405,9 @@ class SectionChunks:
             return header
         job_start_q40 = header.job_start_q40 + place.arc_q40
         if job_start_q40 >= FARTHEST_Q40:
-            raise PlanError(
-                f"line {header.line}: the section is longer than 2 km, and 4 km with those before it: divide it by a "
-                "dwell (G4 P0)"
+            raise SectionPlanError(
+                header.line,
+                "the section is longer than 2 km, and 4 km with those before it: divide it by a dwell (G4 P0)",
             )
         return replace(
             header,
@@ -439,8 +441,9 @@ class SectionChunks:
         size = program.image_size + HEADER_SIZE
         if size > self._most:
             raise _RefusedPartError(
-                f"line {line}: a part of the path that the controller needs at once takes {size} bytes, and it takes "
-                f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory"
+                line,
+                f"a part of the path that the controller needs at once takes {size} bytes, and it takes "
+                f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory",
             )
 
     def _header(self, window: Window, joint: int, program: Program) -> ChunkHeader:

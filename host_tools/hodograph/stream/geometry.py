@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, PlanError
+from ..errors import InputError, SectionPlanError
 from ..events import EVENTS_A_TICK, Events, SwitchedOutputs, events_after, no_events
 from ..feed import FeedZone
 from ..feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S
@@ -244,7 +244,7 @@ class StreamPath:
         return int(self.line.size)
 
     def append(self, block: Block) -> None:
-        """Adds a block. Raises InputError and PlanError: it is beyond the format."""
+        """Adds a block. Raises InputError and SectionPlanError: it is beyond the format."""
         block = short_segments(block)
         made = quantise(block.curve, self._offset_mm)
         point = made.point_q40
@@ -264,8 +264,8 @@ class StreamPath:
         moved = [int(arc_to_q40(one)[0]) for one in arcs[:-1]]
         self._end_point = point[:, -1] + np.array([*moved, *made.extra_q40[:, -1:, -1].ravel()])
         if int(self.start_q40[-1]) + int(made.start_q40[-1]) >= _FARTHEST_Q40:
-            raise PlanError(
-                f"line {block.line[-1]}: the section is longer than 4 km: divide it by a dwell (G4 P0)"
+            raise SectionPlanError(
+                int(block.line[-1]), "the section is longer than 4 km: divide it by a dwell (G4 P0)"
             )
         self.start_q40 = np.concatenate((self.start_q40, self.start_q40[-1] + made.start_q40[1:]))
         self.feed_mm_s = np.concatenate((self.feed_mm_s, block.feed_mm_s))

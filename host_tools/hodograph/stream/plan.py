@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
-from ..errors import InputError, PlanError, RunError
+from ..errors import InputError, PlanError, RunError, SectionPlanError
 from ..events import SwitchedOutputs
 from ..fixed_point import MM_PER_Q40
 from ..names import STANDARD_INPUT, is_toolpath
@@ -106,10 +106,6 @@ class PlannedSection:
     start_q40: int = 0
     rest: Rest | None = None
     standing_mm: tuple[float, ...] = ()
-
-
-_LINE = "line "
-"""The beginning of errors in the plan of a section, which knows lines but not their file."""
 
 
 class _EndedError(Exception):
@@ -404,11 +400,8 @@ class JobPlan:
                 counted = len(chunks.rest_lines)
                 last = planned.chunk.header.last
                 yield section, planned.chunk, planned.new_s
-        except PlanError as error:
-            text = str(error)
-            if not text.startswith(_LINE):
-                raise
-            raise PlanError(f"{section.file}:{text.removeprefix(_LINE)}") from None
+        except SectionPlanError as error:
+            raise PlanError(f"{section.file}:{error.line}: {error.text}") from None
         return None if last else chunks.end
 
     def _skip(self, section: StreamSection, switched: SwitchedOutputs) -> bool:

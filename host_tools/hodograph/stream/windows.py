@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..config import Machine
-from ..errors import PlanError
+from ..errors import SectionPlanError
 from ..events import EVENT
 from ..feed import FeedPlan, FeedRequest, FeedZone, Limits
 from ..feed.kinematics import PathBounds
@@ -200,7 +200,7 @@ class SectionFeed:
         self._again = False
 
     def windows(self) -> Iterator[Window]:
-        """The windows in order; the last one ends the section. Raises PlanError."""
+        """The windows in order; the last one ends the section. Raises SectionPlanError."""
         while True:
             window = self._next()
             yield window
@@ -468,9 +468,8 @@ class SectionFeed:
                 if found is not None:
                     return measured(curve, found)
         if moving is None:
-            raise PlanError(
-                f"line {self.path.line_at(self._low_q40)}: the planner found no feed: please report this file"
-            )
+            line = self.path.line_at(self._low_q40)
+            raise SectionPlanError(line, "the planner found no feed: please report this file")
         return None
 
     def _joints(self, found: Solution, count: int, first: int = 0) -> tuple[int, ...]:
