@@ -305,7 +305,7 @@ def faults(tree: Tree, item: UserList) -> Iterator[str]:
         yield f"{len(item.names)} names, at most {MOST}: name a folder, or remove the list"
 
 
-def silent(tree: Tree) -> Iterator[str]:
+def missing_sentences(tree: Tree) -> Iterator[str]:
     """One line for each file that does not name its users, or its effects, in its first screen."""
     for path, text in tree.texts.items():
         if path.startswith("tests/") or not text.strip():
@@ -331,7 +331,7 @@ def main(arguments: list[str]) -> int:
     """Exit status."""
     root = Path(arguments[0]) if arguments else Path(__file__).resolve().parent.parent
     tree = Tree(root)
-    wrong = [*silent(tree), *wrong_lists(tree)]
+    wrong = [*missing_sentences(tree), *wrong_lists(tree)]
     for line in wrong:
         print(line)
     return 1 if wrong else 0

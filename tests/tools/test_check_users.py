@@ -152,7 +152,9 @@ def test_users_and_effects_in_the_first_screen(
     tmp_path: Path, path: str, comment: str, lacks: tuple[str, ...]
 ) -> None:
     lines = [
-        line for line in check_users.silent(tree_with(tmp_path, path, comment)) if path in line
+        line
+        for line in check_users.missing_sentences(tree_with(tmp_path, path, comment))
+        if path in line
     ]
     assert len(lines) == len(lacks)
     assert all(f"does not name the {word}" in line for line, word in zip(lines, lacks, strict=True))

@@ -80,6 +80,13 @@ def jobs(tmp_path_factory: pytest.TempPathFactory, machine: Machine) -> list[lis
         return made
 
 
+def part_job(folder: Path, machine: Machine) -> JobFiles:
+    """The job of one file with PART."""
+    file = folder / "part.ngc"
+    file.write_text(PART)
+    return JobFiles((file,), machine, 0.01, ReadOptions())
+
+
 def _limits(machine: Machine) -> NativeLimits:
     return NativeLimits(**asdict(program_limits(machine)), chunk=1)
 
@@ -115,9 +122,7 @@ def test_a_long_job_goes_on_as_another_one(
 ) -> None:
     """At the first rest after so much of it, from where it ends, with the commands of the rest before it."""
     monkeypatch.setattr(chunks_module, "ENOUGH_Q40", 20 << 40)
-    file = tmp_path / "part.ngc"
-    file.write_text(PART)
-    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    job = part_job(tmp_path, machine)
     with JobPlan(job, MOST, 7, Place()) as plan:
         found = []
         with suppress(IndexError):
@@ -141,9 +146,7 @@ def test_a_section_that_ends_too_far_in_its_job_names_the_remedy(
     tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(chunks_module, "FARTHEST_Q40", 20 << 40)
-    file = tmp_path / "part.ngc"
-    file.write_text(PART)
-    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    job = part_job(tmp_path, machine)
     with (
         JobPlan(job, MOST, 7, Place()) as plan,
         pytest.raises(PlanError, match=r"/part\.ngc:8: the section .* divide it by a dwell"),

@@ -386,12 +386,10 @@ class Stopped:
         self.stops += 1
 
 
-@pytest.mark.parametrize("error", [KeyboardInterrupt(), InputError("bad"), ZeroDivisionError()])
-def test_whatever_ends_a_job_stops_the_axes_first(
-    monkeypatch: pytest.MonkeyPatch, error: BaseException
-) -> None:
-    """Before the plan is waited for, which may take a while."""
+def stops_after(monkeypatch: pytest.MonkeyPatch, error: BaseException, *, moved: bool) -> int:
+    """How often a job that ends with the error stops the axes."""
     at: Any = Stopped()
+    at.moved = moved
     nothing: Any = None
 
     def fail(_: Sender) -> None:
@@ -400,24 +398,22 @@ def test_whatever_ends_a_job_stops_the_axes_first(
     monkeypatch.setattr(Sender, "_run", fail)
     with pytest.raises(type(error)):
         Sender(at, nothing, nothing, lambda *_: None).run()
-    assert at.stops == 1
+    return int(at.stops)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), InputError("bad"), ZeroDivisionError()])
+def test_whatever_ends_a_job_stops_the_axes_first(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException
+) -> None:
+    """Before the plan is waited for, which may take a while."""
+    assert stops_after(monkeypatch, error, moved=True) == 1
 
 
 @pytest.mark.parametrize(("error", "stops"), [(KeyboardInterrupt(), 1), (RefusedError("no"), 0)])
 def test_a_job_that_moved_nothing_stops_no_other_motion(
     monkeypatch: pytest.MonkeyPatch, error: BaseException, stops: int
 ) -> None:
-    at: Any = Stopped()
-    at.moved = False
-    nothing: Any = None
-
-    def fail(_: Sender) -> None:
-        raise error
-
-    monkeypatch.setattr(Sender, "_run", fail)
-    with pytest.raises(type(error)):
-        Sender(at, nothing, nothing, lambda *_: None).run()
-    assert at.stops == stops
+    assert stops_after(monkeypatch, error, moved=False) == stops
 
 
 def _status(state: int, underruns: int = 0) -> StreamStatus:

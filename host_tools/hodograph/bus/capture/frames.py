@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Frames of a bus as numpy arrays. Used by all modules that handle captured frames. No I/O."""
+"""Frames of a bus as numpy arrays. Used by most modules of capture and of the live page, and by analyses of
+recordings. No I/O.
+"""
 
 from __future__ import annotations
 
