@@ -25,12 +25,19 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 INTERVALS = 12
+"""Intervals between the samples of a cell."""
 _BISECTIONS = 50
+"""Halvings of a piece's time to find where it passes a joint or zone end; they exhaust double precision."""
 _BESIDE = 1e-6
+"""Distance of the outermost samples from the ends of a cell, as a share of it: the curve is one-sided there."""
 _BRIEF = 1e-9
+"""Shortest cell, as a share of its piece; shorter ones are left out."""
 _ROUGH = 0.1
+"""A cell is divided if a value may rise between samples by more than this share of the reserve."""
 _PARTS = 4
+"""Parts into which a cell is divided."""
 _ROUNDS = 3
+"""How often cells are divided."""
 
 
 def axis_motion(frame: Frames, d1: Real, d2: Real, d3: Real) -> tuple[Real, Real, Real]:

@@ -48,6 +48,7 @@ Real = NDArray[np.float64]
 Unsigned = NDArray[np.uint32]
 
 GREATEST_FACTOR = 2.0
+"""Greatest override: 200 %."""
 
 _LEAST_FACTOR = 1.05
 """On a path a factor below this is set to 1: it would use half of the headroom of a changing override and gain less
@@ -55,7 +56,9 @@ than 5 %.
 """
 
 _MARGIN = 1.0 - 1e-9
+"""Factor of all bounds before they are rounded down to codes; covers rounding errors of doubles."""
 _TINY = 1e-12
+"""Least magnitude of a peak, to avoid a division by 0."""
 
 FACTOR_SHARE = 0.5
 """Part of the headroom of each limit that a factor above 1 may use."""

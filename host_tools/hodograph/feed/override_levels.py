@@ -16,14 +16,20 @@ Codes = NDArray[np.uint8]
 Real = NDArray[np.float64]
 
 LEVEL_OVERRIDES = tuple(q9 / 512 for q9 in (320, 448, 488, 504, 509, 511))
+"""Override at the end of each level but the last; multiples of 2^-9 as in the format."""
 LEVELS = len(LEVEL_OVERRIDES) + 1
+"""Number of levels."""
 FULL = LEVELS - 1
+"""The last level: overrides up to 100 %, and above."""
 
 FACTOR_ONE_Q14 = 1 << 14
+"""An override factor of 1 in the format."""
 
 _RATE_UNIT, _SECOND_UNIT = 2.0**-32, 2.0**-24
+"""Units of the mantissa of a rate code, 1/s, and of an override acceleration's code, 1/s^2."""
 
 _GREATEST_CODE = 255
+"""Codes are bytes."""
 _EIGHTHS = np.array([65536, 71468, 77935, 84990, 92681, 101070, 110217, 120193], dtype=np.uint64)
 """2^16 2^(i/8), rounded down."""
 
@@ -55,6 +61,7 @@ def _mantissas(codes: ArrayLike) -> NDArray[np.uint64]:
 
 
 _ALL = _mantissas(np.arange(_GREATEST_CODE + 1))
+"""Mantissas of all codes."""
 
 
 def _codes_below(values: ArrayLike) -> Codes:

@@ -23,12 +23,15 @@ Int = NDArray[np.int64]
 Unsigned = NDArray[np.uint32]
 
 DEGREE = 7
+"""Degree of the polynomial of arc length over time."""
 
 LONGEST_PIECE_MM = 31.875
 """Below the 32 mm of the format."""
 
 JERK_GOAL_MM_S3 = 1.0
+"""Greatest error of the jerk of pieces that replace an exact profile; more pieces are tried until it is kept."""
 LENGTH_GOAL_MM = 2e-10
+"""The same of the arc length."""
 
 
 @dataclass(frozen=True)
@@ -328,3 +331,4 @@ def _to_bernstein(degree: int) -> Real:
 
 
 _TO_BERNSTEIN = {degree: _to_bernstein(degree) for degree in range(DEGREE)}
+"""Matrices from powers to Bernstein coefficients, by degree."""

@@ -30,9 +30,13 @@ from .timeline import timeline
 from .usage import limit_peaks
 
 _CLOSE = 1e-4
+"""The search for the constant feed ends when the logarithm of the limit usage, or of the feed, is this exact."""
 _MARGIN = 1e-6
+"""A plan may exceed a limit by this share; the search for the feed aims below it by as much."""
 _MOST_TRIALS = 30
+"""Greatest number of feeds that are tried."""
 _MOST_ROUNDS = 20
+"""Greatest number of plans in which the limits are corrected by the excess of the pieces."""
 _REMEDY = "raise the limit, or smooth the path there (points too close together make such places)"
 
 

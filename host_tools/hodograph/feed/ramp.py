@@ -33,18 +33,24 @@ DISPLACEMENT, FEED, ACCELERATION, JERK, SNAP = -1, 0, 1, 2, 3
 """Orders of time derivative of the feed."""
 
 INITIAL_MESH = 1.0
+"""Mesh of the first step of the pattern search for n_c."""
 MESH_TOLERANCE = 1e-6
+"""The search ends when its mesh is at most this."""
 MOST_ITERATIONS = 1000
+"""The search ends after this number of steps."""
 
 N_C_START, N_C_LOW, N_C_HIGH = 5.0, 2.0, 12.0
 REVERSE_MM_S = -(2.0**-14)
 """A feed below this counts as reverse motion. (18) always goes a little below 0; the format refuses -2^-10 mm/s."""
 
 _ORDERS = 5
+"""Derivatives of the polynomials below, from the feed on."""
 _GAUSS_X, _GAUSS_W = (v / 2.0 for v in np.polynomial.legendre.leggauss(24))
 
 _PEAK_GRID = np.linspace(0.0, 0.5, 193)
+"""Times of the first half of a ramp, as shares of it, at which peaks are searched; exact by Newton afterwards."""
 _LOW_GRID = np.unique(np.concatenate((np.geomspace(1e-6, 0.5, 160), np.linspace(0.0, 0.5, 97))))
+"""As _PEAK_GRID, with places near the start, where the feed may be negative."""
 
 
 @dataclass(frozen=True, eq=False)

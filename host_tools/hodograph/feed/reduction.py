@@ -20,8 +20,11 @@ from .request import FeedRequest
 T = TypeVar("T")
 
 _MARGIN = 1e-9
+"""How far the search first aims below a limit, in the logarithm of the feed."""
 _CLOSE = 1e-6
+"""The search ends when the logarithm of the limit usage, or of the feed, is this exact."""
 _MOST_TRIALS = 40
+"""Greatest number of feeds that are tried."""
 
 _LEAST_GAIN = 0.05
 """Least assumed ratio of a step in the logarithm of the peak to the step in that of the feed."""

@@ -14,14 +14,23 @@ from typing import Literal
 from ..errors import InputError
 
 OPTIMAL = "optimal"
+"""The profile that depends on the place."""
 PROFILES = ("quintic", "exponential", "minimax", OPTIMAL)
+"""All feed profiles."""
 PERIODS_US = (1000, 2000, 4000, 8000)
+"""Periods of the controller."""
 LEAST_FEED_MM_S, GREATEST_FEED_MM_S = 1e-3, 4000.0
+"""Range of the nominal feed."""
 LEAST_RAMP_S, GREATEST_RAMP_S = 2e-3, 1000.0
+"""Range of the time of a feed ramp."""
 LEAST_DEGREE, GREATEST_DEGREE = 3, 12
+"""Range of the degree of profile minimax."""
 GREATEST_N_C = 50.0
+"""Greatest slope coefficient of profile exponential."""
 SHORTEST_MM, LONGEST_MM = 2.0**-10, 2.0**22 - 1.0
+"""Shortest and longest path: the longest that arc lengths of the format hold."""
 LONGEST_S = 2.0**22 - 1.0
+"""Longest program time of the format."""
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,11 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _COUNTS = (1, 2, 3, 4, 6, 8, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128)
+"""Numbers of pieces per ramp, in the order in which they are tried."""
 _TIGHT = 1.01
+"""Greatest ratio of the controller's bound of an acceleration or jerk to its true peak."""
 _LEAST_FEED_MM_S = -(2.0**-11)
+"""Least Bernstein coefficient of the feed: a little below 0 is accepted."""
 
 # A piece in its own s = 0 … 1: Hermite data F', F'' at both ends and the distance, by quintic; the two free
 # coefficients of degree 6 and 7 by least squares on the jerk at Chebyshev points.
@@ -223,7 +226,9 @@ def _fit_ramp(line: Timeline, cuts: Int, origin_s: float, backwards: bool) -> _R
 
 
 _CHECK = np.linspace(0.0, 1.0, 33)
+"""Places of a piece at which its jerk is compared with the exact profile."""
 _CHECK_POWERS = _CHECK[:, None] ** np.maximum(np.arange(8) - 3, 0)
+"""Powers of _CHECK of the terms of the jerk."""
 
 
 def _hermite(distance: Real, v0: Real, v1: Real, a0: Real, a1: Real) -> Real:

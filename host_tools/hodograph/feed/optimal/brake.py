@@ -20,7 +20,9 @@ from .window import State
 _PIECE_S = 0.05
 """Approximate duration of a piece."""
 _FEWEST, _MOST = 3, 12
+"""Least and greatest number of pieces of a brake."""
 _LEAST_PERIODS = 3.0
+"""Least duration of a piece, in periods."""
 
 
 def brake_to_rest(state: State, low: float, high: float, period_s: float) -> Ends | None:

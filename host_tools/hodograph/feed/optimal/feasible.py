@@ -25,8 +25,11 @@ from .plan_limits import PlanLimits
 Real = NDArray[np.float64]
 
 _SAMPLES = 32
+"""Parts into which each segment is divided; a limit is evaluated at both ends of each part."""
 _MARGIN = 1e-6
+"""Share by which a rounded value in a message has to be above the exact one, so that it suffices."""
 _BEYOND = 2.0
+"""The feed is bounded to this multiple of what acceleration and jerk along the path can reach."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,12 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _GRADED_RATIO = 2.5
+"""An interval is graded if its distance from rest is less than this multiple of its length."""
 _LEAST_GRADED = 3
+"""Intervals next to a rest that are graded whatever their length."""
 
 GAUSS_X, GAUSS_W = (v / 2.0 for v in np.polynomial.legendre.leggauss(8))
+"""Abscissas, later shifted to 0 ... 1, and weights of Gauss-Legendre quadrature on an interval of length 1."""
 GAUSS_X = GAUSS_X + 0.5
 
 

@@ -23,22 +23,34 @@ FEWEST_INTERVALS = 12
 """Least number of intervals of a plan, if its time is enough."""
 
 _SAMPLES = 16
+"""Least number of samples of a segment for the first estimate."""
 _END_SAMPLES = 24
+"""Samples of the first and last part of a window; their distances from the end are proportional to k^3."""
 _PER_SEGMENT = 4
+"""Intervals in the time of a segment next to a sudden change of the acceleration, if it is a short segment."""
 _PER_RAMP = 0.4
+"""Longest interval there, as a share of the time in which full acceleration builds up."""
 _MANY_SEGMENTS = 256
+"""Segments from which a path counts as one of many segments."""
 _BRIEFEST = 0.25
 """On a path of many segments, an interval contains several segments if they are passed in less than this share of its
 longest time. Limits are also evaluated at the joints inside it. With four times as many intervals a program is 0.02 %
 faster.
 """
 _LEAST_PERIODS = 1.7
+"""Least planned duration of an interval, in periods."""
 _FLAT_STRETCH = 8.0
+"""Longest interval far from sudden changes, as a multiple of the longest one next to them."""
 _PER_FLAT_SEGMENT = 32
+"""An interval far from sudden changes may last at least the time of its segment divided by this."""
 _GROWTH = 0.25
+"""Seconds by which an interval may be longer for each second between it and the nearest sudden change."""
 _KINK = 0.05
+"""Change of the acceleration that counts as sudden in the first estimate, as a share of the assumed acceleration."""
 _SUDDEN = 0.5
+"""The same in a plan."""
 _LEAST_Q = 1e-14
+"""Least q of the first estimate, as a share of its greatest; keeps times finite."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -35,6 +35,7 @@ _PERIODS_TO_FULL_ACCELERATION = 8
 """Periods in which the acceleration builds up if no jerk is limited."""
 
 _PERIODS_TO_FULL_FEED = 16
+"""Periods in which the feed builds up if no acceleration is limited."""
 
 
 @dataclass(frozen=True, eq=False)

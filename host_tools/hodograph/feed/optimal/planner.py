@@ -27,10 +27,18 @@ _ABOVE = 3e-4
 """A plan may exceed a limit by this share; to remove a greater excess, it runs slower."""
 
 _ZONE_SHARE, _BESIDE_MM = 0.998, 2.0**-12
+"""A zone that caps a finished plan: the share of its feed that is used, since pieces may exceed a limit a little; and
+the distance from a knot within which the zone also covers the interval beyond.
+"""
 
 _EASED = (1e-5, 1e-4, 1e-3)
+"""Further attempts: times in which the acceleration builds up, as shares of three times the mean least time of a
+segment.
+"""
 _POOR = 1.02
+"""An attempt whose plan has to be slowed by less than this factor is final."""
 _MANY_PERIODS = 100.0
+"""If the second share of _EASED is longer than this number of periods, the attempt without easing is left out."""
 
 _POWER = {"acceleration_mm_s2": 2, "centripetal_mm_s2": 2, "jerk_mm_s3": 3}
 """Power of the feed to which a limited quantity is proportional; 1 for other keys."""

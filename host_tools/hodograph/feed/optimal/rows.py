@@ -24,9 +24,13 @@ JERK_ROW = 1.5
 """Factors of p between which the tangent of a jerk's right side holds its greatest share, and half of it."""
 
 _NEAR = 0.7
+"""Limit usage above which a basic point makes a row."""
 _LEAST_P = 0.05
+"""Least p of the next feed, as a share of the present p, where a row keeps p above 0."""
 _FULL = 0.99
+"""Limit usage above which any point makes a row."""
 _FALLEN = 0.11
+"""A point makes such a row once its p has fallen below this share of the last one."""
 
 
 @dataclass(frozen=True, eq=False)

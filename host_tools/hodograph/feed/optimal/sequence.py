@@ -2,10 +2,14 @@
 """The sequence of planning windows (parts that are planned at once) over a whole path; docs/theory/feed.md 5.6. Used by
 optimal/planner, stream/tails and stream/windows. No I/O.
 
-With windows, time and memory are proportional to length. Each window is planned to rest at its own end, so a motion to
-rest inside all limits always exists. Only the first part of a window is kept, which the stop at the end does not
-affect; the next window begins there with the same F, F', F''. A window is planned again if its pieces exceed a limit:
-next to rest and at sudden changes a polynomial of degree 7 differs from the feed over arc length that it replaces.
+With windows, time and memory are proportional to length. A window has a grid of intervals (grid.py). Each window is
+planned to rest at its own end, so a motion to rest inside all limits always exists. The stop at the end of a window
+affects only its last intervals; these are not kept. The next window begins at the end of the kept part with the same
+F, F', F'' (arc length, feed and acceleration).
+
+The feed over arc length becomes pieces: polynomials of degree 7 in time (track.py). Next to rest and at sudden changes
+a piece differs from the feed that it replaces. If a piece exceeds a limit, its window is planned again with tighter
+limits on that interval.
 """
 
 from __future__ import annotations
@@ -32,12 +36,16 @@ _STOPS = 4.0
 """The part of a window that is not kept, as a multiple of the stopping time."""
 
 _RETREATS = 4
-
+"""How often a window without a solution is tried from an earlier knot: each time two thirds of the intervals before it
+are kept.
+"""
 
 _EXCEEDED = 1.003
+"""Limit usage of a piece above which its window is planned again."""
 _MOST_TIGHTENED = 3
+"""How often a window is planned again with tighter limits."""
 _INHERITED = 2
-"""Intervals whose limits stay, since the state at the start of a window determines them."""
+"""First intervals of a window whose limits are not tightened: its state at the start determines most of them."""
 
 
 class NothingFoundError(PlanError):
@@ -47,7 +55,9 @@ class NothingFoundError(PlanError):
 def plan_windows(
     spline: Curve, limits: PlanLimits, period_s: float, intervals: int = INTERVALS
 ) -> Iterator[Ends]:
-    """The parts of the plan in order. Raises NothingFoundError."""
+    """The kept parts of the windows in order, the last one to the end of the path. If no window continues from the kept
+    part, the present window is kept to its rest, and the next one begins there. Raises NothingFoundError.
+    """
     length = spline.length_mm
     overview = _overview(spline, limits, period_s)
     held: Solution | None = None
@@ -86,7 +96,7 @@ def _continued(
     intervals: int,
     period_s: float,
 ) -> Solution | None:
-    """The window that continues from knot `count` of the one before."""
+    """The window that continues the window `held` from its knot `count`; None: the solver finds none."""
     low = float(held.grid.s[count])
     state = State(float(held.q[count]), float(held.slope[count]))
     high = overview.window_end(low, intervals)
@@ -96,28 +106,28 @@ def _continued(
 
 
 def kept(found: Solution, stop_s: float) -> int:
-    """Number of intervals that are far enough from the stop at the end."""
+    """Number of intervals of a window that are kept: those far enough from the stop at its end, at least a third."""
     left = found.duration_s - np.cumsum(found.times)
     count = int(np.count_nonzero(left > _STOPS * stop_s))
     return max(count, found.grid.size // 3)
 
 
 def trusted_to(found: Solution, stop_s: float) -> float:
-    """Arc length up to which the stop at the end affects a window so little that the next one uses its feed as
-    estimate.
+    """Arc length up to which the next window uses the feed of this one as its estimate: the stop at the end of this one
+    affects it little up to there.
     """
     left = found.duration_s - np.concatenate((np.zeros(1), np.cumsum(found.times)))
     return float(found.grid.s[int(np.count_nonzero(left > 2.0 * stop_s))])
 
 
 class _Overview:
-    """Estimates of the length of intervals along the path, and of the stopping time."""
+    """Estimates for the whole path: `count` intervals from its start to each arc length `s`, and the stopping time."""
 
     def __init__(self, s: Real, count: Real, stop_s: float) -> None:
         self.s, self.count, self.stop_s = s, count, stop_s
 
     def window_end(self, low: float, intervals: int) -> float:
-        """Arc length `intervals` further on, or the end of the path if that is near."""
+        """End of a window from `low`: `intervals` further on, or the end of the path if at most 35 % more reach it."""
         at = float(np.interp(low, self.s, self.count))
         if self.count[-1] - at < 1.35 * intervals:
             return float(self.s[-1])
@@ -141,7 +151,9 @@ def stopping_s(limits: PlanLimits, feed_mm_s: float) -> float:
 
 
 def measured(spline: Curve, found: Solution) -> Solution:
-    """The window with tighter limits on intervals whose piece exceeds one by more than 0.3 %."""
+    """The window, planned again with tighter limits until no piece exceeds a limit by more than 0.3 %; after
+    _MOST_TIGHTENED times, the one with the least excess.
+    """
     best, trial = found, found
     usage = _usage(spline, found)
     least, tight = usage.max(), np.ones(usage.size)
@@ -159,6 +171,7 @@ def measured(spline: Curve, found: Solution) -> Solution:
 
 
 def _usage(spline: Curve, found: Solution) -> Real:
+    """The greatest limit usage (n,) of each piece of a window; 0 where limits are not to be tightened."""
     track = make_track(ends_of(found, found.grid.size), 1.0, spline.segment_starts_mm)
     usage = piece_usage(spline, found.setting.limits, track)
     if found.setting.start is not None:

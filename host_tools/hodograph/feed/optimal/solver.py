@@ -16,6 +16,9 @@ from .rows import Rows
 Real = NDArray[np.float64]
 
 TOLERANCE = 1e-8
+"""Tolerance of a quadratic program of highest effort, in limit usage; a solution stays below its limits by about as
+much.
+"""
 
 _CURVATURE = 1e-8
 """A small curvature of the objective, in units of the unknowns' own scale: the solution is then unique."""

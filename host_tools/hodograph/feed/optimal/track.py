@@ -32,8 +32,11 @@ _DRIFT_Q40 = 1024
 """Greatest distance of a program's joints from those of its path, in 2^-40 mm (1e-9 mm)."""
 
 _US = np.linspace(0.0, 1.0, 33)
+"""Places of a piece, as shares of its time, at which peaks are found."""
 _FEW_US = np.sort(np.append(np.linspace(0.0, 1.0, 17), (1.0 / 32.0, 31.0 / 32.0)))
+"""Fewer places, for the limit usage of pieces while a window is planned."""
 _CHUNK = 2000
+"""Pieces that are evaluated at once, to bound the memory."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,26 +25,42 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+"""Places of each interval, as shares of its length, at which limits are evaluated."""
 GRADED_US = (0.03125, 0.0625, 0.1875, 0.3125, 0.4375, 0.5625, 0.6875, 0.8125, 0.9375, 0.96875)
+"""Further places of an interval that is graded next to rest."""
 BASIC_US = (0.0, 0.5, 1.0)
+"""Those places of US that make rows when they are near a limit; the others only once they exceed it."""
 ALLOWED = 5e-4
 """Greatest excess of a plan over a limit, as a share of it."""
 
 _MOST_ROUNDS = 9
+"""Greatest number of quadratic programs on one grid, without their repetitions with exceeded limits."""
 _HURRIED_GAIN = 0.1
+"""Share of the time that a further round has to gain if the first feed inside the limits will do."""
 _BESIDE = 1e-7
+"""Distance of the two samples on both sides of a joint of segments from it, as a share of the interval."""
 _LEAST_Q = 1e-14
+"""Least q between knots, as a share of the greatest q of the window."""
 _LEAST_TYPICAL = 1e-12
+"""Least scale of an unknown q, as a share of the greatest."""
 _LEAST_P = 1e-300
+"""Least p of a known solution, to avoid a division by 0."""
 _LEAST_FALL = 0.1
+"""Share of its last value to which q and p may fall in one round."""
 _LEAST_DIP = 1e-3
+"""Least q between two knots in an estimate, as a share of the lesser q at the knots."""
 _MOST_TRIALS = 3
+"""Greatest number of choices of the knots."""
 _TRUSTED = 2
+"""Rounds after which the durations of intervals show whether knots have to move."""
 _TOLERABLE = 5e-3
+"""Excess below which a feed is taken if the solver finds no better one, as a share of the limit."""
 _LEAST_ESTIMATED = 1e-3
+"""As _LEAST_FALL, in the first round, whose feed is only estimated."""
 _BRIEF = 2.01
 """Least duration of two consecutive intervals in periods, a little more than a program needs."""
 _MOST_JOINED, _LEAST_KNOTS = 4, 4
+"""How often brief intervals are joined to others, and the least number of knots that stay."""
 _PENALTY = 30.0
 """Cost of an excess of 100 % on one interval, in times of the window."""
 
