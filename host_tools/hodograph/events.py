@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8). Used by all modules that
-handle outputs of a program. No I/O.
+"""Events of a program: outputs that switch at arc lengths (docs/reference/protocol.md 1.8). Used by many modules of
+host_tools: program images, jobs, streaming, simulation, the live page. No I/O.
 """
 
 from __future__ import annotations

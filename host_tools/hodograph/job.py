@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A job: a toolpath as sections from rest to rest, each with its program. Used by all modules that plan, run or show a
-toolpath. Reads the toolpath file or stdin.
+"""A job: a toolpath as sections from rest to rest, each with its program. Used by many modules of host_tools: the
+commands import and stream, the Python API, reports. Reads the toolpath file or stdin.
 
 `load_job` divides a toolpath into sections, fits a curve to each within the tolerance, and gives it a pipeline that
 makes its program. Commands at rest (dwells, spindle, outputs, tool changes) are kept with the section that follows

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What a machine requires of plans and programs: its limits in the forms of feed/, program/ and native/, and what its
-controller proves of a program with them. Used by all modules that plan or check programs for a machine. No I/O.
+controller proves of a program with them. Used by many modules of host_tools: the pipelines, streaming, the checks of
+programs, reports. No I/O.
 """
 
 from __future__ import annotations

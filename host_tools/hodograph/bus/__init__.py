@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The CAN side of the host tools. Used by all modules that use a bus or a recording.
+"""The CAN side of the host tools. Used by many modules of host_tools: commands, commissioning, streaming, the live
+page, fault cases.
 
 sdo          sends to the controller: objects, programs, commands; reads its state
 capture      receives from the bus: frames, recordings, load, setpoint step check

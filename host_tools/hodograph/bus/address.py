@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Names of buses, as python-can has them: `socketcan:vcan0`, `slcan:/dev/ttyACM0@115200`, `virtual:test`; and
-`local:/tmp/bus`, a bus that hodograph-hub serves at this path. Used by all modules that open a bus. Checks whether a
-bus is there; sends and receives nothing.
+`local:/tmp/bus`, a bus that hodograph-hub serves at this path. Used by many modules of host_tools: commands with a bus,
+runs, simulated machines, the live page. Checks whether a bus is there; sends and receives nothing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Straight, jerk-limited moves from the present position of the axes, as programs. Used by all modules that move axes
-to the start of a program. Reads and writes objects of the controller by SDO, and waits by the clock of the bus, real or
-virtual.
+"""Straight, jerk-limited moves from the present position of the axes, as programs. Used by many modules of host_tools:
+the commands goto, run and stream, and the Python API. Reads and writes objects of the controller by SDO, and waits by
+the clock of the bus, real or virtual.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The tables [[axis]] of a machine file, with what the controller writes to each drive (docs/reference/protocol.md
-section 3). Used by all modules that need the axes of a machine. Reads the drive files that the tables name.
+section 3). Used by many modules of host_tools: machine files, commissioning, tuning, simulation, bus load. Reads the
+drive files that the tables name.
 """
 
 from __future__ import annotations

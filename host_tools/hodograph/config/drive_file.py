@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Drive files: plant, PDFF gains and encoder of one simulated axis (paper section 5). Used by all modules that need the
-plant of an axis. Reads the file that it is given.
+"""Drive files: plant, PDFF gains and encoder of one simulated axis (paper section 5). Used by many modules of
+host_tools: machine files, simulation, tuning, campaigns, verification. Reads the file that it is given.
 """
 
 from __future__ import annotations

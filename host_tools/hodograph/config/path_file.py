@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reads path files: the curve, the requested feed, its limits, and the machine to run it on. Used by all modules that
-need a path file. Reads the file that it is given, and the paths that a list names.
+"""Reads path files: the curve, the requested feed, its limits, and the machine to run it on. Used by many modules of
+host_tools: the pipeline, jobs, streaming, reports, campaigns. Reads the file that it is given, and the paths that a
+list names.
 """
 
 from __future__ import annotations

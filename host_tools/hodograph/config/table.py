@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reading TOML tables with checks whose messages name the file, the key and the remedy. Used by all modules that read
-input files. Reads the file that it is given, and checks whether files are there.
+"""Reading TOML tables with checks whose messages name the file, the key and the remedy. Used by many modules of
+host_tools: the readers of path, machine, drive, scenario and campaign files. Reads the file that it is given, and
+checks whether files are there.
 
 A `Table` keeps its file and the name of its section. Each getter returns a value of the promised type and range, or
 raises `InputError` with one line such as `path.toml: [feed] nominal_mm_s must be a number, but is "fast"`.

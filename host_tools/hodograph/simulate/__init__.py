@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs without a bus, and the analysis that they share with recorded ones. Used by all modules that simulate a run or
-handle its result. `write_trace` writes a file; no other I/O.
+"""Runs without a bus, and the analysis that they share with recorded ones. Used by many modules of host_tools: the
+commands simulate and run, reports, tuning, campaigns. `write_trace` writes a file; no other I/O.
 
 `simulate` runs a program through the controller's own kernels and the simulated drives of its axes in one process;
 `simulate_on` takes them from a machine. `analyse` makes the same result from a recording of the bus. All give a

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima. Used by all modules that make the
-result of a run or show it. No I/O.
+"""The result of a run, simulated or recorded: one row for each tick, hashes, maxima. Used by many modules of
+host_tools: simulation, runs on the bus, reports, the Python API. No I/O.
 """
 
 from __future__ import annotations

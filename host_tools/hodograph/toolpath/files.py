@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Reads toolpath files of every kind, distinguished by the endings of their names. Used by all modules that read a
-toolpath file. Reads the file that it is given, or stdin.
+"""Reads toolpath files of every kind, distinguished by the endings of their names. Used by many modules of host_tools:
+jobs, streaming, the Python API, the command import. Reads the file that it is given, or stdin.
 
 for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
     ...

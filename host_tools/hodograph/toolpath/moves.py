@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Moves and machine commands of a toolpath, in the order in which they happen. Used by all modules that make moves or
-use them. No I/O.
+"""Moves and machine commands of a toolpath, in the order in which they happen. Used by many modules of host_tools: all
+toolpath readers, jobs, streaming. No I/O.
 
 A toolpath is a sequence of the classes below (`Command`). All are frozen. Each carries `line`, the number of the source
 line that it comes from (1-based; 0 if the source has no lines).

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The controller node as an object: configuration, programs, commands, state. Used by all modules that command the
-controller. Reads and writes its objects by SDO, and waits by the clock of the bus, real or virtual.
+"""The controller node as an object: configuration, programs, commands, state. Used by many modules of host_tools:
+commands, the Python API, streaming, the live page, fault cases. Reads and writes its objects by SDO, and waits by the
+clock of the bus, real or virtual.
 
 Speaks SDO through python `canopen` and the controller's EDS; objects are those of docs/reference/protocol.md section 3.
 Each failure is a BusError (no answer, or a wrong one) or a RefusedError (the controller refuses, with its reason).
