@@ -9,8 +9,8 @@
 
 /* Where the CRC begins: so that neither erased memory nor a record of another form passes. */
 #define SEED        UINT32_C(0x52444748)
-#define CRC_AT      12u
-#define HALF_CIRCLE UINT32_C(0x80000000)
+#define CRC_AT      12u                  /* offset of the CRC-32 in the record */
+#define HALF_CIRCLE UINT32_C(0x80000000) /* sequence numbers wrap: less than this ahead is newer */
 
 uint32_t bank_record_room(unsigned bank)
 {

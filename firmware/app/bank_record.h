@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define BANK_RECORD_SIZE 16u
+#define BANK_RECORD_SIZE 16u /* bytes */
 
 struct bank_record {
     uint32_t sequence;

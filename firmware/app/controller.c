@@ -12,11 +12,11 @@
 #include "canopen/cob.h"
 #include "port/port.h"
 
-#define SDO_TIMEOUT_US     2000000u
-#define SDO_BLOCK_SEGMENTS 127u
-#define LAST_OBJECT        0xFFFFu
-#define OFF_TIME_US        1000000u
-#define STOP_BOUND_MOST_US 60000000u
+#define SDO_TIMEOUT_US     2000000u  /* between two requests of a transfer, then it is aborted */
+#define SDO_BLOCK_SEGMENTS 127u      /* of a block of a block transfer; CiA 301: at most 127 */
+#define LAST_OBJECT        0xFFFFu   /* greatest index: parameters of all objects */
+#define OFF_TIME_US        1000000u  /* at a shutdown, for all drives to switch off */
+#define STOP_BOUND_MOST_US 60000000u /* greatest stop time bound that a shutdown waits for */
 
 /* ---- Values at power-on and at a reset ---- */
 

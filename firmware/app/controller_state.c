@@ -5,8 +5,8 @@
 
 #include "port/port.h"
 
-#define SEND_TRIES    40u
-#define SEND_PAUSE_US 500u
+#define SEND_TRIES    40u  /* of a frame while the send queue of the port is full */
+#define SEND_PAUSE_US 500u /* between two tries */
 
 bool controller_configured(const struct controller *controller)
 {

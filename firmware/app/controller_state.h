@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * controller_state: the state of the controller, and the functions on it that several of its parts call (commands,
- * objects, report). app/controller.h begins it, runs it and shuts it down. Used by firmware/app, except its folders.
+ * controller_state: struct controller, the whole state of the controller, and the functions on it that commands,
+ * objects and report share. controller.c initialises the struct, runs the main loop on it and shuts it down. Used by
+ * firmware/app, except its folders.
  *
- * All functions: main loop.
+ * All functions: main loop. The timer and receive interrupts use the first part of the struct, under the port's lock.
  */
 #ifndef APP_CONTROLLER_STATE_H
 #define APP_CONTROLLER_STATE_H
@@ -28,10 +29,10 @@
 #include "canopen/sdo_server.h"
 #include "od_controller.h"
 
-/* The valid configuration: confirmed by the host, or restored from the store. */
+/* Which configuration (machine, drives, limits) is valid: its CRC-32, if `known`. */
 struct configured {
-    bool known;
-    bool restored;
+    bool known;    /* confirmed by the host, or restored */
+    bool restored; /* from the parameter store; known only if the host had confirmed it */
     uint32_t crc32;
 };
 
@@ -40,8 +41,8 @@ struct controller {
     struct machine machine;
     struct tick tick;
     struct frame_queue queue;
-    bool checks_chunk; /* the main loop checks a chunk; the motion may continue meanwhile */
-    /* stop commands received during that check, bit by enum command; they wait in the queue as well */
+    bool checks_chunk; /* the main loop checks a chunk of a job; axes may move meanwhile */
+    /* stop commands received while checks_chunk, one bit for each enum command; the same frames also wait in `queue` */
     uint16_t urgent;
     /* main loop only */
     struct config config; /* the same values as machine.config */
@@ -59,18 +60,19 @@ struct controller {
     struct nmt_slave nmt;
     struct heartbeat_producer heartbeat;
     struct emcy_producer emcy;
-    uint32_t polled_us;             /* port_time_us() of the last poll */
-    uint32_t reported_serial;       /* machine.fault_serial of the last EMCY */
-    enum machine_state noted_state; /* last one logged */
-    enum cia402_state noted_drive[AXES_MAX];
-    struct drive_trouble noted_trouble;
-    enum machine_refusal refusal; /* of the last command */
-    bool ending; /* the shutdown has begun: nothing may be switched on or started */
-    uint8_t node;
-    bool limit_noted[AXES_MAX]; /* an internal limit was logged, and is still active */
+    uint32_t polled_us;                      /* port_time_us() of the last poll */
+    uint32_t reported_serial;                /* machine.fault_serial of the last EMCY */
+    enum machine_state noted_state;          /* last logged state of the machine, */
+    enum cia402_state noted_drive[AXES_MAX]; /* of the drives, */
+    struct drive_trouble noted_trouble;      /* and last logged trouble of a drive */
+    enum machine_refusal refusal;            /* why the last command was refused */
+    bool ending;                /* the shutdown has begun: nothing may be switched on or started */
+    uint8_t node;               /* node number of the controller */
+    bool limit_noted[AXES_MAX]; /* statusword bit 11, internal limit, was logged and is still set */
 };
 
-/* Whether the present configuration is the one that was confirmed or restored. Otherwise nothing may be switched on. */
+/* Whether the configuration is unchanged since the host confirmed it or it was restored. Otherwise nothing may be
+ * switched on. */
 bool controller_configured(const struct controller *controller);
 
 /* Whether axes move (machine_moving). Takes the port's lock. */
@@ -83,15 +85,15 @@ void controller_heartbeat(struct controller *controller, uint32_t elapsed_us);
  * due and calls port_progress(). `self`: the controller. */
 void controller_beat(void *self);
 
-/* Call these before and after the check of a chunk: stop commands that arrive in between take effect at once. */
+/* Called before and after the check of a chunk. Stop commands that arrive during the check take effect at once. */
 void controller_check_begins(struct controller *controller);
 void controller_check_ends(struct controller *controller);
 
 /* The node is its own NMT master: from PRE-OPERATIONAL to OPERATIONAL. */
 void controller_start_itself(struct controller *controller);
 
-/* Sends a frame. If the port is full, waits for some frame times, then drops the frame: every protocol above tolerates
- * a lost frame. */
+/* Sends a frame. If the send queue of the port stays full for 20 ms, the frame is lost: SDO, heartbeat and EMCY
+ * tolerate a lost frame. */
 void controller_send(const struct can_msg *message);
 
 #endif

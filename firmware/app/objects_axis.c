@@ -146,6 +146,7 @@ uint64_t object_read_velocity_mapped(struct controller *controller, const struct
 
 /* ---- The outputs of the path: 0x180C, 0x1A0C, 0x2036 ---- */
 
+/* entry of a PDO mapping: object 0x2036, the outputs of the I/O module */
 #define OUTPUTS UINT32_C(0x20360000)
 
 uint64_t object_read_outputs_cob_id(struct controller *controller, const struct od_entry *entry)

@@ -101,7 +101,7 @@ static uint64_t header_number(const struct program_slot *slot, uint8_t sub)
 #define FAULT_FIRST 20u
 #define AXES_NUMBER 24u /* then start and end of the axes after the plane */
 #define START_REST  25u
-#define END_REST    (START_REST + AXES_MAX - PROGRAM_PLANE)
+#define END_REST    (START_REST + AXES_MAX - PROGRAM_PLANE) /* the same of its end */
 
 /* The first piece whose stop time bound is the longest one, which the header holds. */
 static uint32_t longest_piece(const struct program *p, enum program_stop_kind kind,

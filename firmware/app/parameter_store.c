@@ -13,12 +13,12 @@
 #include "core/crc32.h"
 #include "port/port.h"
 
-#define HEADER_BYTES 12u
-#define CONFIG_AT    4u
-#define CONFIRMED_AT 8u
-#define NUMBER_MAX   8u
-#define NODE_NUMBER  0x2054u
-#define ALIGNMENT    8u /* port.h: what is written can be read at multiples of it */
+#define HEADER_BYTES 12u     /* CRC-32 of the layout, and the next two */
+#define CONFIG_AT    4u      /* offset of the CRC-32 of the configuration */
+#define CONFIRMED_AT 8u      /* offset of the byte: the host confirmed it */
+#define NUMBER_MAX   8u      /* bytes of the greatest number */
+#define NODE_NUMBER  0x2054u /* object: node number of the controller */
+#define ALIGNMENT    8u      /* port.h: what is written can be read at multiples of it */
 
 static bool is_parameter(const struct od_entry *entry)
 {

@@ -13,7 +13,7 @@
 #include "core/program_check.h"
 #include "port/port.h"
 
-#define COPY_BYTES 256u
+#define COPY_BYTES 256u /* written at once, between two calls of program_table_attend */
 
 void program_slot_init(struct program_slot *slot)
 {

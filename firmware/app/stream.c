@@ -18,6 +18,7 @@ struct stream_chunk {
     struct chunk chunk;
 };
 
+/* bytes of a block of the ring before those of its chunk */
 #define HEAD_SIZE ((uint32_t)sizeof(struct stream_chunk))
 
 /* Hosts make chunks so small that three with such heads fit the ring (docs/reference/protocol.md 3.7). */

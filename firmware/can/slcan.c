@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-#define STAMP_DIGITS 4u
+#define STAMP_DIGITS 4u /* of a time stamp, optional after the data */
 #define HEAD_SIZE    5u /* t, identifier, length */
 
 static char digit(uint32_t value)

@@ -117,6 +117,7 @@ uint16_t cia402_device_statusword(const struct cia402_device *device)
     return (uint16_t)(flags | cia402_status_bits(device->state));
 }
 
+/* Commands to the state machine, decoded from a controlword. */
 enum command {
     COMMAND_DISABLE_VOLTAGE,
     COMMAND_QUICK_STOP,

@@ -9,8 +9,8 @@
 #include "canopen/nmt.h"
 #include "canopen/sdo_abort.h"
 
-#define AXIS_NODE   0x2005u
-#define MODULE_NODE 0x2035u
+#define AXIS_NODE   0x2005u /* object: node number of the drive of each axis */
+#define MODULE_NODE 0x2035u /* object: node number of the I/O module */
 
 /* The next attempt begins after a pause. */
 static void pause_for(struct drive_boot *boot, uint32_t pause_us)

@@ -19,7 +19,7 @@
 #include "app/machine/config.h"
 #include "canopen/sdo_client.h"
 
-#define DRIVE_BOOT_SDO_TIMEOUT_US 500000u
+#define DRIVE_BOOT_SDO_TIMEOUT_US 500000u /* for the answer of a drive */
 #define DRIVE_BOOT_PAUSE_US      20000u /* hosts write several objects at once: wait for the last */
 #define DRIVE_BOOT_RETRY_US      200000u
 #define DRIVE_BOOT_READ_AGAIN_US 5000u /* a value that a drive takes over in its own cycle */

@@ -96,10 +96,10 @@ struct drive_pdo {
 
 #define PROFILE_DRIVE 402u /* low half of 0x1000 */
 #define PROFILE_IO    401u
-#define SYNC_COUNTER  240u
-#define SYNCHRONOUS   1u /* transmission types */
+#define SYNC_COUNTER  240u /* last value of the counter in SYNC */
+#define SYNCHRONOUS   1u   /* transmission types */
 #define ON_CHANGE     255u
-#define INHIBIT_MS    10u
+#define INHIBIT_MS    10u /* between two PDOs sent on change */
 
 enum { QUICK_STOP = 3 };     /* 0x6007: the reaction to a lost connection */
 enum { QUICK_STOP_OFF = 2 }; /* 0x605A, 0x605E: by 0x6085, then off, then Fault */

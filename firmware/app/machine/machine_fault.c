@@ -6,7 +6,7 @@
 
 #include "app/machine/machine_drives.h"
 
-#define EMCY_CLASS 0xFF00u
+#define EMCY_CLASS 0xFF00u /* bits of an error code: its class */
 
 /* ---- Into a fault: which reaction it gets, and what replaces its reason ---- */
 

@@ -6,7 +6,7 @@
 
 /* LSI 32 kHz / 64 = 500 Hz */
 #define DIVIDE_BY_64 4u
-#define RELOAD       2000u
+#define RELOAD       2000u /* counts until the reset: 4 s */
 
 /* The registers take some cycles of the slow clock. */
 #define POLLS 1000000u
