@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+/* COB-IDs; end of the SYNC counter; bits of a controlword that mean enable operation. */
 enum { SYNC = 0x080, RPDO1 = 0x200, OVERFLOW = 240, ENABLED = 0x0F };
 
 void fault_ticks_init(struct fault_ticks *ticks)

@@ -20,6 +20,8 @@
 
 #include "hub/frame_bits.h"
 
+/* Receive buffer of a connection; packets taken from one connection before the next one has its turn; longest wait
+ * between two checks of all connections. */
 enum { BUFFER_BYTES = 4 * 1024 * 1024, PACKETS_AT_ONCE = 64, POLL_ALL_MS = 20 };
 
 #define NS_PER_S      1000000000u

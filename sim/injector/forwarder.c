@@ -5,6 +5,7 @@
 
 #include <string.h>
 
+/* A frame that waits for its successor, to be reordered, is sent after this time. */
 enum { HOLD_NS = 20000000 };
 
 /* The effect of the rules on one frame. */

@@ -3,7 +3,7 @@
  * period; all in one context. */
 #include "node/axis_stop.h"
 
-#define WAIT_MAX_US 1000000u
+#define WAIT_MAX_US 1000000u /* longest wait for the target position */
 
 /* 0x605A and 0x605E: what the codes from 1 on mean, those above STAY for 0x605A only. */
 enum { SLOW = 1, CURRENT_LIMIT = 3, VOLTAGE_LIMIT = 4, STAY = 4 };

@@ -11,7 +11,10 @@
 /* A Newton step shorter than this ends the search; the distance is then wrong by about its square
  * times the curvature. */
 static const double CONTOUR_STEP_MM = 1e-6;
+/* Greatest number of Newton steps; where they fail: samples on each side of the arc length, and steps of the golden
+ * section between two of them. */
 enum { CONTOUR_STEPS = 12, CONTOUR_SAMPLES = 64, CONTOUR_SECTIONS = 80 };
+/* A foot is accepted within this multiple of the distance at the arc length, along the curve. */
 static const double CONTOUR_WINDOW = 4.0;
 
 struct foot {

@@ -7,6 +7,8 @@
 #include <stdbool.h>
 #include <string.h>
 
+/* The objective has differences up to this order; greatest number of Newton steps for one barrier, and of trials in
+ * the line search of a step. */
 enum { SMOOTHING_ORDER = 3, SMOOTHING_STEPS = 60, SMOOTHING_TRIALS = 40 };
 static const double SMOOTHING_CLOSE = 1e-3;  /* a step that gains less, in barriers, is the last */
 static const double SMOOTHING_FIRST = 1e-3;  /* barrier of the first minimum */

@@ -6,14 +6,15 @@
 
 #include <math.h>
 
-#define GREATEST_CODE 255
+#define GREATEST_CODE 255  /* codes of jerk and deceleration are bytes */
 #define LEAST_MM_S    1e-4 /* slower is standstill */
 #define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
-/* ticks of a brake between two tests whether bounds show the limits kept, for its remaining ticks or so many ticks */
+/* ticks of a brake between two tests by bounds: whether these ticks, or all remaining ones, keep the limits */
 #define SURE_EACH   12
-#define SPARE_TIME  1.25 /* of stop_brake_time, */
-#define SPARE_TICKS 10.0 /* and ticks more */
-/* of a feed, or the velocity of an axis: at other overrides the states include some that look-ahead excludes */
+#define SPARE_TIME  1.25 /* bounds of a whole brake cover this multiple of stop_brake_time, */
+#define SPARE_TICKS 10.0 /* and this number of ticks more */
+/* share by which a feed, or an axis' velocity, may exceed its limit at overrides other than 1: the sampled states there
+ * include some that the look-ahead of the controller excludes */
 #define FASTER 0.03
 
 double stop_number_of(int k, int code)

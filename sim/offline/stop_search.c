@@ -10,10 +10,12 @@
 #include "offline/stop_piece.h"
 #include "offline/stop_verdict.h"
 
-#define GREATEST_CODE 255
-#define WAIT_BETTER   0.8   /* of the mean time: no brake is used if waiting takes less; */
-#define WAIT_AS_GOOD  1.001 /* or about as long, if the brake could also take much longer */
-#define NEAR 1.05 /* times the least time without limits: below it no other start is tried */
+#define GREATEST_CODE 255 /* codes of jerk and deceleration are bytes */
+/* A piece gets no brake if waiting for that of the next piece takes a share of the brake's mean time below: */
+#define WAIT_BETTER  0.8   /* this; */
+#define WAIT_AS_GOOD 1.001 /* or this, if the brake could also take much longer */
+/* times the least time without limits: codes that take at most this are not searched for from other starts */
+#define NEAR 1.05
 
 struct choice {
     int codes[3];

@@ -9,10 +9,10 @@
 #include "core/feed_override.h"
 #include "core/interpolator.h"
 
-#define MOST_COMMANDS 4u
-#define MOST_BETWEEN  60u
-#define MOST_TICKS    200000u
-#define HISTORY       3u
+#define MOST_COMMANDS 4u      /* before the stop that ends a trial */
+#define MOST_BETWEEN  60u     /* ticks between two commands */
+#define MOST_TICKS    200000u /* of the motion after the stop command */
+#define HISTORY       3u      /* setpoints before the newest: a third difference needs them */
 #define NOISE_MM_S3   20.0 /* of a kernel in third differences at 1 kHz; docs/theory/proofs.md 16 */
 
 #define ARC PROGRAM_AXES /* after the axes of a setpoint: its arc length */

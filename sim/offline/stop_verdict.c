@@ -9,10 +9,10 @@
 #define FINE_S         0.0005 /* and in the strict test */
 #define BRAKE_EACH     5      /* ticks of a brake that another may replace, */
 #define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
-#define LONGEST_SHARE  0.1
+#define LONGEST_SHARE  0.1    /* of the longest brake in the cost of codes */
 #define FAR_TICKS                                                                                  \
     20.0 /* and twice the brake: so far from its end a brake fits before the end of the program */
-#define NO_BRAKE_S 10.0
+#define NO_BRAKE_S 10.0 /* longest brake in the cost of codes with which none begins */
 
 /* What a brake has to keep; `surely`: it does. */
 struct keeping {

@@ -17,7 +17,7 @@
 
 /* codes below the greatest: a brake with less than an eighth of a limit is not used */
 #define STOP_FEWER   24
-#define STOP_NEVER_S 1e6
+#define STOP_NEVER_S 1e6 /* time of a stop that is not possible */
 
 /* Times to standstill from the instants of a piece, from the last to the first: of a brake, or of waiting for one. */
 struct stop_times {
