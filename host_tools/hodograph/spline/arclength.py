@@ -19,6 +19,7 @@ from .bernstein import Real, basis
 Index = NDArray[np.intp]
 
 EXACT = 2.0**-52
+"""Tolerance of `locate`, relative: the spacing of doubles."""
 
 
 class ArcLengthChain(ABC):

@@ -13,7 +13,9 @@ import numpy as np
 from .bernstein import Complex, Real, halves, square_modulus
 
 _RELATIVE_GAP = 1e-13
+"""Relative difference of bound and value at which the search ends."""
 _MOST_ROUNDS = 60
+"""How often intervals are halved."""
 
 
 def curvature_numerator(w: Complex) -> Real:

@@ -19,7 +19,9 @@ LEFT, RIGHT = -1, 1
 """Sides of a joint of segments: PH quintic splines are C2, the slope of the curvature jumps there."""
 
 _AT_JOINT = 1e-9
+"""Distance in the curve parameter within which a place counts as the joint."""
 _CLOSE = 1e-11
+"""Tolerance of the curve parameter of a place."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,13 +22,21 @@ from .quality import Shape
 from .system import EndRule, System, coefficients_between
 
 _SHARP_FACTOR = 1.3 * np.pi
+"""Turning by one root of w, rad, above which a span is near that root."""
 _SHARP_SPAN = 1.25 * np.pi
+"""Turning of a span, rad, above which it is chosen without a comparison."""
 _STRAYED = 0.5 * np.pi
+"""Difference of the turning angles of a span near a root and of its guide, rad, above which it is chosen."""
 _TIGHT = 100.0
+"""Bending energy times length above which a span near a root is chosen."""
 _REACH = 8
+"""Spans on each side of the chosen one that are solved again with it."""
 _GAIN = 0.8
+"""A change is taken if it reduces the energy below this share."""
 _PASSES = 3
+"""Greatest number of passes over the suspect spans."""
 _MOST_STEPS = 12
+"""Greatest number of Newton steps for a window."""
 
 
 @dataclass(frozen=True)

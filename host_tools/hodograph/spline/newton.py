@@ -19,10 +19,15 @@ from .banded import SingularSystem
 from .bernstein import Real
 
 _ROUNDING = 16.0 * 2.0**-52
+"""Residual, relative to its terms, that counts as 0: 16 units in the last place."""
 _STAGNATION = 1e-11
+"""Residual that also counts as 0 once a step reduces it by less than half."""
 _MOST_STEPS = 20
+"""Greatest number of steps."""
 _SMALLEST_STRIDE = 2.0**-12
+"""Continuation fails if a step has to be a smaller part of it than this."""
 _BULGES = (0.0, 0.25j, -0.25j)
+"""Detours of the continuation, tried in this order; those off the real axis only for planar splines."""
 
 Unknowns = NDArray[Any]
 """Unknowns of M spans: (M,) complex in the plane, (M, 3) real in space; residuals and chords likewise."""

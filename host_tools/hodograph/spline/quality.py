@@ -28,7 +28,9 @@ def _rule(points: int, panels: int) -> tuple[Real, Real]:
 
 
 _SMOOTH = _rule(6, 1)
+"""Quadrature of usual spans."""
 _SHARPER = ((0.5 * np.pi, _rule(12, 2)), (0.75 * np.pi, _rule(16, 8)))
+"""Finer quadratures, each for spans in which one root turns its factor by more than an angle, rad."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from .system import System
 from .verdict import Verdict, judge
 
 _ROUNDS = 3
+"""Greatest number of rounds that remove remaining loops."""
 
 
 @dataclass(frozen=True)

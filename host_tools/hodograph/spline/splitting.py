@@ -18,8 +18,11 @@ from .bernstein import Real, halves, restricted, square, square_modulus
 from .quintics import halved
 
 _HAIR = 1.0 - 2.0**-20
+"""The speed ratio is kept with this margin, so that rounding of the program does not exceed it."""
 _SHORTEST_MM = 2.0**-20
+"""A part that is shorter and still uneven cannot be split: an error."""
 _MOST_ROUNDS = 64
+"""Greatest number of rounds in which uneven parts are split."""
 _MOST_EXTRA = 127.0
 """Greatest move of an extra axis in a segment; the format allows 128 mm or degrees."""
 

@@ -12,7 +12,9 @@ import numpy as np
 from .bernstein import Complex, Real, halves, rotation
 
 _REST = 1e-6
+"""Share of the size of a hodograph up to which it counts as 0 at a joint."""
 _NUDGE = 1e-3
+"""Share of that size by which a hodograph that is 0 is moved aside."""
 
 
 def without_rests(hodograph: Complex, closed: bool) -> Complex:

@@ -18,9 +18,13 @@ from .bernstein import Complex, Real, square_modulus
 from .quality import Shape
 
 EXTRA_TURNING_RAD = 1.25 * np.pi
+"""Turning of a span beyond that of the guide curve above which the spline has a loop too many."""
 _TIGHT = 1e3
+"""Bending energy times length of a span that is refused if the guide curve has much less."""
 _TIGHTER_THAN_GUIDE = 1e2
+"""The ratio of both that counts as much."""
 _CUSP = 1e6
+"""Bending energy times length that is refused whatever the guide curve has."""
 _STRAIGHT = 1e-6
 """Bending energy times length of an arc of 1e-3 rad. A guide that reverses on a straight line has less: its bends lie
 between the samples.

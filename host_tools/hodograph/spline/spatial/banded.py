@@ -11,6 +11,7 @@ from ..banded import SingularSystem
 from ..bernstein import Real
 
 _BLOCK = 3
+"""Unknowns of a span."""
 _REACH = 2 * _BLOCK - 1
 """Greatest distance of an entry from the diagonal, on either side."""
 

@@ -23,6 +23,7 @@ span, over the greater step.
 _REPEATED = 1e-9
 
 _SHORT_MM = 1e-4
+"""Spans shorter than this have rounded coefficients, as in a program."""
 
 
 def with_extra_axes(curve: SpatialPHSpline, values: Real) -> SpatialPHSpline:

@@ -19,8 +19,11 @@ Rates = Callable[[Real, Real], tuple[Real, Real, Real]]
 """From coefficients of spans and places xi: speed, curvature * speed and curvature^2 * speed."""
 
 _UNEVEN = 2.0
+"""Ratio of greatest to least parametric speed above which a span is sampled finely."""
 _SHARP_RAD = 0.8
+"""Turning of the tangent above which a span is sampled finely."""
 _SAMPLES = 8
+"""Parts of a span for the turning of its tangent."""
 
 
 def _rule(points: int, panels: int) -> tuple[Real, Real]:
