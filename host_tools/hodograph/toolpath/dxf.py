@@ -26,8 +26,10 @@ from .moves import Command
 
 _BINARY = b"AutoCAD Binary DXF"
 _DEEPEST_INSERT = 32
+"""Greatest depth of blocks inside blocks."""
 
 _SURVEY_FOOT_MM = 1.2e6 / 3937.0
+"""US survey foot, 1200/3937 m."""
 _INCH_UNITS_MM = {
     1: 25.4,
     2: 304.8,
@@ -44,6 +46,7 @@ _INCH_UNITS_MM = {
 
 _BY_BLOCK, _BY_LAYER = 0, 256
 _WHITE = 7
+"""Colour number of entities without a colour."""
 
 
 def read_dxf(path: Path, options: DrawingOptions) -> Iterator[Command]:

@@ -21,8 +21,11 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _CHORD_SHARE = 0.005
+"""Distance of the curve from its chords, as a share of the tolerance."""
 _MOST_PIECES = 4096
+"""Greatest number of chords of a segment."""
 _HALVINGS = 16
+"""How often chords that are too far from the other path are halved before their distance counts."""
 _BESIDE = (2, 6, 6, 24)
 """Chords on either side of the nearest one found that are compared, at first and after each of the first halvings;
 later 6. In noise, places of two chains correspond only roughly.

@@ -20,9 +20,13 @@ from .corners import SHAPES, corners
 Real = NDArray[np.float64]
 
 _STEPS = 8
+"""Greatest number of Newton steps."""
 _JOINED = 1e-12
+"""Residual at which the chain counts as joined."""
 _NEARLY = 1e-10
+"""Residual above which the solution is refused after the last step."""
 _LEAST_MM = 1e-9
+"""A leg longer than this is a straight piece of its own."""
 
 
 @dataclass(frozen=True, eq=False)

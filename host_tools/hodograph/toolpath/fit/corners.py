@@ -23,7 +23,9 @@ SHARPEST_RAD = 2.6
 """Sharper turns are stops: a corner curve would take as long."""
 
 _PLACES = 33
+"""Samples of a corner curve."""
 _ANGLES = 60
+"""Turning angles of the table of corners."""
 
 
 @dataclass(frozen=True)

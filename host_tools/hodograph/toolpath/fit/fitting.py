@@ -31,6 +31,7 @@ _CORNER_SHARE, _ROOM_SHARE = 0.985, 0.985
 """Shares of the tolerance for corner curves, and for stations of smoothed stretches."""
 
 _LEG_SHARE = 0.98
+"""Share of a leg that the corners at its two ends may use together."""
 _STRAIGHT_ROOM = 10.0
 """Usable leg length, in tolerances, of a vertex without change of direction, where a stretch may end."""
 
@@ -38,10 +39,15 @@ _ENDS = 8.0
 """Length of a long leg that a stretch uses, in multiples of the usable leg length of the vertex there."""
 
 _BARRIER = 3e-7
+"""Barrier of the last minimum of the smoothing."""
 _POWER = 5
+"""Power of the speed in the weights of the smoothing."""
 _ROUNDS = 8
+"""Rounds of smoothing, each with the speeds of the last one."""
 _REPAIRS = 12
+"""How often the fit is made again with less deviation at places that exceed the tolerance."""
 _MOST_FOR_CHOICE = 20_000
+"""Greatest number of chords of a section for which alternatives are compared."""
 _SLOW_SHARES = (0.5, 0.25)
 """Greatest speeds of further estimates, as shares of the speed above which acceleration and not jerk limits the
 motion.
@@ -52,7 +58,9 @@ _LESS_ROOM = (0.95, 0.95, 0.95, 0.75)
 later ones. In the first rounds the new stations help; lower bounds cost time.
 """
 _THIN_SHARE = 0.01
+"""Points nearer than this share of the tolerance to the chord of their neighbours are left out."""
 _THIN_ROUNDS = 4
+"""How often points are left out."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,8 +22,11 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _MOST_ARC_CHORDS = 2_000_000
+"""Greatest number of chords of an arc, to bound the memory."""
 _MOST_HALVINGS = 16
+"""Greatest number of halvings of the chords of a spline."""
 _LEAST_CHORD_RAD = 1e-4
+"""Least angle of a chord of an arc."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ Real = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _ORDER = 3
+"""Order of the differences whose squares are minimised: the third, about the jerk."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ Real = NDArray[np.float64]
 
 _ACCELERATION_SHARE, _JERK_SHARE = 0.7, 0.9
 _LEAST_SHARE = 1e-3
+"""Least speed, at rest too, as a share of the feed; keeps times finite."""
 
 
 @dataclass(frozen=True)

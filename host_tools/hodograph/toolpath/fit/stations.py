@@ -37,6 +37,7 @@ _NEAREST = 11.0
 """Least distance, in tolerances, of vertices of smoothed stretches that are not needed to keep `_LINE_SHARE`."""
 
 _THIN_ROUNDS = 12
+"""How often stations are left out."""
 _GRADES = np.array([0.25, 0.5, 0.8, 1.2, 1.8, 2.7, 4.0, 6.0, 9.0, 15.0])
 """Distances of stations from a vertex, in multiples of the usable leg length that its corner curve would need."""
 
@@ -54,7 +55,9 @@ straight.
 """
 
 _MOST_TIMES = 8.0
+"""Greatest reach of a station as a multiple of its leg."""
 _LESS_ELSEWHERE = 0.99
+"""Share of their bound that stations keep where the tolerance is not exceeded."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,12 +32,19 @@ _PEAK = 1.0 / 6.0
 """Deviation at a change of the rate by 1 that is spread over 1 on either side."""
 
 _BESIDE = 24
+"""A change of the rate is spread over at most this number of places on each side."""
 _ROUNDS = 60
+"""Greatest number of rounds in which changes that deviate too far are spread less."""
 _LEAST_SHRINK = 0.5
+"""Least factor of the width of a change in one round."""
 _SURE = 1.0 - 1e-9
+"""Greatest factor of such a width in one round."""
 _PARTS = 8
+"""Parts of a segment for which the difference is bounded one by one."""
 _HALVINGS = 16
+"""How often segments are halved until their quintics are within the tolerance."""
 _EDGE = 1e-6
+"""A segment is not cut nearer than this to its ends, in its parameter."""
 
 _SAME_RATE = 1e-6
 """Rates that differ by less are equal, degrees per mm."""

@@ -17,12 +17,17 @@ from .coordinates import Coordinates, position_of
 from .modes import MM_PER_INCH, Modes
 
 COUNTERCLOCKWISE = 30
+"""Code of G3 in tenths."""
 _SPIRAL_ABSOLUTE_MM = 2 * 0.01 * math.sqrt(2.0)
 _SPIRAL_ABSOLUTE_INCH = 2 * 0.001 * math.sqrt(2.0)
+"""Difference of the radii at start and end of an arc that is always accepted: mm, inch."""
 _SPIRAL_RELATIVE = 1e-3
+"""A greater difference, up to 100 times, is accepted up to this share of the radius."""
 _LEAST_RADIUS_INCH = 5e-5
 _SEMICIRCLE = 1e-12
+"""An R arc this near to a semicircle, relative, is one."""
 MOST_TURNS = 1_000_000
+"""Greatest P word of an arc."""
 _CENTRE_LETTERS = "ijk"
 _AXIS_LETTERS = "xyz"
 

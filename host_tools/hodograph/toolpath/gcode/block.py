@@ -34,10 +34,12 @@ from .source import COMMENT, SourceLine
 
 _LINE_NUMBER = re.compile(r"n[0-9]+(?:\.[0-9]*)?")
 _INTEGER_LETTERS = "hlt"
+"""Words whose value is an integer."""
 GREATEST_VALUE = 1e9
 """Bound of the magnitude of a word's value."""
 
 _VALUE_LETTERS = "abcefhijklpqrstxyz" + POLAR_LETTERS
+"""Words whose value is a number with decimals."""
 
 
 @dataclass(slots=True)
