@@ -30,6 +30,7 @@ _CHUNK = struct.pack("<HB", STREAM, 1)
 _BEGIN, _BLOCK_DONE, _END, _ENDED, _ABORT = 0xC0, 0xA2, 0xC1, 0xA1, 0x80
 _POINTS, _MOST_POINTS = 60, 3000
 _LONGEST = 1 << 20
+"""A captured transfer of this number of bytes or more is ignored: it is no chunk."""
 
 Floats = NDArray[np.float64]
 

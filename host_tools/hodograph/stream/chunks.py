@@ -74,6 +74,7 @@ _TAIL_SHARE = 0.8
 """A chunk is planned only if its tail has room for this share of the last tail's bytes."""
 
 _LONGEST_NAME = 32
+"""Characters of the name in a chunk."""
 _MOVING_FAULTS = frozenset(
     (
         ProgramError.FEED,

@@ -38,7 +38,9 @@ segments.
 """
 
 _LEAST_HALVED_MM = 0.25
+"""Segments are not cut shorter than this for their duration."""
 _SPEED_RATIO = 2.0
+"""Greatest speed ratio of a segment, as of any program."""
 _PAIR_SHARE = 0.997
 """Share of the least feed at which a tick at 200 % would cross more than two ends of segments."""
 
@@ -48,9 +50,11 @@ on them.
 """
 
 _BESIDE_MM = 1e-6
+"""A begin nearer than this to the start of the section counts as the start."""
 LEAST_REST_MM = 0.002
 """A section with a shorter remainder counts as done."""
 _FARTHEST_Q40 = 1 << 62
+"""Arc lengths of a job have to stay below this, the end of the format, 2^-40 mm."""
 
 
 @dataclass(frozen=True, eq=False)

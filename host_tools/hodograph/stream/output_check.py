@@ -28,6 +28,7 @@ _NUMBER = rb"[+-]?(?:\d+\.?\d*|\.\d+)"
 _LITERAL = re.compile(rb"/?\d*(?:[A-Z]" + _NUMBER + rb")*%?")
 _WORD = re.compile(rb"([A-Z])(" + _NUMBER + rb")")
 _MOST_SEEN = 1000
+"""Words that are remembered, so that each is reported once."""
 _DIGITAL, _ANALOGUE = (62.0, 63.0, 64.0, 65.0), (67.0, 68.0)
 
 

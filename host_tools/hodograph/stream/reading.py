@@ -40,6 +40,7 @@ from .geometry import Block, sliced, with_joints
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
 FIRST_CHORDS = 300
+"""Chords of the first fitting window: short, so that the motion begins soon."""
 
 _SEARCHED = 200
 """Chords after a window among which the cut is chosen; if none of them is straight, as many again are searched."""

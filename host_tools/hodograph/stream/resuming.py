@@ -22,7 +22,9 @@ from .plan import JobFiles, Place
 from .reading import StreamReader
 
 _STEP_MM = 0.05
+"""Distance of the samples between which the place is searched."""
 _MOST_SAMPLES = 200_000
+"""Greatest number of these samples."""
 _REFINED = (41, 3)
 """Samples of a refinement, and number of refinements. Each refines by half the number of samples."""
 _BESIDE_MM = 0.01

@@ -45,13 +45,19 @@ AHEAD_S = 20.0
 """Most motion that is sent ahead, so that commands act soon."""
 
 _POLL_S = 0.05
+"""Time between two readings of the controller's state."""
 _PLAN_WAIT_S = 0.05
+"""Time that a call waits for the next planned chunk."""
 _VIRTUAL_PLAN_WAIT_S = 60.0
 """Longest wait for the planner while virtual time stands still."""
 _JOURNAL_S = 1.0
+"""Time between two entries of the journal."""
 _RECORD_S = 0.5
+"""Time between two writes of the recording."""
 _UNDERRUN_S = 10.0
+"""Least time between two notes about underruns."""
 _START_COUNTS = 2
+"""Greatest distance of the axes from the start of the job."""
 _PASSED_Q40 = 1 << 20
 """A section counts as in motion from this distance after its start on, 2^-20 mm."""
 _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0

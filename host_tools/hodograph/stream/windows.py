@@ -81,7 +81,9 @@ the other: 8 are a factor of 2.
 """
 
 _DRIFT_Q40 = 1024
+"""Greatest distance of a planned joint from that of the path, in 2^-40 mm (1e-9 mm)."""
 _SAME_MM = 1e-9
+"""Arc lengths nearer than this are the same."""
 
 
 JOINTS = 4
