@@ -27,7 +27,9 @@ from ..native import Contour, NativeProgram
 from .decoder import Floats, Samples
 
 DRAWN_POINTS = 3000
+"""Greatest number of points of a drawn path."""
 _TABLE_POINTS = 20000
+"""Greatest number of ticks at which arc lengths are tabulated."""
 _ON_PATH_UM = 1.0
 """Greatest distance of setpoints from the curve, which are rounded to counts; beyond it they belong to another
 motion.
@@ -176,9 +178,13 @@ class FollowedPath(Protocol):
 
 
 REACHED_AFTER = 2
+"""Ticks until an axis has reached a setpoint, without the lag of its drive."""
 _HALF_WINDOW_S = 0.010
+"""Half of the time over which derivatives are fitted."""
 _LEAST_HALF = 3
+"""Least number of ticks of that half."""
 _ORDER = 4
+"""Degree of the fitted polynomial."""
 _LONGEST_GAP = 1000
 """Most lost SYNCs that are filled with NaN; after more the filters restart."""
 

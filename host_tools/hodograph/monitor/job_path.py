@@ -27,10 +27,13 @@ motion.
 _STEP_MM, _MOST_SAMPLES = 0.1, 20_000
 """Step in mm of the search for a setpoint whose place is not known."""
 _BESIDE_MM = 1e-3
+"""Distance of the two points by which the tangent of the path is estimated."""
 _KEPT_MM = 50.0
 """Length in mm of the path kept before the last setpoint, for late frames."""
 _MOST_PARTS = 500
+"""Greatest number of parts of a job that are kept."""
 _PROJECTIONS = 4
+"""Steps that project a position onto the path."""
 
 
 @dataclass(frozen=True, eq=False)

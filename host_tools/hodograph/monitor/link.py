@@ -51,7 +51,9 @@ PAUSE_S = 0.2
 WHOLE_S = 1.5
 """Period of reading the state and moving values, and period of reading all values."""
 _ANSWER_S = 3.0
+"""Longest time until an answer of the controller."""
 _RETRY_S = 1.0
+"""Time between two attempts to connect."""
 LONGEST_UPLOAD = 256 * 1024
 """A program up to this size is read from the controller and drawn; larger ones would occupy the bus for too long."""
 

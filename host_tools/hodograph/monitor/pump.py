@@ -34,8 +34,11 @@ from .output_marks import JobMarks, PassedMarks, drawn_marks, output_marks
 from .source import Source, Taken
 
 LOOK_S = 0.04
+"""Period in which received frames are processed, in real time."""
 _STATE_S = 0.25
+"""Least time between two messages of states, in real time."""
 _RETRY_S = 1.0
+"""Time between two attempts to open the bus."""
 
 Publish = Callable[[dict[str, Any]], None]
 

@@ -23,13 +23,17 @@ from .messages import encode
 from .security import HEADERS, Guard
 
 _MOST_REQUEST = 4096
+"""Greatest request, bytes."""
 _HELLO_S = 10.0
+"""Time in which a client has to send its first message."""
 REQUEST_S = 10.0
 """Longest time for a whole request to come, on a new connection and between two requests; aiohttp counts its keep-alive
 time from there.
 """
 _WRONG_TOKEN_S = 0.5
+"""Delay of the answer to a wrong token, so that tokens cannot be tried quickly."""
 _BEAT_S = 10.0
+"""Time between two pings, which show that a client is still there."""
 _POLICY, _TOKEN_NEEDED = 1008, 4401
 """Close codes: not from this page, or no slot is free; the token is missing or wrong."""
 
