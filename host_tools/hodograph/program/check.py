@@ -66,6 +66,7 @@ REACH_Q40 = 1 << 27
 """Greatest distance by which a piece may reach beyond its ends: 2^-14 mm (PIECE_SLACK_MM), plus a gap at a joint."""
 
 _LEAST_FEED_Q24 = 1 << 14
+"""Feeds below this are rounding, as in core/feed_bounds.h: 2^-10 mm/s."""
 
 
 def brief_pairs(joints_q40: Int, pieces: FeedPieces, period_us: int) -> tuple[Int, Real, Real]:
@@ -110,13 +111,21 @@ Bool = NDArray[np.bool_]
 Rule = tuple[Bool, int, ProgramError]
 
 POINT_LIMIT_Q40 = 4096 << 40
+"""Coordinates are below 4096 mm."""
 ARC_LIMIT_Q40 = 1 << 62
+"""Arc lengths are below 2^22 mm."""
 JOIN_ARC = wide(ARC_SCALE << (88 - 34))
+"""Greatest gap of arc length between two segments: 2^-34 mm."""
 CLOSE_ARC = wide(ARC_SCALE << (88 - 24))
+"""Greatest difference of a closed path's length from the sum of its segments: 2^-24 mm."""
 LONGEST_ARC = wide(32 * ARC_SCALE << 88)
+"""Longest segment: 32 mm."""
 DIRECTION_RAD = 2.0**-20
+"""Greatest change of direction between two segments."""
 SLOPE = 2.0**-20
+"""Greatest relative change of an extra axis' slope between two segments."""
 CLOSE_Q40 = 1 << 16
+"""Greatest distance of the last point of a closed path from its first one."""
 TRAVEL_SLACK_Q40 = 2.0**16
 """A path may run along a travel limit: 2^-24 mm of rounding are allowed."""
 BOX_ROUNDING_Q40 = 8.0
@@ -295,13 +304,18 @@ def _leaves(program: Program, limits: ProgramLimits, slack_q40: float = TRAVEL_S
 
 
 COEFFICIENT_Q40 = 1 << 54
+"""Greatest coefficient of a piece."""
 PIECE_Q40 = 32 << 40
+"""Longest piece: 32 mm."""
 JOIN_Q40 = 1 << 6
+"""Greatest gap of arc length or of a coordinate between two pieces or segments: 2^-34 mm."""
 LONGEST_Q32 = 1 << 54
+"""Longest duration of a piece: 2^22 s."""
 JOIN_FEED_Q24 = 2.0**8
 JOIN_ACCELERATION_Q16 = 2.0**10
 """2^-16 mm/s and 2^-6 mm/s^2, in the units to which the controller rounds down what it compares."""
 BACKWARDS_MM_S = -(2.0**-10)
+"""A feed below this is motion backwards; above it, rounding."""
 PIECE_SLACK_MM = 2.0**-14
 """Greatest distance that a piece may move before its start or beyond its end."""
 

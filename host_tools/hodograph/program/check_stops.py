@@ -41,6 +41,7 @@ LITTLE = 0.25
 _ROUNDING = 1e-12
 """Share of a bound that rounding may change here."""
 _MOST_US = 2.0**32 - 1.0
+"""Greatest time of the format."""
 
 
 def stop_fault(

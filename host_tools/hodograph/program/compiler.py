@@ -34,6 +34,7 @@ _FEED_MARGIN_MM_S = 2.0**-22
 
 _U32_MAX = 2**32 - 1
 _MOST_ROUNDS = 12
+"""Greatest number of plans with a feed lowered for the length of their segments."""
 _PLACES = 9
 """Least curvature of a feed piece that messages name, 1/mm."""
 

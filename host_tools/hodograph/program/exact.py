@@ -18,6 +18,7 @@ import mpmath
 from .image import Program
 
 DIGITS = 50
+"""Decimal digits of the arithmetic."""
 
 
 @dataclass(frozen=True)

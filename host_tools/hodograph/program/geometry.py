@@ -56,6 +56,7 @@ def arc_to_q40(distance: Wide) -> Int:
 
 
 LONGEST_SEGMENT_MM = 31.875
+"""Below the 32 mm of the format."""
 PREIMAGE_LIMIT = {2: 64, 4: 8}
 """Components of the preimage are below this, by their number."""
 _ANCHOR_Q40 = 16

@@ -32,6 +32,7 @@ RING_BYTES = 48 * 1024
 """Memory for chunks of the small controllers (0x2060 sub 14)."""
 
 _ROWS = 12
+"""First and last rows of a table that are shown if it is not shown whole."""
 
 
 def inspect_dict(program: Program) -> dict[str, Any]:

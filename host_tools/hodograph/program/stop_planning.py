@@ -39,6 +39,7 @@ WORTH_GAIN = 0.05
 LONGEST_WAIT_S = 0.04
 """Pieces in which a hold may wait longer than this for a brake are halved down to FINE_PART_S."""
 FINE_PART_S = 0.004
+"""Least duration of a part of a halved piece."""
 MOST_FINE_PARTS = 1024
 """Most parts of that length; in a longer program parts last longer, which bounds the time of the search and the
 image.
