@@ -29,11 +29,15 @@ NAME_VARIABLE = "HODOGRAPH_PARTICIPANT"
 MOST_FRAMES = 8
 """In a packet from the hub to a member."""
 _NAME_BYTES = 32
+"""Bytes of a participant's name."""
 _MARK = 0xFFFFFFFF
+"""Begins each packet that is no frame."""
 _NEVER_NS = 2**64 - 1
+"""Time of a participant that waits without limit."""
 _CONTROL = struct.Struct(f"=IHHIIQ{_NAME_BYTES}s")
 _WATCHES, _VIRTUAL, _SENT, _FRAMES = 1, 2, 4, 8
 _VERSION = 3
+"""Version of the protocol of the local bus."""
 _HELLO_MEMBER, _HELLO_PARTICIPANT, _FILTER, _WAIT, _SUSPEND, _CONTINUE = 1, 2, 3, 5, 6, 7
 _WELCOME, _GRANT, _JOINED, _LEFT, _INTERRUPTED = 16, 17, 18, 19, 20
 _NOTICE_S = 0.05

@@ -26,9 +26,11 @@ from .sdo.objects import OVERRIDE
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
+"""Time of the feed ramp of a move."""
 SHORTEST_MOVE_MM = 0.002
 """Shorter moves (the format ends near 1 um) go through a point DETOUR_MM away."""
 DETOUR_MM = 0.1
+"""Least distance of the point through which a short move goes."""
 DETOUR_SHARE, LONGEST_DETOUR_MM = 0.01, 5.0
 """Length of the move of x if only axes after z move: mm for each degree or mm of the longest of their moves."""
 FOLLOWING_SHARE = 0.5

@@ -19,6 +19,7 @@ COMPUTE_US = 55
 """Assumed of the controller, from the request of SYNC to that of the last setpoint: the shortest SYNC at 1 Mbit/s."""
 
 _SCALE = 1_000_000
+"""Microseconds in a second: bits become integers in units of 1 us / bitrate."""
 _SENT_WITH_SYNC = ("setpoints", "offsets", "outputs")
 """Frames of the controller, ready `compute_us` after the request of SYNC, usually while SYNC is on the wire."""
 

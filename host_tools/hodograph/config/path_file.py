@@ -36,7 +36,9 @@ from .table import Table, read_toml
 COORDINATE_LIMIT_MM = 4096.0
 
 _CLOSING = 1e-3
+"""Points nearer than this share of the median distance of points close a path."""
 _SAME_MM = 1e-9
+"""Points nearer than this are the same."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ _EMCY = 0x080
 _GAP_US = 150_000
 """More than answer_wait_ms, for which lock step waits for a lost answer."""
 _LAST_LOOK_US = 50_000
+"""Time at the end of a recording from which `still_moving` judges."""
 
 
 @dataclass(frozen=True)

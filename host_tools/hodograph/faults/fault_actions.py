@@ -24,7 +24,9 @@ from ..errors import RunError
 _STATUSWORD, _POSITION = 0x6041, 0x6064
 _STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
 _WATCH_S = 0.004
+"""Time between two readings of the encoders."""
 _STILL_LOOKS = 5
+"""Equal readings after which an axis counts as standing."""
 
 
 def cut_upload(controller: Controller, image: bytes, at: int, *, polite: bool) -> None:

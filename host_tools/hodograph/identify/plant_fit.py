@@ -29,12 +29,14 @@ MEMORY_PERIODS = 50
 _SMOOTH = 2**26
 """Increments per turn of the model's encoder: so many that small changes of the plant make small differences."""
 _ROUNDS = 3
+"""Rounds of the fit."""
 _LEAST_MM, _LEAST_VOLTS = 1e-6, 1e-3 / np.sqrt(12.0)
 _STEPS = np.array([3e-3, 3e-3, 5e-3])
 """Steps of central differences: gain and time constant over the guess, friction in V; wide, since friction is not
 smooth.
 """
 _LEAST_TRAVEL_MM = 0.1
+"""Less travel than this identifies nothing."""
 _FRICTION_GAIN = 20.0
 """Least decrease of the sum of squares by friction, in variances, to accept friction."""
 
@@ -70,6 +72,7 @@ class Plant:
 
 
 _LOW = np.array([1e-2, 1e-2, 0.0])
+"""Least values of gain, time constant and friction in the fit."""
 
 
 class _Model:

@@ -72,10 +72,13 @@ PARK_PERIODS = 250
 """
 
 _FOLLOWS = 0x1027
+"""A statusword of a following drive, masked: Operation enabled, and bit 12, drive follows the command value."""
 _FOLLOWS_MASK = 0x106F
+"""Bits of the state, and bit 12; CiA 402."""
 _STILL = 3
 """Least SYNCs with one target before a motion that begins at rest; a run's recording begins a few before its start."""
 _REST = PARK_PERIODS + REACHED_AFTER
+"""Ticks of constant setpoints after which an axis counts as parked."""
 
 Float = NDArray[np.float64]
 

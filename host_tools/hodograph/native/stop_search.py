@@ -18,6 +18,7 @@ from .library import library
 from .program import AXES, NativeProgram
 
 FREE: tuple[float, ...] = (inf, inf)
+"""No limit of the first two axes."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,9 @@ class StopLimits:
 
 
 _RAISED = ("feed", "centripetal", "axis_velocity", "axis_acceleration", "axis_jerk", "reach")
+"""Limits that are raised to what the program uses."""
 _MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
+"""Undoes STOP_MARGIN of offline/stop_limits.h, so that the used values themselves are allowed."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from .joints import joint_disturbance
 
 CASES = ("alpha", "heart")
 PAPER_N_C = 8.12
+"""Slope coefficient n_c as printed in the paper."""
 A_MAX_MM_S2, J_MAX_MM_S3 = 2000.0, 50000.0
 
 

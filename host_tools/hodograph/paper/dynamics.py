@@ -17,6 +17,7 @@ import numpy as np
 from ..spline import PHSpline
 
 _SAMPLES_PER_SEGMENT = 4001
+"""Samples at which the paper's quantities are evaluated."""
 
 
 @dataclass(frozen=True)

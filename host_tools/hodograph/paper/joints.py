@@ -20,6 +20,7 @@ from ..spline import PHSpline
 
 Real = NDArray[np.float64]
 _NEAR_TICKS = 3
+"""Ticks before and after a joint that are compared."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,9 @@ ALLOWED_UM = 30.0
 """The contour error that the paper allows."""
 
 _ZOOM_FACTOR = 5.0
+"""Half width of the enlarged figure, as a multiple of the greatest contour error."""
 _LEAST_ZOOM_UM = 5.0
+"""Least half width."""
 _COLORS = (BLUE, GREEN, ORANGE, RED, GREY, SOFT)
 
 

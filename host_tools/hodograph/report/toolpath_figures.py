@@ -26,6 +26,7 @@ CORNERS = 4
 """Corners shown enlarged."""
 
 _LEAST_TURN_RAD = np.radians(5.0)
+"""A vertex that turns more is a corner in the figure."""
 _HALF_WIDTH = 6.0
 """Half the width of an enlarged corner, in tolerances."""
 

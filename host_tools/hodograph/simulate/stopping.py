@@ -28,6 +28,7 @@ STOP_ORDERS = {"hold": "hold", "stop": "stop", "fault": "fault-stop"}
 """Kinds of a stop, and of its OfflineOrder."""
 
 _HISTORY = 3
+"""Setpoints before and after a stop that its differences need: third differences."""
 
 
 @dataclass(frozen=True, eq=False)

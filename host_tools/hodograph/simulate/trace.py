@@ -29,6 +29,7 @@ TRACE_HEADER = trace_header(AXES[:2])
 """The first line of a trace in the plane."""
 
 _CHUNK = 65536
+"""Rows that are written at once, to bound the memory."""
 
 
 def write_trace(motion: Motion, file: Path) -> None:

@@ -31,7 +31,9 @@ BATCH = 1024
 """Most packets of a call. A packet has one frame, on a local bus up to MOST_FRAMES."""
 _LOCAL_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_ns", "<u8")])
 _CONTROL_BYTES = 64
+"""Room for the control messages of a frame: its time and the number of lost frames."""
 _BUFFER_BYTES = 64 * 2**20
+"""Receive buffer of the socket."""
 _SO_RCVBUFFORCE = 33
 _SO_TIMESTAMP = 29
 _SO_RXQ_OVFL = 40

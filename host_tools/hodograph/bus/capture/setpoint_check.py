@@ -51,9 +51,11 @@ AXIS_RULES = ("axis speed", "axis acceleration", "axis jerk")
 _DRAWN = (2, 3)
 """Number of axes that draw a path: in the plane, in space."""
 _ROUNDING_COUNTS = 2 * math.sqrt(2.0)
+"""Least allowance for the rounding of setpoints, in counts; it grows with the number of axes."""
 _ENABLED, _HOMING = 0x0F, 0x10
 _STATE_MASK, _OPERATION_ENABLED = 0x6F, 0x27
 _LARGEST_TURN = 0.5
+"""Greatest angle of one step that is taken into account, rad."""
 _JOINTS = 1.01
 """Factor on the limits of acceleration and jerk of an axis."""
 

@@ -30,20 +30,24 @@ IDENTITY = ((1, "vendor", 0), (2, "product code", 0), (3, "revision", 16))
 NOWHERE = 0x5000
 """The first of the 4096 indices that no EDS uses."""
 LET_PASS_S = 1.0
+"""Least time that a request waits until the transfer of another client has ended."""
 ABORT, ABORT_BUSY = 0x80, 0x08000021
 """Command byte of an abort; the code with which a server refuses a second client during a transfer."""
 BUSY_S = 5.0
 """Longest wait while another client has a transfer open: after two seconds the server drops a client that is gone."""
 _BUSY_LOOK_S = 0.05
+"""Time between two attempts while the SDO channel is busy."""
 _NOBODY = b"\xff\xff\xff"
 """In place of the object that this client reads: it waits for no answer."""
 _NO_OBJECT = bytes(3)
+"""Index and sub of an abort that names no object."""
 _SDO_BYTES = 8
 _SCS, _NAMING = 0xE0, (0x40, 0x60)
 """Bits of a server's command byte; those of the first answers to an upload and to a download, which name the object."""
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
 _AGAIN_S = 0.25
+"""Time after which `write_at_once` sends a request without answer again."""
 READ_AGAIN_S = 1.0
 """A read without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
 _T = TypeVar("_T")

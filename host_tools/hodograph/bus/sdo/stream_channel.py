@@ -18,11 +18,14 @@ from .objects import STREAM
 from .upload import ABORT_VALUE_RANGE, block_download, program_fault_text
 
 ABORT_NO_ROOM = 0x05040005
+"""Abort code: out of memory. The ring has no room for the chunk."""
 NONE, OPEN, UNDERRUN, ENDED, STOPPED, PROGRAM_STOP = range(6)
 """Values of sub 2."""
 UNKNOWN_MS = 0xFFFFFFFF
 _TRIES = 4
+"""Attempts to send a chunk."""
 _PATIENCE_S = 5.0
+"""Longest time until an answer in the transfer of a chunk."""
 _OTHER_FORMAT = -80
 """Also the refusal of a chunk whose version the controller does not read."""
 _CORRUPT = (-4, _OTHER_FORMAT, -81)
