@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define COEFFICIENTS (BERNSTEIN_MOST_DEGREE + 1)
-#define MOST_DEPTH   9
+#define MOST_DEPTH   9 /* halvings until a polynomial counts as outside */
 
 /* scale / C(n,k) for n = 4, 5, 6, 7 */
 static const int64_t scaled_inverse[4][COEFFICIENTS] = {

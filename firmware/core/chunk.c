@@ -14,8 +14,8 @@
 #include "core/program_check.h"
 
 #define CRC_AT        12u /* the CRC covers everything but the magic before it and itself */
-#define CRC_FROM      16u
-#define ARC_LIMIT_Q40 ((int64_t)1 << 62)
+#define CRC_FROM      16u /* offset of the first byte that the CRC covers */
+#define ARC_LIMIT_Q40 ((int64_t)1 << 62)  /* 2^22 mm */
 #define MEETS_Q40     ((uint64_t)1 << 16) /* 2^-24 mm: how far an end may be from the next start */
 #define REST_FLAGS    (CHUNK_REST_STOP | CHUNK_REST_OPTIONAL)
 #define FLAGS         (CHUNK_FLAG_FIRST | CHUNK_FLAG_LAST | CHUNK_FLAG_REST | CHUNK_FLAG_JOINED)

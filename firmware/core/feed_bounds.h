@@ -34,7 +34,7 @@ enum feed_derivative { FEED_VELOCITY = 1, FEED_ACCELERATION = 2, FEED_JERK = 3 }
 int feed_bounds_within(const struct program_piece *piece, enum feed_derivative derivative,
                        int64_t low_q24, int64_t high_q24);
 
-#define FEED_PARTS 8
+#define FEED_PARTS 8 /* parts of a piece that have bounds of their own */
 
 /* Bounds of that derivative over each eighth of the piece (in time), their Bernstein coefficients' least and greatest
  * in 2^-24 units, rounded outwards. The greatest are held at +-FEED_NO_BOUND_Q24; the least are -FEED_NO_BOUND_Q24 or

@@ -19,8 +19,8 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 #define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
 #define END_TICKS         2u       /* until a command counts, and until the end is a setpoint */
 #define SEARCH_STEPS      2        /* in a tick at standstill */
-#define NO_NUMBERS        2u
-#define MOST_FEED_Q32     ((int64_t)1 << 45)
+#define NO_NUMBERS        2u       /* no enum program_stop_kind: no brake is possible */
+#define MOST_FEED_Q32     ((int64_t)1 << 45) /* 2^13 mm/s */
 /* 2^57, the greatest, less a unit: it is made an int32_t */
 #define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
 #define REACH_Q40      ((int64_t)1 << 26) /* 2^-14 mm: how far a piece may reach beyond its ends */

@@ -9,7 +9,7 @@
 /* The greatest distance in a period, and its greatest change, of any machine: 32 mm and 1 mm. They keep the
  * products below inside 62 bits. */
 #define DISTANCE_MAX_Q40_MM (INT64_C(1) << 45)
-#define CHANGE_MAX_Q40_MM   (INT64_C(1) << 40)
+#define CHANGE_MAX_Q40_MM   (INT64_C(1) << 40) /* 1 mm: greater second differences count as this */
 
 static int64_t clamp(int64_t value, int64_t most)
 {

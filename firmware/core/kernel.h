@@ -24,7 +24,7 @@ enum kernel_number {
     KERNEL_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
 };
 
-#define KERNELS 3u
+#define KERNELS 3u /* of enum kernel_number */
 
 /* KERNEL_INLINE: for code that the planar and the spatial version of a kernel share. It is inlined into both, so a tick
  * has no additional call. KERNEL_APART: for code of one version only, which stays a function. */

@@ -6,11 +6,11 @@
 
 #include "core/kernel.h"
 
-#define Q40   1099511627776.0
+#define Q40   1099511627776.0 /* 2^40 */
 #define Q45   35184372088832.0
 #define Q48   281474976710656.0
 #define Q50   1125899906842624.0
-#define STEPS 3
+#define STEPS 3 /* of Newton's method */
 
 /* A feed without limit (docs/reference/protocol.md 1.1: 0) can be beyond what 64 bits hold. */
 #define MOST 4611686018427387904.0 /* 2^62 */

@@ -7,7 +7,7 @@
 #include "core/kernel.h"
 #include "core/qmath.h"
 
-#define STEPS 2
+#define STEPS 2 /* of Newton's method */
 
 /* 2^16 / a for a in q30, 2^-4 <= a < 1, in q16: twelve bits or more are right. */
 static uint32_t reciprocal_q16(int32_t a_q30)

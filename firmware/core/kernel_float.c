@@ -7,9 +7,9 @@
 #include "core/kernel.h"
 #include "core/qmath.h"
 
-#define Q30  1073741824.0f
-#define Q24  16777216.0f
-#define HALF 2 /* parts on each side of the middle */
+#define Q30  1073741824.0f /* 2^30 */
+#define Q24  16777216.0f   /* 2^24 */
+#define HALF 2             /* parts on each side of the middle */
 
 static float from_q30(int64_t a)
 {

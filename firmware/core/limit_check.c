@@ -8,9 +8,9 @@
 #include "core/path_motion.h"
 #include "core/real.h"
 
-#define PARTS_LOG2    5
+#define PARTS_LOG2    5  /* a cell has 2^this parts */
 #define MOST_HALVINGS 20 /* of a cell */
-#define CUT_STEPS     30
+#define CUT_STEPS     30 /* halvings of a piece's time to find a distance */
 
 /* Never inlined, so that its frame is not on the stack while the caller calls program_limits_attend(). */
 #if defined(__GNUC__)

@@ -7,9 +7,9 @@
 
 #define FINE_BITS        16 /* from q40 to q56 */
 #define MOST_Q56         ((int64_t)1 << 60)
-#define MOST_BITS        12 /* of PATH_BRAKE_MOST_TICKS */
-#define SIXTH_Q32        715827882u
-#define THREE_HALVES_Q16 98304u
+#define MOST_BITS        12         /* of PATH_BRAKE_MOST_TICKS */
+#define SIXTH_Q32        715827882u /* 1/6 */
+#define THREE_HALVES_Q16 98304u     /* 3/2 */
 #define SPARE_HALVES 3 /* half ticks of path_brake_fits: what a brake in whole ticks takes more */
 #define ONE_TICK_Q16 65536u
 #define RISE_BITS    7 /* of an acceleration at which a brake begins, over its deceleration */

@@ -6,13 +6,13 @@
 #include "core/feed_bounds.h"
 #include "core/qmath.h"
 
-#define COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54)
-#define ARC_LIMIT_Q40         ((int64_t)1 << 62)
-#define LONGEST_Q44           ((int64_t)32 << 44)
-#define MOST_DURATION_Q32     ((uint64_t)1 << 54)
-#define JOIN_Q44              ((int64_t)1 << 10) /* 2^-34 mm */
-#define JOIN_FEED_Q24         ((int64_t)1 << 8)  /* 2^-16 mm/s */
-#define JOIN_ACCELERATION_Q16 ((int64_t)1 << 10) /* 2^-6 mm/s^2 */
+#define COEFFICIENT_LIMIT_Q40 ((int64_t)1 << 54)  /* 2^14 mm */
+#define ARC_LIMIT_Q40         ((int64_t)1 << 62)  /* 2^22 mm */
+#define LONGEST_Q44           ((int64_t)32 << 44) /* 32 mm */
+#define MOST_DURATION_Q32     ((uint64_t)1 << 54) /* 2^22 s */
+#define JOIN_Q44              ((int64_t)1 << 10)  /* 2^-34 mm */
+#define JOIN_FEED_Q24         ((int64_t)1 << 8)   /* 2^-16 mm/s */
+#define JOIN_ACCELERATION_Q16 ((int64_t)1 << 10)  /* 2^-6 mm/s^2 */
 #define OVERRIDE_ONE          (1u << 24)
 
 static int within(int64_t a, int64_t tolerance)

@@ -13,12 +13,12 @@
 #define CRC_FROM 16u /* the CRC covers everything after itself */
 
 /* Where fields of compact records begin, protocol.md 1.7.1. */
-#define COMPACT_POINT        7u /* of a segment */
-#define COMPACT_COEFFICIENTS 7u /* of an extra axis */
-#define COMPACT_START        4u /* of a piece */
-#define COMPACT_POWERS       11u
-#define COMPACT_OVERRIDE     53u
-#define COMPACT_BOUNDS       6u /* of a stop */
+#define COMPACT_POINT        7u  /* of a segment */
+#define COMPACT_COEFFICIENTS 7u  /* of an extra axis */
+#define COMPACT_START        4u  /* of a piece */
+#define COMPACT_POWERS       11u /* coefficients of arc length */
+#define COMPACT_OVERRIDE     53u /* override bounds */
+#define COMPACT_BOUNDS       6u  /* of a stop */
 
 static void read_header(struct program_header *h, const uint8_t *b)
 {

@@ -11,8 +11,9 @@
 #include "core/segment_length_check.h"
 #include "core/stop_check.h"
 
-#define NAME_FROM      80u
-#define NAME_SIZE      32u
+#define NAME_FROM 80u /* offset of the name in the header */
+#define NAME_SIZE 32u /* bytes */
+/* flags that only the program of a chunk may have */
 #define FLAGS_IN_CHUNK (PROGRAM_FLAG_MOVING | PROGRAM_FLAG_COMPACT)
 
 static int bytes_are_zero(const uint8_t *b, uint32_t size)

@@ -8,9 +8,9 @@
 #include "core/qmath.h"
 #include "core/qwide.h"
 
-#define W_LIMIT_Q44     ((int64_t)1 << 50)
-#define POINT_LIMIT_Q40 ((int64_t)1 << 52)
-#define ARC_LIMIT_Q40   ((int64_t)1 << 62)
+#define W_LIMIT_Q44     ((int64_t)1 << 50) /* 2^6, of a component of the preimage */
+#define POINT_LIMIT_Q40 ((int64_t)1 << 52) /* 2^12 mm */
+#define ARC_LIMIT_Q40   ((int64_t)1 << 62) /* 2^22 mm */
 #define JOIN_Q48        ((int64_t)1 << 14) /* 2^-34 mm */
 #define CLOSED_Q48      ((int64_t)1 << 24) /* 2^-24 mm */
 #define TRAVEL_Q48      ((int64_t)1 << 24) /* rounding of a path that runs along a limit */

@@ -6,7 +6,7 @@
 #include "core/feed_bounds.h"
 #include "core/qmath.h"
 
-#define NO_BOUND  UINT32_MAX
+#define NO_BOUND  UINT32_MAX /* no bound of time or distance */
 #define END_TICKS 2u /* until a command counts, and until the end of the program is a setpoint */
 
 /* Larger values count as no bound: 2^14 mm/s, 2^24 mm/s^2. So no product below exceeds 2^63. */
