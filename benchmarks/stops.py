@@ -46,7 +46,7 @@ class Compared:
 
     @property
     def of_least(self) -> float | None:
-        """Its time over the least."""
+        """Time of the stop over the least time."""
         return None if self.least_s is None else self.rest_after_s / self.least_s
 
 

@@ -39,7 +39,7 @@ def opened() -> socket.socket:
 
 
 def echo(rounds: int) -> None:
-    """The other end of the round trip."""
+    """Sends each received frame back: the other end of the round trip."""
     bus = opened()
     for _ in range(rounds):
         select.select([bus], [], [])

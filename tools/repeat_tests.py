@@ -52,7 +52,7 @@ class Run:
 
     @property
     def line(self) -> str:
-        """Of the table."""
+        """One line of the table."""
         minutes, seconds = divmod(round(self.seconds), 60)
         return f"{self.number:4} {self.mode:9} {minutes:4}:{seconds:02}  {self.count}"
 

@@ -32,7 +32,7 @@ Table = dict[str, dict[str, Row]]  # target, image
 
 
 def compilers() -> dict[str, str]:
-    """Their versions, as they say them."""
+    """Versions of the compilers, as they report them."""
     return {
         name: subprocess.run(
             [name, "--version"], check=True, capture_output=True, text=True

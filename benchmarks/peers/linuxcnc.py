@@ -47,7 +47,7 @@ HOME_SEQUENCE = 0
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Version of the installed LinuxCNC package."""
     query = ["dpkg-query", "--show", "--showformat=${Version}", "linuxcnc-uspace"]
     return subprocess.run(query, capture_output=True, text=True, check=True).stdout
 

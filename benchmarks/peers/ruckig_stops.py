@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Version of the installed Ruckig package."""
     return version_of("ruckig")
 
 

@@ -90,7 +90,7 @@ _BLENDING = re.compile(r"(?i)G64\s*(P\s*[\d.]+)?")
 
 
 def _with_feed(text: str, feed_mm_min: float) -> str:
-    """The same program with this feed word in place of its own, and without its own words of blending."""
+    """A program with this feed word in place of its own, and without its own words of blending."""
     inches = re.search(r"(?i)\bG20\b", text) is not None
     word = f"F{feed_mm_min / 25.4 if inches else feed_mm_min:.6g}"
     return _FEED_WORD.sub(word, _BLENDING.sub("", text))

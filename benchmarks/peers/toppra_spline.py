@@ -24,7 +24,7 @@ _GRID_A_POINT = 4
 
 
 def version() -> str:
-    """Of the installed package."""
+    """Version of the installed TOPPRA package."""
     return version_of("toppra")
 
 

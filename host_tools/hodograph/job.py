@@ -133,7 +133,7 @@ class JobSection:
         return int(self.fitted.reference.line[-1])
 
     def lines_summary(self) -> dict[str, object]:
-        """Its source lines, for JSON."""
+        """Source lines of the section, for JSON."""
         lines: dict[str, object] = {"first_line": self.first_line, "last_line": self.last_line}
         return lines | self.turning_summary
 

@@ -246,7 +246,7 @@ class Pipeline:
         return self.peaks_of(self.plan)
 
     def peaks_of(self, plan: FeedPlan) -> dict[str, Peak]:
-        """The same of another plan of the path, such as `compilation.plan`."""
+        """As `peaks`, of another plan of the path, such as `compilation.plan`."""
         machine, limits = self.machine_or_none, self.limits
         controller = controller_limits(machine) if machine is not None else None
         return plan_peaks(plan, self.curve, limits, controller, plants(machine, limits))

@@ -180,7 +180,7 @@ class Campaign:
         }
 
     def pair_stamped(self, target: Target, kernel: str) -> Any:
-        """The same, or from a stamp."""
+        """The result of `pair`, or that of a stamp."""
         images = ("setpoints", "isr")
         return self.stamped(kernel, [target], images, lambda: self.pair(target, kernel))
 

@@ -60,7 +60,7 @@ class Counter:
 
     @property
     def names(self) -> Sequence[str]:
-        """Of the columns of what is counted."""
+        """Names of the columns of what is counted."""
         return self.map.names
 
     def count(

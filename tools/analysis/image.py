@@ -127,7 +127,7 @@ class Image:
         return [f.address for f in self.functions]
 
     def function_at(self, address: int) -> Function:
-        """The one that an address lies in; KeyError when none begins before it."""
+        """The function in which an address lies; KeyError when none begins before it."""
         index = bisect_right(self._starts, address) - 1
         if index < 0:
             raise KeyError(hex(address))

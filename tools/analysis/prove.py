@@ -257,7 +257,7 @@ def included(proof: Proof, firmware: Path) -> list[Path]:
 
 
 def provers_digest(build: Path) -> str:
-    """Of the provers themselves, the compilers that read headers for them, and this program."""
+    """Digest of the provers themselves, the compilers that read headers for them, and this program."""
     versions = [
         subprocess.run([name, "--version"], capture_output=True, text=True, check=False).stdout
         for name in ("gcc", "arm-none-eabi-gcc")
@@ -268,7 +268,7 @@ def provers_digest(build: Path) -> str:
 
 
 def libraries(root: Path) -> str:
-    """Of the shared libraries that the provers bring along."""
+    """Digests of the shared libraries that the provers bring along."""
     found = sorted(path for path in root.rglob("*.so*") if path.is_file())
     return digest(word for path in found for word in (path.name, content(path)))
 

@@ -93,7 +93,7 @@ def image(adversary: Adversary) -> bytes:
 
 
 def _durations(adversary: Adversary) -> list[int]:
-    """Of the pieces of constant feed, q32 s."""
+    """Durations of the pieces of constant feed, 2^-32 s."""
     return [
         round((adversary.short_s if i % 2 == 0 else _PAIR_S - adversary.short_s) * _Q32)
         for i in range(adversary.pieces)

@@ -54,7 +54,7 @@ EXPORTS = """\
 
 
 def version() -> str:
-    """Of the release, from the one place that says it."""
+    """Version of the release, from the one place that says it."""
     text = (ROOT / "host_tools/hodograph/__init__.py").read_text(encoding="utf-8")
     (found,) = re.findall(r'^__version__ = "([^"]+)"$', text, re.MULTILINE)
     return str(found)

@@ -40,7 +40,7 @@ def epoch_s() -> int:
 
 
 def build_environment(time_s: int, given: Mapping[str, str]) -> dict[str, str]:
-    """Of the build backend. $LDSHARED stays as it is given: it links for another platform."""
+    """Environment of the build backend. $LDSHARED stays as it is given: it links for another platform."""
     return {
         # Python's own link command may name folders of this computer, which the module would then search.
         "LDSHARED": f"{sysconfig.get_config_var('CC') or 'cc'} -shared",

@@ -26,7 +26,7 @@ PROGRAMS = {
 
 
 def programs_for(platform: str) -> dict[str, str]:
-    """Those that a platform, as sys.platform names it, can have: they need Linux. The native module does not."""
+    """Programs that a platform, as sys.platform names it, can have: they need Linux. The native module does not."""
     return PROGRAMS if platform == "linux" else {}
 
 

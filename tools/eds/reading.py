@@ -89,7 +89,7 @@ class Ini:
         return found
 
     def number(self, section: str, key: str, default: str | None = None) -> int:
-        """The same for an integer (decimal or 0x...)."""
+        """The value of a key as an integer (decimal or 0x...); else as `text`."""
         text = self.text(section, key, default)
         try:
             return int(text, 0)

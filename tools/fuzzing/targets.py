@@ -96,7 +96,7 @@ def _judge(what: str, status: int, errors: str, reported: list[str]) -> None:
 
 
 def loaded(load: Callable[[Path], object], file: Path) -> Outcome:
-    """The same for a function of the package: what `main` would make of it. Raises Finding."""
+    """Runs a function of the package on a file: what `main` would make of it. Raises Finding."""
     from hodograph.errors import HodographError
 
     with _warnings() as reported:

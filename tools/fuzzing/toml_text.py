@@ -145,7 +145,7 @@ def plain(data: Tree) -> str:
 
 
 def spelled(data: Tree, random: Random) -> str:
-    """The same document in another order and another spelling."""
+    """The document in another order and another spelling."""
     return _Writer(random).document(data)
 
 

@@ -33,7 +33,7 @@ class Connection(Channel):
         super().close_stdin()
 
     def output_ended(self, fd: int, trouble: int) -> None:
-        """The other side has ended it, or could not be reached."""
+        """The other side has ended the connection, or could not be reached."""
         super().output_ended(fd, trouble)
         self.status = trouble
 

@@ -140,7 +140,7 @@ def _join(options: argparse.Namespace) -> int:
 
 
 def _elsewhere(forwards: list[Forward]) -> list[Forward]:
-    """Those that are needed where the command has the loopback of this process: to other ports."""
+    """Forwards that are needed where the command has the loopback of this process: to other ports."""
     return [each for each in forwards if each.outside != each.inside]
 
 

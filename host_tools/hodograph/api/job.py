@@ -55,7 +55,7 @@ class Section:
 
     @cached_property
     def path(self) -> Path:
-        """Its curve. `Path.plan` of it may use other limits, and needs the machine."""
+        """Curve of the section. `Path.plan` of it may use other limits, and needs the machine."""
         return path_of_section(self._section)
 
     @cached_property

@@ -171,7 +171,7 @@ class Path:
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """Name of the path."""
         return self._file.name
 
     @property

@@ -169,7 +169,7 @@ class Process:
             self.child.wait()
 
     def text(self) -> str:
-        """Its whole output."""
+        """Whole output of the process."""
         self._output.seek(0)
         return self._output.read().decode(errors="replace")
 

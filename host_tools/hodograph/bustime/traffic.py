@@ -50,12 +50,12 @@ class Message:
 
     @property
     def plain_bits(self) -> int:
-        """Its length without a stuff bit."""
+        """Length of the frame in bits without a stuff bit."""
         return plain_bits(self.size)
 
     @property
     def worst_bits(self) -> int:
-        """Its greatest length; for SYNC exactly, over all values of the counter; for SDO with any identifier."""
+        """Greatest length in bits; for SYNC exactly, over all values of the counter; for SDO with any identifier."""
         if self.kind == "SYNC":
             return sync_bits()[1]
         if self.kind == "SDO":

@@ -73,7 +73,7 @@ class DriveProperties:
 
     @property
     def described(self) -> str:
-        """Its name and the versions of its hardware and software; empty if it reports none of them."""
+        """Name of the drive and the versions of its hardware and software; empty if it reports none of them."""
         texts = (
             self.name,
             f"hardware {self.hardware}" if self.hardware else None,

@@ -85,12 +85,12 @@ class NodeReader:
             ) from error
 
     def number(self, index: int, sub: int = 0, *, signed: bool = False) -> int | None:
-        """The same as a whole number; None: there is none."""
+        """The object as a whole number; None: there is none."""
         data = self.data(index, sub)
         return int.from_bytes(data[:8], "little", signed=signed) if data else None
 
     def text(self, index: int) -> str | None:
-        """The same as a text, without unprintable characters."""
+        """The object as a text, without unprintable characters."""
         data = self.data(index)
         if not data:
             return None

@@ -134,7 +134,7 @@ class Machine:
 
     @property
     def path_units(self) -> tuple[str, ...]:
-        """Their units, "mm" or "deg"."""
+        """Units of the path axes, "mm" or "deg"."""
         return tuple(axis.unit for axis in self.path_axes)
 
     def require_plane(self, what: str) -> tuple[Axis, Axis]:

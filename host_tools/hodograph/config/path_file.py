@@ -56,7 +56,7 @@ class PathSpec:
 
 @dataclass(frozen=True, eq=False)
 class SpacePathSpec:
-    """The same in space: points (n, 3) in mm, and directions (3,).
+    """As PathSpec, in space: points (n, 3) in mm, and directions (3,).
 
     extra  (n, E): the extra axes at the points, in mm; rotary axes in degrees
     """

@@ -95,7 +95,7 @@ class Limit:
 
     @property
     def dotted(self) -> str:
-        """The same as a plan's JSON has it: "feed_mm_s", "axis.velocity_mm_s.x", "volts.x"."""
+        """Name of the limited quantity in a plan's JSON: "feed_mm_s", "axis.velocity_mm_s.x", "volts.x"."""
         return self.quantity if self.axis is None else f"{self._table}{self.in_unit}.{self.axis}"
 
     @property
@@ -107,7 +107,7 @@ class Limit:
 
     @property
     def name(self) -> str:
-        """The same in notes: "axis x velocity_mm_s"."""
+        """Name of the limited quantity in notes: "axis x velocity_mm_s"."""
         return self._zone + self.key if self.axis is None else f"axis {self.axis} {self.in_unit}"
 
     @property
@@ -246,7 +246,7 @@ class AxisLimits:
         return any(getattr(self, one.name) is not None for one in fields(self))
 
     def scaled(self, share: float) -> AxisLimits:
-        """The same limits times `share`."""
+        """These limits times `share`."""
         return AxisLimits(*(_scaled(getattr(self, one.name), share) for one in fields(self)))
 
     def from_axis(self, first: int) -> AxisLimits:
@@ -329,7 +329,7 @@ class Limits:
                 )
 
     def of_axes(self, count: int) -> Limits:
-        """The same for a path that `count` axes follow. Raises InputError: they are for another number of axes."""
+        """These limits for a path that `count` axes follow. Raises InputError: they are for another number of axes."""
         if len(self.names) == count:
             return self
         if self.axis.any or self.machine.any or self.names != AXES[:2]:

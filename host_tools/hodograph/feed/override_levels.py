@@ -50,7 +50,7 @@ def rate_codes(rate_per_s: ArrayLike) -> Codes:
 
 
 def second_codes(second_per_s2: ArrayLike) -> Codes:
-    """The same of override accelerations."""
+    """The greatest codes whose override accelerations are not above these; 0: there is none."""
     return _codes_below(np.asarray(second_per_s2) / _SECOND_UNIT)
 
 

@@ -253,7 +253,7 @@ def derivative_peaks(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]
 
 
 def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> FeedPieces:
-    """The same feed, the `chosen` (M,) pieces each as two that last half as long; docs/theory/feed.md section 7.
+    """These pieces, the `chosen` (M,) pieces each as two that last half as long; docs/theory/feed.md section 7.
 
     A half is the polynomial of its piece about its own start, rounded like each piece: its end is exactly the next
     start, and its feed differs by less than 2^-30 mm/s. Override bounds are those of the piece.

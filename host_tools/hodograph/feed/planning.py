@@ -108,7 +108,7 @@ def replan(plan: FeedPlan, zones: Sequence[FeedZone], reason: str) -> FeedPlan:
 
 
 def _below(plan: FeedPlan, limit: Limit) -> FeedPlan:
-    """The same request planned with one more limit of the feed."""
+    """The request of a plan, planned again with one more limit of the feed."""
     again = _plan(
         plan.curve.length_mm, plan.request, plan.limits, plan.controller, plan.period_us, (limit,)
     )

@@ -39,7 +39,7 @@ class StopTrials:
         return self.within(0.0)
 
     def within(self, share: float) -> bool:
-        """The same, but limits may be exceeded by this share."""
+        """As `kept`, but limits may be exceeded by this share."""
         uses = max(*self.of_hold.values(), *self.of_fault.values())
         return (
             uses <= 1.0 + share

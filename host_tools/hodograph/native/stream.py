@@ -81,7 +81,7 @@ class OfflineStream(FeedCommands):
     def run_with_outputs(
         self, ticks: int, *, until_rest: bool = False
     ) -> tuple[NDArray[np.void], NDArray[np.void]]:
-        """The same, and the outputs on the path at each setpoint as an array of OUTPUTS, (n,)."""
+        """As `run`, and also the outputs on the path at each setpoint as an array of OUTPUTS, (n,)."""
         points, values = np.zeros(ticks, dtype=POINT), np.zeros(ticks, dtype=OUTPUTS)
         made = self._lib.offline_stream_run(
             self._stream,

@@ -499,7 +499,7 @@ def check(
 def check_image(
     image: bytes, limits: ProgramLimits | None = None, *, chunk: bool = False
 ) -> Fault | None:
-    """The same from the bytes, including faults that `decode` refuses and fields that `Program` does not have."""
+    """As `check`, from the bytes, including faults that `decode` refuses and fields that `Program` does not have."""
     broken = open_fault(image)
     if broken is not None:
         return Fault(broken, 0)

@@ -89,7 +89,7 @@ class ExactProgram:
 
 
 def _horner(c: list[Any], tau: Any) -> Any:
-    """Of the polynomial with coefficients c, lowest power first."""
+    """Value at a place of the polynomial with coefficients c, lowest power first."""
     value = mpmath.mpf(0)
     for v in reversed(c):
         value = value * tau + v

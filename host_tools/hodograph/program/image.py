@@ -447,7 +447,7 @@ class ReservedFields:
 
 
 def reserved_fields(image: bytes) -> ReservedFields:
-    """The same of an image that opens."""
+    """The reserved fields of an image that opens."""
     head = _HEADER.unpack_from(image)
     name = head[18]
     compact, stops = bool(head[8] & FLAG_COMPACT), None

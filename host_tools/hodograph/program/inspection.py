@@ -156,7 +156,7 @@ def end_point_q40(program: Program) -> NDArray[np.int64]:
 
 
 def inspect_text(program: Program, *, full: bool = False) -> str:
-    """The same for reading, with the tables of segments and pieces (their first and last rows, or all)."""
+    """The contents of a program as text, with the tables of segments and pieces (their first and last rows, or all)."""
     d = inspect_dict(program)
     limits = ", ".join(
         f"{key} {d[name]:g} {unit}"

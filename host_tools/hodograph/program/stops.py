@@ -114,7 +114,7 @@ def stops_dict(stops: Stops, start_mm: Real) -> dict[str, Any]:
 
 
 def stops_text(stops: Stops, start_mm: Real, unit: str) -> Iterator[str]:
-    """The same for reading: one line for each kind. `unit`: of lengths of the path."""
+    """The stop table as text: one line for each kind. `unit`: of lengths of the path."""
     for kind, name in enumerate(("hold, stop", "fault stop")):
         worst = stops.worst(kind)
         yield (

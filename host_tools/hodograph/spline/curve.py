@@ -138,7 +138,7 @@ class PHSpline(ArcLengthChain):
         return greatest_curvature(self.w)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> PHSpline:
-        """The same curve in shorter segments, as a program needs them (docs/reference/protocol.md 1.2).
+        """This curve in shorter segments, as a program needs them (docs/reference/protocol.md 1.2).
 
         Segments are halved, exactly (de Casteljau on w), until each is at most `max_length_mm` long and the largest
         Bernstein coefficient of its speed is (1e-9 less than) at most `max_speed_ratio` times the smallest, which is

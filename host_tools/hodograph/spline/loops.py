@@ -90,7 +90,7 @@ def without_loops(system: System, z: Complex, guide_turning: Real) -> Unlooped:
 
 
 def without_remaining_loops(system: System, z: Complex, spans: Sequence[int]) -> Unlooped:
-    """The same at every joint within three spans of each of `spans`, one after the other."""
+    """Try the other side at every joint within three spans of each of `spans`, one after the other."""
     changes = iterations = 0
     for span in spans:
         for first in range(span - 3, span + 5):

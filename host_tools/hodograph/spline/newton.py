@@ -42,7 +42,7 @@ class InterpolationSystem(Protocol):
         ...
 
     def with_chords(self, chords: Unknowns) -> Self:
-        """The same system for other chords."""
+        """This system for other chords."""
         ...
 
     def residual(self, z: Unknowns) -> Unknowns:

@@ -54,7 +54,7 @@ def checked_points(
 def checked_space_points(
     points: object, closed: bool, minimum: int, what: str
 ) -> tuple[Real, tuple[str, ...]]:
-    """The same for points in space: real (n, 3)."""
+    """As `checked_points`, for points in space: real (n, 3)."""
     try:
         p = np.array(points, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

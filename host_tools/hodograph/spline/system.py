@@ -82,7 +82,7 @@ class System:
     knots: KnotSpans | None = None
 
     def with_chords(self, chords: Complex) -> System:
-        """The same system for other chords (M,)."""
+        """This system for other chords (M,)."""
         return replace(self, chords=chords)
 
     def sizes(self, residual: Complex) -> Real:

@@ -244,7 +244,7 @@ def shared_fault(chunk: Chunk, before: Chunk | None) -> str | None:
 
 
 def _rest_fault(one: ChunkHeader, before: Chunk) -> str | None:
-    """The same for a chunk that begins at rest."""
+    """The fault of a chunk that begins at rest."""
     if one.first or one.job != before.header.job or one.sequence != before.header.sequence + 1:
         return "it is not the next chunk of the job"
     shared = (one.piece_shift, one.segment_shift, one.shared_pieces, one.shared_segments)
@@ -255,7 +255,7 @@ def _rest_fault(one: ChunkHeader, before: Chunk) -> str | None:
 
 
 def _shared_fault(one: ChunkHeader, own: Program, old: Program) -> str | None:
-    """The same for the programs of both."""
+    """The fault of the shared part in the programs of both."""
     if one.piece_shift + one.shared_pieces >= old.piece_count + 1 or not one.shared_pieces:
         return "the shared pieces are not in the predecessor"
     if own.first_axis != old.first_axis or own.axis_count != old.axis_count:

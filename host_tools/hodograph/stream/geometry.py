@@ -178,7 +178,7 @@ def curve_after(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
 
 
 def with_joints(curve: Curve, at_mm: Real) -> Curve:
-    """The same curve with further joints at arc lengths (n,), rising, none of them at a joint."""
+    """The curve with further joints at arc lengths (n,), rising, none of them at a joint."""
     if not at_mm.size:
         return curve
     segment, xi = curve.locate(at_mm)

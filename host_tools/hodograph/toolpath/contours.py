@@ -99,7 +99,7 @@ class Spline:
     degree: int
 
     def reversed(self) -> Spline:
-        """The same curve from its end to its start."""
+        """This curve from its end to its start."""
         return Spline(self.points[::-1], self.weights[::-1], 1.0 - self.knots[::-1], self.degree)
 
 
@@ -125,7 +125,7 @@ class Step(NamedTuple):
     spline: Spline | None
 
     def reversed(self) -> Step:
-        """The same step from its end to its start."""
+        """This step from its end to its start."""
         controls = self.controls[::-1]
         if self.kind == ARC:
             x, y, turns = controls[0]

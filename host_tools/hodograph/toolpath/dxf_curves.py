@@ -247,7 +247,7 @@ def _clamped_at_start(spline: Spline) -> Spline:
 def _with_knot(
     values: NDArray[np.float64], knots: NDArray[np.float64], degree: int, knot: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The same curve with another knot (Boehm's algorithm)."""
+    """The curve with another knot (Boehm's algorithm)."""
     span = int(np.searchsorted(knots, knot, side="right")) - 1
     old = np.arange(span - degree + 1, span + 1)
     share = (knot - knots[old]) / (knots[old + degree] - knots[old])

@@ -26,7 +26,7 @@ _OFFSET_MAX = 32767.0
 
 @dataclass(frozen=True)
 class Poles:
-    """Of the closed loop: a pair of natural frequency and damping, and a real one; rad/s."""
+    """Poles of the closed loop: a pair of natural frequency and damping, and a real one; rad/s."""
 
     natural_rad_s: float
     damping: float

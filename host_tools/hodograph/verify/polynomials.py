@@ -29,7 +29,7 @@ def values(coefficients: Real, x: Real, order: int = 0) -> Real:
 
 
 def shifted(coefficients: Any, start: Real, width: Real) -> Any:
-    """The same polynomials in u, x = start + width u, (C, n + 1)."""
+    """These polynomials in u, x = start + width u, (C, n + 1)."""
     degree = coefficients.shape[1] - 1
     out = np.empty_like(coefficients)
     for power in range(degree + 1):

@@ -85,7 +85,7 @@ class SetpointWatch:
 
 
 def jumps(steps: Sequence[Step], limits: StepLimits) -> list[Jump]:
-    """Those that break a limit."""
+    """Steps that break a limit."""
     return [step.jump(limits) for step in steps if step.needed > limits.of(step.rule, step.group)]
 
 

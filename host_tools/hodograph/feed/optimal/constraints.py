@@ -41,7 +41,7 @@ class Constraint:
 
     @property
     def name(self) -> str:
-        """Of the quantity."""
+        """Name of the limited quantity."""
         return self.limit.dotted
 
     @property

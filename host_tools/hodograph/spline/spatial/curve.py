@@ -187,7 +187,7 @@ class SpatialPHSpline(ArcLengthChain):
         return greatest_curvature(self.preimage, curvature_numerator, speed_of)
 
     def split(self, max_length_mm: float, max_speed_ratio: float = 2.0) -> SpatialPHSpline:
-        """The same curve in shorter segments, as PHSpline.split. In addition components of A are below 8, and no extra
+        """This curve in shorter segments, as PHSpline.split. In addition components of A are below 8, and no extra
         axis moves by more within a segment than the format allows.
         """
         origin, preimage, extra = split_segments(

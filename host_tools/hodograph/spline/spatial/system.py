@@ -60,7 +60,7 @@ class SpaceSystem:
     phase: float | None = None
 
     def with_chords(self, chords: Real) -> SpaceSystem:
-        """The same system for other chords (M, 3)."""
+        """This system for other chords (M, 3)."""
         return replace(self, chords=chords)
 
     def sizes(self, residual: Real) -> Real:

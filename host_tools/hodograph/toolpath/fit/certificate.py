@@ -171,7 +171,7 @@ def _nearest(
 def _nearest_of(
     start: Real, end: Real, at: Index, to: Chords, beside: int
 ) -> tuple[Real, Real, Index]:
-    """The same for few chords, with all chords around them at once."""
+    """As `_nearest`, for few chords, with all chords around them at once."""
     other = np.clip(at[:, None] + np.arange(-beside, beside + 1), 0, to.start.shape[0] - 1)
     a, b, error = to.start[other], to.end[other], to.error_mm[other]
     from_start = distance_to_chord(start[:, None], a, b) + error

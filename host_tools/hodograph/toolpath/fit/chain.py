@@ -54,7 +54,7 @@ class Segments:
         )
 
     def ordered(self) -> Segments:
-        """The same in the order of their places."""
+        """These segments in the order of their places."""
         order = np.argsort(self.low, kind="stable")
         return Segments(
             self.origin[order],
