@@ -26,6 +26,7 @@ from _figures import figures_parser, write_figures
 CAMPAIGN = Path(__file__).resolve().parents[1] / "examples" / "campaigns" / "ten_thousand.toml"
 WORKERS = 2
 START_S = 60
+"""Longest time until the workers have started."""
 
 
 def measured(folder: Path, *options: str) -> dict[str, float]:

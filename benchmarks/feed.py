@@ -38,6 +38,7 @@ from hodograph.spline import PHSpline  # noqa: E402
 CONTROLLER = ControllerLimits(500.0, 5000.0, 200000.0, 0.02)
 PAPER_N_C = 8.12
 SHARES = (1e-6, 0.13, 0.5, 0.77, 1.0 - 1e-6)
+"""Places of each piece at which it is compared, as shares of its duration."""
 
 
 def profiles(feed: float, ramp: float) -> tuple[dict[str, Any], dict[str, Any]]:

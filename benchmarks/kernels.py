@@ -45,6 +45,7 @@ KERNELS = ("fixed", "float", "double")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 DIGITS = 50
 LENGTHS_MM = (31.0, 20.0, 5.0, 1.0, 0.1, 1e-3, 1e-6)
+"""Lengths of the segments in which kernels are compared."""
 
 
 class Point(ctypes.Structure):

@@ -28,7 +28,9 @@ from hodograph.simulate import simulate
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 LAPS = 20
 FRAMES_A_TICK = 5
+"""Frames of one tick on the bus."""
 LOOK_TICKS = 40
+"""Ticks whose frames are processed at once."""
 
 
 def traffic() -> tuple[bytes, Frames]:

@@ -71,8 +71,11 @@ SEEDS = range(101, 106)
 """Seeds of paths that were never used for tuning."""
 
 RAMPS_S = (0.02, 0.03, 0.045, 0.07, 0.1, 0.14, 0.2, 0.28, 0.4, 0.6)
+"""Ramp times that are compared."""
 COARSE = 8
+"""Intervals of a span in the first solution of the reference."""
 LEAST_RESERVE = 0.002
+"""Reserve of the limits in the compared plans."""
 
 
 @dataclass(frozen=True)

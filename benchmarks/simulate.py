@@ -28,7 +28,9 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 LAPS = 350
 RATES_HZ = (4000, 8000, 16000, 32000, 64000)
 NEARLY_CONTINUOUS_HZ = 1_024_000
+"""Sampling rate that stands for continuous time."""
 FINE_ENCODER = 2**26
+"""Counts per revolution of an encoder that stands for one without steps."""
 
 
 def example(name: str, laps: int = 1) -> tuple[bytes, tuple[Drive, Drive]]:

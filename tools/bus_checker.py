@@ -30,6 +30,7 @@ _NMT, _SYNC, _EMCY, _TPDO1, _RPDO1, _TPDO2, _TPDO3 = 0x000, 0x080, 0x080, 0x180,
 _SDO_ANSWER, _SDO_ASK, _HEARTBEAT = 0x580, 0x600, 0x700
 _SDO_BYTES, _SDO_ABORT = 8, 0x80
 _OVERFLOW = 240
+"""Last value of the counter in SYNC."""
 _MAY_REFUSE = {
     (0x1005, 0x06010002),  # the COB-ID of SYNC is fixed
     (0x100C, 0x06020000),  # no node guarding
@@ -39,7 +40,9 @@ _MAY_REFUSE = {
 _NOT_YET = (0x2001, 0x08000022)
 """`start` while the axes settle; a refusal that the host does not expect ends its run."""
 _NO_OBJECT = 0x06020000
+"""Abort code: the object does not exist."""
 _KEPT_FINDINGS = 50
+"""Findings that are kept for the report."""
 _SAMPLE = 499
 """cantools itself decodes each frame whose number this divides; the rest is decoded by numpy."""
 

@@ -271,8 +271,11 @@ def state_figure() -> Figure:
 # --- Bus timing ---
 
 READY_US = 55.0
+"""Time from a tick until its setpoints are ready to be sent."""
 REACTION_US = 200.0
+"""Time from SYNC until a drive sends its position."""
 DRIVES = (2, 3)
+"""Node numbers of the drives."""
 
 
 def frames(at_us: float) -> list[tuple[float, float, str, str]]:

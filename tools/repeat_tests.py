@@ -35,8 +35,10 @@ from run_parts import Part, judge
 ROOT = Path(__file__).resolve().parent.parent
 MODES = ("idle", "busy", "one-core")
 BUSY_PROCESSES = 4
+"""Processes that keep the cores busy."""
 _FAILED = "failed: "  # a line for each failed test (run_tests.py)
 _PATIENCE_S = 30.0
+"""Longest time until a process ends that was asked to."""
 
 
 @dataclass(frozen=True)

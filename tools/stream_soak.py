@@ -56,9 +56,12 @@ FEED_MM_S, LEAST_MM, MOST_MM, GROWTH_MM = 50.0, 20.0, 60.0, 0.5
 ICOUNT = 3
 """The board makes 125 million instructions a second: about 2 million for the check of each KiB of a chunk."""
 MARK_TICKS = 60_000
+"""Ticks between two hashes of the setpoints."""
 PATIENCE_S = 1e6
+"""Longest wait for a chunk: practically without limit."""
 _REPORT_S, _TAKE_S = 60.0, 2.0
 _PAGE_MB = 4096 / 2**20
+"""Size of a page of memory."""
 
 
 def write_job(file: Path, seconds: float) -> int:

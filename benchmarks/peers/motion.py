@@ -14,7 +14,9 @@ RATE_HZ = 1000.0
 _STANDS_MM = 1e-6
 """Steps below this are standstill: positions are known to a nanometre."""
 _BLOCK = 256
+"""Points whose distance is computed at once, to bound the memory."""
 _FINE_MM = 0.01
+"""Longest step between samples of a path."""
 
 
 @dataclass(frozen=True)

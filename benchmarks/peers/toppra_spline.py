@@ -21,6 +21,7 @@ from .motion import RATE_HZ, AxisLimits, Motion
 Real = NDArray[np.float64]
 
 _GRID_A_POINT = 4
+"""Intervals of the grid for each point of the program."""
 
 
 def version() -> str:

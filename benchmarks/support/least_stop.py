@@ -27,6 +27,7 @@ from hodograph.spline.frames import frames
 Real = NDArray[np.float64]
 
 INTERVALS = 40
+"""Intervals of a stop in the discretised problem."""
 _SPAN_PLACES = 48
 """Places of each span at which the splines of the path interpolate."""
 _PARTS = (0.0, 0.25, 0.5, 0.75, 1.0)

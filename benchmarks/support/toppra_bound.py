@@ -26,7 +26,9 @@ from hodograph.spline.spatial import SpatialPHSpline
 Real = NDArray[np.float64]
 
 GRID = 4000
+"""Intervals of the path."""
 _FREE = 1e7
+"""Stands for no limit, in mm and s."""
 _PERIOD_S = 1e-3
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 KERNELS = {"fixed": 0, "float": 1}
 _LIMIT_S = 300
+"""Longest run of an emulator."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from functools import cached_property
 from pathlib import Path
 
 _EM_RISCV = 243
+"""Machine number of RISC-V in an ELF header."""
 _FUNCTION = re.compile(r"^([0-9a-f]+) <([^>]+)>:$")
 _LINE = re.compile(r"^\s*([0-9a-f]+):\t(\S+)(?:\t(.*))?$")
 _DATA = {".word": 4, ".short": 2, ".byte": 1}

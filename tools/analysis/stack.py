@@ -20,6 +20,7 @@ from analysis.effects import StackError, effect
 from analysis.image import Function, Image
 
 _MOST_BYTES = 1 << 16
+"""At a greater depth the stack is taken to grow in a loop."""
 _FRAME_BYTES, _FPU_FRAME_BYTES = 32 + 4, 104 + 4  # each with the word that aligns it to 8
 
 

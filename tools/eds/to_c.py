@@ -25,6 +25,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from .reading import NUMBERS, OTHERS, EdsError, NumberType, default_of, read, values_of
 
 _STRING_ROOM = 32
+"""Least bytes of a string that can be written."""
 _KEYWORDS = {
     *(
         "auto",

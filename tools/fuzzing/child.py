@@ -25,7 +25,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from fuzzing.targets import TARGETS, Finding
 
 HANG_S = 120
+"""Longest time of a case."""
 MOST_FINDINGS = 20
+"""A run ends after this number of findings."""
 
 
 def run_case(target: str, seed: int, case: int, folder: Path) -> str | None:

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 STATUSES = (0, 2, 3, 4, 5, 6, 7)
+"""Exit statuses that a command may have: all but that of an internal error."""
 _WALL_TIME = ("planning_s",)
 _ROUNDED_US = 20.0
 """The controller's bounds of stops may be above those in Python by this (hodograph.program.check_stops)."""

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 MOST = 25
+"""Examples of a Hypothesis test while mutants are tested."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -14,6 +14,7 @@ from vcan import frames
 from vcan.channel import Channel
 
 _GRACE_S = 2.0
+"""Time that the processes have to end."""
 
 
 class Job(Channel):

@@ -27,6 +27,7 @@ from vcan.forward import Forward
 from vcan.registry import Bus
 
 _TROUBLE = 125
+"""Exit status if the bus itself fails."""
 
 _ABOUT = """\
 Runs COMMAND with a CAN bus vcan0: the kernel's own where there is one, else one in a network namespace,
