@@ -60,6 +60,7 @@ _IGNORED: dict[tuple[type[Command], ...], str] = {
 }
 _LONGEST_NAME = 40
 _ROUNDING_MM = 1e-9
+"""Rounding that is allowed beyond the travel of an axis."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
 from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
 
 _CHECK_S = 0.1
+"""Time between two checks of the bus, in a dwell and while the operator is awaited."""
 _START_COUNTS = 2
 """If no axis is farther from the start of a section, it begins without a move there. The last end was rounded."""
 

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from ..config import Machine
 
 _WRITE_EVERY_S = 0.5
+"""Time between two writes of received frames."""
 _ANSWER_S = 1.0
+"""Longest time until the controller answers."""
 
 
 def record(options: Namespace) -> None:

@@ -26,6 +26,7 @@ _SETTLE_S = 0.01
 """Pause between two requests, for the answers of further nodes."""
 _LOOK_S = 0.001
 _ANYBODY = 0x80
+"""Bit number of a question that all nodes without a number answer (CiA 305)."""
 _FASTSCAN = struct.Struct("<BIBBB")
 BOOT_S = 0.5
 """Wait for the boot-up of nodes after they got their number."""

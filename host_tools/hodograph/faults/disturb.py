@@ -24,6 +24,7 @@ QUIET_S = 0.25
 """Time recorded after the end of the case, so that later motion is recorded too."""
 _SYNCS, _TICK = 1, 2
 _STILL_LOOKS = 5
+"""Equal readings after which the axes count as standing."""
 _START_S = 120.0
 """Time for the start of a command process: on a busy computer it loads for longer than a case lasts."""
 

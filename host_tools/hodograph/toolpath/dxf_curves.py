@@ -19,6 +19,7 @@ from .contours import FLAT_MM, MOST_MM, Affine, Contours, Point, ShapeError, Spl
 from .dxf_tags import Entity, ezdxf_module, number_of
 
 _MOST_DEGREE = 15
+"""Greatest degree of a spline."""
 
 _ROUNDED_TURN = 1e-4
 """By how many rad a whole circle or ellipse may seem longer than a turn: programs write 2π as 6.28319 or 6.2832."""

@@ -29,6 +29,7 @@ _MOST_ENTRIES = 64
 """Most points that a closed chain may begin at."""
 
 _CIRCLE_ENTRIES = 16
+"""Points at which a full circle may begin."""
 
 _LEAST_RING = 4.0
 """A contour whose ends are within the gap is closed if its length is at least this many gaps. A shorter one is a dash,
@@ -44,6 +45,7 @@ _PASSED = 10_000
 """Passes end after this number of tried visits."""
 
 _LEAST_GAIN = 1e-9
+"""A change of the order has to gain more than this, mm."""
 
 _NONE = -1
 """An end that is not linked."""

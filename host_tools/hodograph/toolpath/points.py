@@ -47,7 +47,9 @@ _Row = tuple[int, Position, float | None]
 """Line number, position, and feed in mm/s (None: the line has none)."""
 
 _BATCH = 4096
+"""Lines that are read at once."""
 _MOST_LINE = 4096
+"""Characters of the longest line."""
 _BLANKS = " \t\r\n\N{ZERO WIDTH NO-BREAK SPACE}"
 _UTF_16 = ("\udcff\udcfe", "\udcfe\udcff")
 """Byte order marks, as surrogateescape has them."""

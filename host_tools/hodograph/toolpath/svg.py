@@ -62,6 +62,7 @@ _STYLED = (
     "transform-origin",
 )
 _DEEPEST_USE = 32
+"""Greatest depth of elements inside other elements."""
 
 
 def read_svg(path: Path, options: DrawingOptions) -> Iterator[Command]:

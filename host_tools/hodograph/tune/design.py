@@ -22,6 +22,7 @@ VELOCITIES = ("drive", "bus")
 _SLOWEST = 1e-3
 """Range of the real pole in the search, as a part of the fastest."""
 _OFFSET_MAX = 32767.0
+"""Greatest coefficient of the torque offset that the controller accepts, per mille of the rated torque."""
 
 
 @dataclass(frozen=True)

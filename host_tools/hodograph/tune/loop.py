@@ -20,7 +20,9 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 GRID_POINTS = 6000
+"""Frequencies at which a loop is evaluated, over six decades."""
 _GONE = 1e-9
+"""Poles of smaller magnitude are left out: their motion is gone within a step."""
 
 
 @dataclass(frozen=True)

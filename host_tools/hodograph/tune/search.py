@@ -18,6 +18,7 @@ from .design import Poles, feedforward_of, pole_for_stiffness, with_poles
 from .loop import Margins, loop_of, margins
 
 DAMPINGS = (0.6, 0.7, 0.85, 1.0, 1.2)
+"""Dampings of the closed loop that are tried."""
 BANDWIDTHS = 7
 """Number of bandwidths tried for each damping, in equal ratios up to the greatest that keeps the margins."""
 SPAN = 8.0
@@ -25,6 +26,7 @@ SPAN = 8.0
 ENOUGH = 1.02
 """Loops whose error is at most this factor times the least error are equally good: the slowest of them is taken."""
 _HALVINGS = 30
+"""Halvings of the bracket of the frequency."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,9 @@ Series = list[Real]
 """Coefficients of ascending powers of time, (C,) each."""
 
 _ORDERS = 5
+"""Terms of the Taylor expansions in time."""
 _LEAST_WIDTH = 1e-6
+"""Least width of a cell in the curve parameter, to avoid a division by 0."""
 
 
 def bends(cells: Cells) -> Motion:

@@ -23,7 +23,9 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _BISECTIONS = 56
+"""Halvings of the time at which a piece passes a joint; they exhaust double precision."""
 _BRIEF_S = 1e-12
+"""Shorter cells are left out."""
 
 
 @dataclass(frozen=True, eq=False)

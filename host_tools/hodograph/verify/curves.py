@@ -20,6 +20,7 @@ Complex = NDArray[np.complex128]
 Int = NDArray[np.int64]
 
 _NEWTON_STEPS = 6
+"""Steps from an arc length to its curve parameter."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,11 @@ GAP = 1e-4
 """Greatest rise of a quantity between samples, over its least limit or its peak, whichever is greater."""
 
 _MOST_INTERVALS = 48
+"""A cell that needs more sampling intervals than this is divided."""
 _ROUNDS = 8
+"""How often cells are divided."""
 _CHUNK = 1 << 16
+"""Approximate number of samples that are evaluated at once, to bound the memory."""
 
 
 @dataclass(frozen=True, eq=False)

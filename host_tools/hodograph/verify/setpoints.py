@@ -19,7 +19,9 @@ Real = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 _CHUNK = 1 << 17
+"""Ticks that are evaluated at once, to bound the memory."""
 _ORDER = 3
+"""Highest difference of setpoints: the third, for the jerk."""
 PerAxis = tuple[float, ...]
 
 

@@ -26,6 +26,7 @@ TOLERANCE = 1e-3
 """A limit counts as kept if its quantity exceeds it by at most this share."""
 
 _HAIR = 1e-6
+"""Limit usage above 1 that counts as rounding."""
 
 
 @dataclass(frozen=True)

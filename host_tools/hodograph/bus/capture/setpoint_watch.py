@@ -21,6 +21,7 @@ _STEP, _EDGE = WINDOW // 2, WINDOW // 4
 _MOST_FRAMES = 100_000
 """If no SYNC comes, at most this many frames are kept."""
 _NODES = 0x7F
+"""Node numbers: 1 to this."""
 
 
 class SetpointWatch:
