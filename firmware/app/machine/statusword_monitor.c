@@ -7,7 +7,7 @@
 #include "app/machine/fault.h"
 #include "canopen/cia402.h"
 
-/* bits that have to be set in every mode */
+/* bits that, once set, have to stay set in every mode */
 #define KEEPS_ALWAYS (CIA402_STATUS_VOLTAGE | CIA402_STATUS_REMOTE)
 
 void statusword_monitor_init(struct statusword_monitor *monitor)
