@@ -3,7 +3,8 @@
 between.
 
 A command does not wait until a state has been read: it is sent between two objects of it, and it breaks off the
-transfer of a program. In virtual time the thread is a participant, and its waits are counted in that time.
+transfer of a program. A hold, a stop and a quick stop do not wait for other commands either, nor for other clients of
+the controller's SDO channel. In virtual time the thread is a participant, and its waits are counted in that time.
 
 Used by monitor/session. Reads and writes objects of the controller by SDO; a participant is a process on a bus in
 virtual time.
@@ -28,6 +29,7 @@ from ..bus.diagnostics.texts import STATES
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import (
+    AT_ONCE,
     DISABLE,
     ENABLE,
     HOLD,
@@ -88,9 +90,10 @@ class Link:
         self._given_crc32 = None if given is None else zlib.crc32(given[16:])
         self._crc32: int | None = self._given_crc32
         self._commands: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
+        self._stops: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
         self._wake = threading.Event()
         self._ending = threading.Event()
-        self._in_command = False
+        self._in_command = self._in_stop = False
         self._clock: VirtualClock | None = None
         """Clock of the present connection in virtual time."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
@@ -112,10 +115,13 @@ class Link:
         """Whether the thread works; it ends by `close` alone."""
         return self._thread.is_alive()
 
-    def submit(self, command: Command) -> Future[None]:
-        """Queues a command; the future gets a HodographError if the controller does not accept it."""
+    def submit(self, command: Command, *, at_once: bool = False) -> Future[None]:
+        """Queues a command; the future gets a HodographError if the controller does not accept it.
+
+        `at_once`: the controller accepts it at any time (AT_ONCE), so it overtakes the others.
+        """
         done: Future[None] = Future()
-        self._commands.put((command, done))
+        (self._stops if at_once else self._commands).put((command, done))
         self._wake_up()
         return done
 
@@ -144,6 +150,7 @@ class Link:
             controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
             controller.before_read = lambda: self._execute(controller)
+            controller.call_while_waiting(lambda: self._execute_stops(controller))
             if isinstance(network.clock, VirtualClock):
                 self._clock = network.clock
             try:
@@ -158,6 +165,7 @@ class Link:
         whole_due_s = 0.0
         failures = 0
         while not self._ending.is_set():
+            self._execute_stops(controller)
             if not controller.answers(_ANSWER_S):
                 status = None
                 self._lost(
@@ -199,25 +207,36 @@ class Link:
         self._fail_commands(BusError(note))
 
     def _fail_commands(self, error: HodographError) -> None:
-        with suppress(queue.Empty):
-            while True:
-                self._commands.get_nowait()[1].set_exception(error)
+        for waiting in (self._stops, self._commands):
+            with suppress(queue.Empty):
+                while True:
+                    waiting.get_nowait()[1].set_exception(error)
 
     def _execute(self, controller: Controller) -> None:
         """Executes the queued commands."""
-        if self._in_command:
+        self._execute_stops(controller)
+        if self._in_command or self._in_stop:
             return
         self._in_command = True
         try:
             while not self._commands.empty():
-                command, done = self._commands.get()
-                try:
-                    command(controller)
-                    done.set_result(None)
-                except HodographError as error:
-                    done.set_exception(error)
+                _carry_out(*self._commands.get(), controller)
+                self._execute_stops(controller)
         finally:
             self._in_command = False
+
+    def _execute_stops(self, controller: Controller) -> None:
+        """Executes the queued commands that need not wait, also while another command waits for its turn."""
+        if self._in_stop or self._stops.empty():
+            return
+        patience, controller.sdo.RESPONSE_TIMEOUT = controller.sdo.RESPONSE_TIMEOUT, _ANSWER_S
+        self._in_stop = True
+        try:
+            while not self._stops.empty():
+                _carry_out(*self._stops.get(), controller)
+        finally:
+            self._in_stop = False
+            controller.sdo.RESPONSE_TIMEOUT = patience
 
     def _look_at_program(self, controller: Controller, program: dict[str, Any]) -> None:
         """Reads the program to draw if it is not the one before."""
@@ -239,7 +258,15 @@ class Link:
                 self._show_program(image, "")
 
     def _has_other_work(self) -> bool:
-        return self._ending.is_set() or not self._commands.empty()
+        return self._ending.is_set() or not (self._commands.empty() and self._stops.empty())
+
+
+def _carry_out(command: Command, done: Future[None], controller: Controller) -> None:
+    try:
+        command(controller)
+        done.set_result(None)
+    except HodographError as error:
+        done.set_exception(error)
 
 
 def _changed(controller: Controller, status: dict[str, Any]) -> bool:
@@ -308,6 +335,12 @@ def read_command(request: dict[str, Any]) -> Command:
     if not isinstance(name, str) or name not in _BUTTONS:
         raise InputError("there is no such command")
     return _button(_BUTTONS[name])
+
+
+def is_stop(request: dict[str, Any]) -> bool:
+    """Whether the controller accepts the command of a request at any time."""
+    name = request.get("name")
+    return isinstance(name, str) and _BUTTONS.get(name) in AT_ONCE
 
 
 def _button(number: int) -> Command:
