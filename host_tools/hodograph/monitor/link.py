@@ -44,6 +44,7 @@ from ..bus.sdo.objects import (
     STOP,
 )
 from ..bus.sdo.status import read_status, stream_dict
+from ..bus.sdo.stream_channel import ENDED, STOPPED
 from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
 from ..fixed_point import MM_PER_Q40
@@ -54,6 +55,9 @@ WHOLE_S = 1.5
 """Period of reading the state and moving values, and period of reading all values."""
 _ANSWER_S = 3.0
 _RETRY_S = 1.0
+_OF_A_JOB = -1
+"""In place of a CRC-32: the page shows the path of a streamed job."""
+_MOVES = ("running", "holding", "held")
 LONGEST_UPLOAD = 256 * 1024
 """A program up to this size is read from the controller and drawn; larger ones would occupy the bus for too long."""
 
@@ -87,6 +91,7 @@ class Link:
         self._address, self._node, self._bitrate = address, node, bitrate
         self._publish = publish
         self._show_program = show_program
+        self._given = given
         self._given_crc32 = None if given is None else zlib.crc32(given[16:])
         self._crc32: int | None = self._given_crc32
         self._commands: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
@@ -94,6 +99,7 @@ class Link:
         self._wake = threading.Event()
         self._ending = threading.Event()
         self._in_command = self._in_stop = False
+        self._program_runs = False
         self._clock: VirtualClock | None = None
         """Clock of the present connection in virtual time."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
@@ -176,7 +182,7 @@ class Link:
             try:
                 if status is None or begun_s >= whole_due_s or _changed(controller, status):
                     status = read_status(controller)
-                    self._look_at_program(controller, status["program"])
+                    self._look_at_program(controller, status)
                     took_s = clock.now_s() - begun_s
                     whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
                 else:
@@ -238,14 +244,19 @@ class Link:
             self._in_stop = False
             controller.sdo.RESPONSE_TIMEOUT = patience
 
-    def _look_at_program(self, controller: Controller, program: dict[str, Any]) -> None:
-        """Reads the program to draw if it is not the one before."""
-        crc32 = program["crc32"] if program["state"] == "ready" else None
-        if crc32 == self._crc32 or (crc32 is None and self._given_crc32 is not None):
+    def _look_at_program(self, controller: Controller, status: dict[str, Any]) -> None:
+        """Reads the program to draw if it is not the one before, or the path of a job is drawn in its place."""
+        if self._shows_job(status):
+            return
+        program = status["program"]
+        crc32 = program["crc32"] if program["state"] == "ready" else self._given_crc32
+        if crc32 == self._crc32:
             return
         self._crc32 = crc32
         if crc32 is None:
             self._show_program(None, "no program is loaded")
+        elif crc32 == self._given_crc32:
+            self._show_program(self._given, "")
         elif program["size"] > LONGEST_UPLOAD:
             self._show_program(None, "the program is too long to be fetched: give it as --program")
         else:
@@ -256,6 +267,19 @@ class Link:
                 self._crc32 = None  # once more at the next poll
             else:
                 self._show_program(image, "")
+
+    def _shows_job(self, status: dict[str, Any]) -> bool:
+        """Whether the path of a streamed job is the one to show: until the controller has none any more, or runs its
+        program though the job is over, in two looks one after the other.
+        """
+        stream = status["stream"]
+        if stream is None:
+            return False
+        if stream["state"] not in (ENDED, STOPPED):
+            self._crc32, self._program_runs = _OF_A_JOB, False
+            return True
+        before, self._program_runs = self._program_runs, status["state"] in _MOVES
+        return self._crc32 == _OF_A_JOB and not (before and self._program_runs)
 
     def _has_other_work(self) -> bool:
         return self._ending.is_set() or not (self._commands.empty() and self._stops.empty())

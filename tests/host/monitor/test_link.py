@@ -15,6 +15,7 @@ from canopen.sdo.exceptions import SdoCommunicationError
 
 from hodograph.bus.address import BusAddress, parse_address
 from hodograph.bus.sdo.channel_lock import Turns
+from hodograph.bus.sdo.stream_channel import ENDED, OPEN
 from hodograph.errors import HodographError
 from hodograph.monitor.link import Link, is_stop
 from hodograph.monitor.session import _require_alive
@@ -58,6 +59,8 @@ class FakeController:
 class Bench:
     def __init__(self) -> None:
         self.shown: list[bytes | None] = []
+        self.state = "ready"
+        self.stream: dict[str, int] | None = None
         self.link = Link(
             parse_address("socketcan:vcan0"),
             1,
@@ -69,7 +72,8 @@ class Bench:
         self.controller = FakeController()
 
     def look(self) -> None:
-        self.link._look_at_program(self.controller, PROGRAM)  # type: ignore[arg-type]
+        status = {"program": PROGRAM, "state": self.state, "stream": self.stream}
+        self.link._look_at_program(self.controller, status)  # type: ignore[arg-type]
 
 
 def test_a_command_does_not_wait_for_a_program_that_is_being_fetched() -> None:
@@ -94,6 +98,27 @@ def test_a_program_that_could_not_be_fetched_is_fetched_at_the_next_look() -> No
     assert bench.shown == []
     bench.look()
     assert bench.shown == [IMAGE]
+
+
+def test_after_a_streamed_job_the_program_is_shown_again() -> None:
+    """When the controller has no job any more, or runs the program though it has one that is over."""
+    bench = Bench()
+    bench.look()
+    for over in ([(None, "ready")], [({"state": ENDED}, "running")] * 2):
+        bench.stream = {"state": OPEN}
+        bench.look()
+        bench.stream = {"state": ENDED}
+        for bench.state in (
+            "running",
+            "ready",
+            "ready",
+        ):  # the first: its end was between two reads
+            bench.look()
+        assert bench.shown == [IMAGE]
+        for bench.stream, bench.state in over:
+            bench.look()
+        assert bench.shown == [IMAGE, IMAGE]
+        bench.shown.pop()
 
 
 def test_a_stop_is_sent_while_another_command_waits_for_its_turn() -> None:
