@@ -7,7 +7,12 @@ import os
 import signal
 import tempfile
 
+import pytest
 from hypothesis import settings
+
+# A test that hangs fails after this time (pytest-timeout). Long tests compute for minutes, and the computer may be
+# busy. The limit of all others is in pyproject.toml.
+LONG_TEST_LIMIT_S = 7200.0
 
 # The machine may be shared, and no test measures time by examples.
 # The same examples in every run, so that a verdict is the same on every machine.
@@ -24,3 +29,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 _OWN = tempfile.TemporaryDirectory(prefix="hodograph-tests-")
 for _name in ("XDG_STATE_HOME", "XDG_RUNTIME_DIR"):
     os.environ[_name] = _OWN.name
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(LONG_TEST_LIMIT_S))

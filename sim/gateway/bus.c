@@ -18,18 +18,24 @@ static volatile sig_atomic_t signals;
 
 static void on_signal(int number)
 {
-    (void)number;
-    signals++;
+    if (number != SIGHUP || signals == 0) { /* shell and kernel may both send SIGHUP */
+        signals++;
+    }
     clock_note_signal();
 }
 
 int bus_catch_signals(void)
 {
     struct sigaction action;
+    struct sigaction before;
     memset(&action, 0, sizeof action); /* without SA_RESTART: a wait ends */
     action.sa_handler = on_signal;
     (void)sigemptyset(&action.sa_mask);
     (void)signal(SIGPIPE, SIG_IGN);
+    if (sigaction(SIGHUP, NULL, &before) != 0 ||
+        (before.sa_handler != SIG_IGN && sigaction(SIGHUP, &action, NULL) != 0)) { /* nohup */
+        return -1;
+    }
     return sigaction(SIGTERM, &action, NULL) == 0 ? sigaction(SIGINT, &action, NULL) : -1;
 }
 

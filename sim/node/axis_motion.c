@@ -34,6 +34,14 @@ static void axis_motion_put_scale(struct drive *drive, double counts_per_mm)
     drive->mm_per_count = 1.0 / counts_per_mm;
 }
 
+/* The loop restarts; the motor keeps its place and speed. */
+static void axis_motion_release(struct axis_motion *axis, struct motor_state motor)
+{
+    axis->drive.state.motor = motor;
+    drive_hold(&axis->drive);
+    axis->drive.state.motor = motor;
+}
+
 int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us)
 {
     struct drive changed;
@@ -43,10 +51,15 @@ int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us)
     if (error != 0) {
         return error;
     }
+    const bool moves = !axis_motion_at_standstill(axis);
+    const struct motor_state motor = axis->drive.state.motor;
     axis_motion_put_scale(&changed, axis->drive.counts_per_mm);
     drive_place(&changed, drive_position_counts(&axis->drive));
     axis->config = config;
     axis->drive = changed;
+    if (moves) {
+        axis_motion_release(axis, motor);
+    }
     axis_motion_rest(axis);
     return 0;
 }
@@ -60,7 +73,7 @@ bool axis_motion_set_scale(struct axis_motion *axis, double counts_per_mm)
     }
     if (scale != axis->drive.counts_per_mm) {
         axis_motion_put_scale(&axis->drive, scale);
-        drive_hold(&axis->drive);
+        axis_motion_release(axis, axis->drive.state.motor);
         axis_motion_rest(axis);
     }
     return true;

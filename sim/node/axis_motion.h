@@ -30,11 +30,11 @@ struct axis_motion {
 int axis_motion_init(struct axis_motion *axis, const struct drive_config *config,
                      int32_t position_counts);
 
-/* Another bus period, while the axis stands. Returns 0, or an enum drive_error and nothing changes.
- */
+/* Another bus period, while the axis has no setpoints: one that stands is placed at a whole count, one that moves goes
+ * on moving. Returns 0, or an enum drive_error and nothing changes. */
 int axis_motion_set_period(struct axis_motion *axis, uint32_t period_us);
 
-/* Other bus counts per mm (0x6091, 0x6092), while the axis stands; 0: those of the configuration.
+/* Other bus counts per mm (0x6091, 0x6092), while the axis has no setpoints; 0: those of the configuration.
  * Returns false, and nothing changes, when it is out of 1 ... 10^9 or the position would not fit. */
 bool axis_motion_set_scale(struct axis_motion *axis, double counts_per_mm);
 

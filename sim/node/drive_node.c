@@ -37,6 +37,7 @@ static void reset_node(void *context)
     servo_power_on(&node->servo);
     sync_clock_await(&node->clock);
     begin_communication(node);
+    servo_check_causes(&node->servo);
 }
 
 static void reset_communication(void *context)
@@ -197,6 +198,9 @@ static void process_own_frames(struct drive_node *node, uint32_t elapsed_us)
                                    node->nmt.state, elapsed_us, &out) != 0 &&
         !node->without_heartbeats) {
         send(node, &out);
+    }
+    if (!nmt_permits_sdo(node->nmt.state)) {
+        return; /* STOPPED: neither EMCY nor SDO */
     }
     while (emcy_producer_process(&node->servo.errors.emcy, &out) != 0) {
         send(node, &out);

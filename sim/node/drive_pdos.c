@@ -116,6 +116,9 @@ bool drive_pdos_receive(struct drive_pdos *pdos, const struct can_msg *in)
             drive_errors_rpdo_short(&servo->errors, i, map, in);
             continue;
         }
+        if (result == PDO_MAP_TAKEN) {
+            pdos->received |= (uint8_t)(1u << i);
+        }
         if (result == PDO_MAP_TAKEN && servo->errors.short_rpdos != 0u) {
             drive_errors_rpdo_good(&servo->errors, i);
         }
@@ -169,8 +172,11 @@ static void process_events(struct drive_pdos *pdos, uint32_t elapsed_us)
 void drive_pdos_process(struct drive_pdos *pdos, uint32_t elapsed_us)
 {
     process_events(pdos, elapsed_us);
+    const uint8_t received = pdos->received;
+    pdos->received = 0;
     for (int i = 0; i < pdos->rpdo_count; i++) {
-        if (pdo_map_overdue(&pdos->rpdos[i], elapsed_us)) {
+        const uint32_t without_us = (received >> i & 1u) != 0u ? 0u : elapsed_us;
+        if (pdo_map_overdue(&pdos->rpdos[i], without_us)) {
             servo_disconnect(pdos->servo, EMCY_RPDO_TIMEOUT);
         }
     }

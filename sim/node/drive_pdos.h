@@ -30,6 +30,7 @@ struct drive_pdos {
     bool moved;           /* identifiers of RPDOs changed: for the owner's filters, who clears it */
     bool want_all;        /* a TPDO maps values that are not updated at each SYNC */
     uint8_t target_rpdos; /* a bit for each RPDO that maps the target 0x607A */
+    uint8_t received;     /* a bit for each RPDO that came since the last drive_pdos_process */
     uint8_t rpdo_count;   /* PDOs in use: those above are off */
     uint8_t tpdo_count;
 };
@@ -54,7 +55,8 @@ bool drive_pdos_receive(struct drive_pdos *pdos, const struct can_msg *in);
 void drive_pdos_report(struct drive_pdos *pdos);
 void drive_pdos_latch(struct drive_pdos *pdos);
 
-/* Wall time passes: event-driven TPDOs, deadlines of RPDOs. */
+/* Wall time passes: event-driven TPDOs, deadlines of RPDOs. For an RPDO that came since the last call it counts from
+ * this call on, so that a deadline is never early. */
 void drive_pdos_process(struct drive_pdos *pdos, uint32_t elapsed_us);
 
 #endif

@@ -40,6 +40,7 @@ void servo_power_on(struct servo *servo)
     drive_homing_leave(&servo->homing);
     axis_stop_reset(&servo->stop);
     servo->supervision.following_us = 0;
+    servo->supervision.overloaded = false; /* an overload that persists trips again */
     servo->enabled_now = false;
     servo->setpoint_fresh = false;
     servo->limit_switch_hit = false;
@@ -48,8 +49,19 @@ void servo_power_on(struct servo *servo)
 
 /* ---- errors ---- */
 
+/* An option code may have been written after the last controlword. */
+static void take_options(struct servo *servo)
+{
+    struct cia402_options *options = &servo->device.options;
+    options->quick_stop = servo->values->quick_stop_option_code;
+    options->fault_reaction = servo->values->fault_reaction_option_code;
+    options->shutdown = servo->values->shutdown_option_code;
+    options->disable = servo->values->disable_operation_option_code;
+}
+
 void servo_fail(struct servo *servo, uint16_t code)
 {
+    take_options(servo);
     if (cia402_device_fault(&servo->device)) {
         axis_stop_reset(&servo->stop);
         drive_errors_report(&servo->errors, code, 0);
@@ -71,8 +83,19 @@ void servo_fail_powerless(struct servo *servo, uint16_t code)
     servo->device.options.fault_reaction = reaction;
 }
 
+void servo_check_causes(struct servo *servo)
+{
+    if (servo->supervision.encoder_failed) {
+        servo_fail_powerless(servo, EMCY_POSITION_SENSOR_1);
+    }
+    if (servo->supervision.supply_failed) {
+        servo_fail_powerless(servo, EMCY_DC_UNDERVOLTAGE);
+    }
+}
+
 static void quick_stop(struct servo *servo, uint16_t code, uint8_t detail)
 {
+    take_options(servo);
     if (servo->device.state == CIA402_OPERATION_ENABLED) {
         axis_stop_reset(&servo->stop);
         drive_errors_report(&servo->errors, code, detail);
@@ -122,15 +145,6 @@ static void begin_operation(struct servo *servo)
     if (!servo->setpoint_fresh) {
         servo->values->target_position = servo->axis.target_counts;
     }
-}
-
-static void take_options(struct servo *servo)
-{
-    struct cia402_options *options = &servo->device.options;
-    options->quick_stop = servo->values->quick_stop_option_code;
-    options->fault_reaction = servo->values->fault_reaction_option_code;
-    options->shutdown = servo->values->shutdown_option_code;
-    options->disable = servo->values->disable_operation_option_code;
 }
 
 static bool homes(const struct servo *servo)

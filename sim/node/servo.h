@@ -51,6 +51,9 @@ void servo_equip(struct servo *servo, const struct equipment *equipment);
  * periods. A failed encoder or supply stays failed, and the axis stays homed. */
 void servo_power_on(struct servo *servo);
 
+/* After servo_power_on, when errors can be reported: a failed encoder or supply is an error again. */
+void servo_check_causes(struct servo *servo);
+
 /* A controlword, from RPDO or SDO: 0x6040. */
 void servo_control(struct servo *servo, uint16_t controlword);
 

@@ -20,7 +20,7 @@
 #include "offline/stop_limits.h"
 
 #define STOP_ROWS        33u /* of the path, for each segment */
-#define STOP_MOST_LEVELS 11  /* of groups of rows: of 8, 64, 512, ... rows */
+#define STOP_MOST_LEVELS 11
 
 /* The path at an arc length, ascending; two rows with one arc length where segments meet. */
 struct stop_row {

@@ -30,6 +30,13 @@ def free_port() -> int:
 @contextlib.contextmanager
 def monitor(*words: str) -> Iterator[str]:
     """A running monitor; its address."""
+    with running(*words) as (url, _):
+        yield url
+
+
+@contextlib.contextmanager
+def running(*words: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+    """A running monitor: its address, and its process."""
     with subprocess.Popen(
         [HODOGRAPH, "monitor", *words, "--port", str(free_port())],
         stdin=subprocess.DEVNULL,
@@ -40,7 +47,7 @@ def monitor(*words: str) -> Iterator[str]:
         try:
             words_said = process.stderr.readline()
             assert "monitor: http" in words_said, words_said
-            yield words_said.partition("monitor: ")[2].strip()
+            yield words_said.partition("monitor: ")[2].strip(), process
         finally:
             process.send_signal(signal.SIGTERM)
             assert process.wait(HANGS_S) == 0
@@ -137,6 +144,37 @@ def test_the_keyboard_reaches_everything(browser: Browser, files: Path) -> None:
         page.press("Enter", text="\r")
         assert page.js("document.documentElement.dataset.theme") == "dark"
         assert page.complaints == []
+
+
+def test_a_monitor_that_sends_nothing_is_not_shown_as_connected(
+    browser: Browser, files: Path
+) -> None:
+    """As after a pulled cable, where the browser keeps the connection."""
+    with running("--replay", str(files / "alpha.log")) as (url, process):
+        page = browser.open(url)
+        page.wait("document.querySelector('#drive-rows').rows.length === 2")
+        process.send_signal(signal.SIGSTOP)
+        try:
+            page.wait("document.querySelector('#state').textContent === 'not connected'")
+            assert "does not answer" in page.text("#banner")
+        finally:
+            process.send_signal(signal.SIGCONT)
+        page.wait("document.querySelector('#state').textContent === 'replay'")
+        assert "does not answer" not in page.text("#banner")
+
+
+def test_a_reconnected_page_has_no_marks_of_before(browser: Browser, files: Path) -> None:
+    with monitor("--replay", str(files / "alpha.log")) as url:
+        page = browser.open(url)
+        kept = page.js(
+            """import('/store.js').then(({ Store }) => {
+            const store = new Store();
+            store.add({ t: [], marks: [[1, 'coolant on']] });
+            store.setAxes(2);
+            return store.marks.length;
+        })"""
+        )
+        assert kept == 0
 
 
 def test_without_a_program_the_plots_are_there_all_the_same(browser: Browser, files: Path) -> None:

@@ -268,13 +268,18 @@ static void test_a_sleeping_process_is_no_silence(void)
 
 static void test_leaving_operational_stops_the_drive(void)
 {
+    struct emcy emcy;
     enable();
+    sent_count = 0;
     nmt(NMT_STOP);
     for (int i = 0; i < 60; i++) {
         drive_node_process(&node, 10000);
     }
     TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, node.servo.device.state);
+    TEST_ASSERT_NULL(newest(COB_EMCY + ID)); /* not in STOPPED, CiA 301 */
     nmt(NMT_START);
+    TEST_ASSERT_EQUAL_UINT8(ID, emcy_decode(newest(COB_EMCY + ID), &emcy));
+    TEST_ASSERT_EQUAL_HEX16(EMCY_COMMUNICATION, emcy.code);
     sent_count = 0;
     (void)sync();
     TEST_ASSERT_EQUAL_INT64(0, read_object(0x2101, OD_DRIVE_SIMULATION_LOST_SYNCS));

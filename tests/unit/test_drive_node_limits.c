@@ -125,6 +125,35 @@ static void test_an_encoder_that_fails(void)
     reset(CIA402_SWITCH_ON_DISABLED);
 }
 
+/* A restart does not repair it: the drive reports it after its boot-up message, and cannot be enabled. */
+static void test_a_cause_that_persists_over_a_restart(void)
+{
+    const uint16_t words[] = {CIA402_SHUTDOWN, CIA402_SWITCH_ON, CIA402_ENABLE_OPERATION};
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FAULT}, true);
+    for (int restart = 0; restart < 2; restart++) {
+        if (restart == 0) {
+            drive_bench_nmt(NMT_RESET_NODE);
+        } else {
+            drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_RESTART}, true);
+        }
+        drive_bench_expect_emcy(EMCY_POSITION_SENSOR_1,
+                                EMCY_REGISTER_PROFILE | EMCY_REGISTER_GENERIC);
+        drive_bench_nmt(NMT_START);
+        for (int k = 0; k < 3; k++) {
+            bench.word = words[k];
+            drive_bench_run(1);
+        }
+        TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+    }
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_ENCODER_FAULT}, false);
+    drive_bench_nmt(NMT_RESET_NODE);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_SATURATE, .volts = 0.4}, true);
+    drive_bench_nmt(NMT_RESET_NODE);
+    drive_bench_expect_emcy(EMCY_DC_UNDERVOLTAGE, EMCY_REGISTER_VOLTAGE | EMCY_REGISTER_GENERIC);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+}
+
 static void test_undervoltage(void)
 {
     drive_bench_enable();
@@ -163,7 +192,13 @@ static void test_overload(void)
                            drive_bench_read(0x1001, 0));
     drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_LOAD}, false);
     reset(CIA402_FAULT);
-    drive_bench_run(6000); /* cools by 1 s a second, to 80 % of 30 s */
+    bench.node.servo.supervision.overload.heat_s = 32.0;
+    drive_bench_nmt(NMT_RESET_NODE); /* the motor stays hot */
+    drive_bench_nmt(NMT_START);
+    drive_bench_run(1);
+    drive_bench_expect_emcy(EMCY_OVERLOAD, EMCY_REGISTER_CURRENT | EMCY_REGISTER_GENERIC);
+    reset(CIA402_FAULT);
+    drive_bench_run(8000); /* cools by 1 s a second, to 80 % of 30 s */
     reset(CIA402_SWITCH_ON_DISABLED);
 }
 
@@ -355,7 +390,7 @@ static void test_setpoints_that_stay_away(void)
 {
     put(0x1400, 5, 20);
     drive_bench_enable();
-    for (int k = 0; k < 19; k++) { /* one more has passed with the last setpoint */
+    for (int k = 0; k < 20; k++) {
         drive_bench_sync();
         drive_node_process(&bench.node, 1000);
         TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
@@ -363,6 +398,22 @@ static void test_setpoints_that_stay_away(void)
     drive_bench_sync();
     drive_node_process(&bench.node, 1000);
     TEST_ASSERT_EQUAL_INT(CIA402_QUICK_STOP_ACTIVE, state());
+    TEST_ASSERT_EQUAL_HEX16(EMCY_RPDO_TIMEOUT, drive_bench_read(0x603F, 0));
+}
+
+/* Time that has passed before a setpoint came is no part of its deadline: a process that reads its clock seldom trips
+ * no drive that gets its setpoints in time. */
+static void test_a_deadline_is_not_early(void)
+{
+    put(0x1400, 5, 10);
+    drive_bench_enable();
+    for (int k = 0; k < 20; k++) {
+        drive_bench_setpoint(bench.word, bench.target);
+        drive_bench_sync();
+        drive_node_process(&bench.node, 20000);
+        TEST_ASSERT_EQUAL_INT(CIA402_OPERATION_ENABLED, state());
+    }
+    drive_node_process(&bench.node, 10001);
     TEST_ASSERT_EQUAL_HEX16(EMCY_RPDO_TIMEOUT, drive_bench_read(0x603F, 0));
 }
 
@@ -488,6 +539,7 @@ int main(void)
     RUN_TEST(test_the_time_of_a_following_error_starts_again);
     RUN_TEST(test_a_jump_of_the_encoder);
     RUN_TEST(test_an_encoder_that_fails);
+    RUN_TEST(test_a_cause_that_persists_over_a_restart);
     RUN_TEST(test_undervoltage);
     RUN_TEST(test_overload);
     RUN_TEST(test_saturation_is_an_internal_limit);
@@ -502,6 +554,7 @@ int main(void)
     RUN_TEST(test_a_controlword_is_no_setpoint);
     RUN_TEST(test_every_mapped_value_is_up_to_date);
     RUN_TEST(test_setpoints_that_stay_away);
+    RUN_TEST(test_a_deadline_is_not_early);
     RUN_TEST(test_scaling);
     RUN_TEST(test_a_scaled_axis_moves);
     RUN_TEST(test_feedforward_objects);

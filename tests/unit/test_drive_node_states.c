@@ -324,6 +324,48 @@ static void test_power_off_is_the_brake(void)
     TEST_ASSERT_INT32_WITHIN(150000, 360000, axis_motion_position(&bench.node.servo.axis) - from);
 }
 
+/* A drive that restarts at speed is configured while its axis still coasts. */
+static void test_configuring_does_not_stop_a_coasting_axis(void)
+{
+    struct equipment equipment;
+    equipment_init(&equipment, &drive_bench_config);
+    equipment.brake_volts = 0.1;
+    TEST_ASSERT_TRUE(drive_node_equip(&bench.node, &equipment));
+    const double scale = bench.node.servo.axis.drive.counts_per_mm;
+    put(0x6040, CIA402_SHUTDOWN);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x6092, 1, 2000000));
+    TEST_ASSERT_TRUE(bench.node.servo.axis.drive.counts_per_mm != scale);
+    drive_bench_enable();
+    move(400);
+    drive_bench_nmt(NMT_RESET_NODE); /* the scale is that of the drive again */
+    const double speed = bench.node.servo.axis.drive.state.motor.speed_rad_s;
+    TEST_ASSERT_TRUE(speed > 10.0 && bench.node.servo.axis.drive.counts_per_mm == scale);
+    const double place_mm = bench.node.servo.axis.drive.state.motor.position_mm;
+    put(0x1006, 2000);
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, drive_bench_write(0x60C2, 1, 1));
+    TEST_ASSERT_TRUE(bench.node.servo.axis.drive.state.motor.speed_rad_s == speed);
+    TEST_ASSERT_TRUE(bench.node.servo.axis.drive.state.motor.position_mm == place_mm);
+    drive_bench_sync();
+    TEST_ASSERT_FALSE(axis_motion_at_standstill(&bench.node.servo.axis));
+}
+
+/* Option codes are those of the moment of the error, also without a controlword since. */
+static void test_an_option_code_written_after_the_controlword(void)
+{
+    drive_bench_enable();
+    put(0x605E, 0);
+    drive_bench_fault((struct fault_rule){.kind = FAULT_KIND_FAULT, .code = 0x4210}, true);
+    TEST_ASSERT_EQUAL_INT(CIA402_FAULT, state());
+    drive_bench_begin();
+    drive_bench_enable();
+    put(0x605A, 0);
+    for (int i = 0; i < 60; i++) {
+        drive_node_process(&bench.node, 10000); /* no SYNC */
+    }
+    TEST_ASSERT_EQUAL_HEX16(EMCY_SYNC_LOST, bench.node.values.error_code);
+    TEST_ASSERT_EQUAL_INT(CIA402_SWITCH_ON_DISABLED, state());
+}
+
 static void test_reset_reports_no_error(void)
 {
     drive_bench_enable();
@@ -449,6 +491,8 @@ int main(void)
     RUN_TEST(test_a_stop_ends_when_the_motor_stands);
     RUN_TEST(test_patience_ends);
     RUN_TEST(test_power_off_is_the_brake);
+    RUN_TEST(test_configuring_does_not_stop_a_coasting_axis);
+    RUN_TEST(test_an_option_code_written_after_the_controlword);
     RUN_TEST(test_reset_reports_no_error);
     RUN_TEST(test_abort_connection_codes);
     RUN_TEST(test_error_behaviour);

@@ -31,9 +31,10 @@ MARKS = {
     "serial": "serial and not bus",
     "bus": "bus",
 }
-# pytest-timeout (pyproject.toml) ends a test that hangs. It cannot end a test that hangs outside Python: after this
-# time the whole group is ended.
+# pytest-timeout (pyproject.toml, tests/conftest.py) ends a test that hangs. It cannot end a test that hangs outside
+# Python: when a test has run for this time, the whole group is ended. A long test may take two hours.
 LAST_LIMIT_S = 1800.0
+LONG_LAST_LIMIT_S = 8100.0
 _LOOK_S = 5.0
 
 
@@ -44,7 +45,7 @@ class Groups:
     root: Path
     out: Path  # reports and records go here
     is_long: bool = False
-    last_limit_s: float = LAST_LIMIT_S
+    last_limit_s: float | None = None  # None: LAST_LIMIT_S, or LONG_LAST_LIMIT_S with is_long
     records: list[Path] = field(default_factory=list)
     _running: list[subprocess.Popen[bytes]] = field(default_factory=list)
 
@@ -129,13 +130,14 @@ class Groups:
 
     def _wait(self, process: subprocess.Popen[bytes], record: Path) -> list[str]:
         """Waits for the end; names of tests because of which the group had to be ended."""
+        limit_s = self.last_limit_s or (LONG_LAST_LIMIT_S if self.is_long else LAST_LIMIT_S)
         try:
             while True:
                 try:
                     process.wait(_LOOK_S)
                     return []
                 except subprocess.TimeoutExpired:
-                    limit = time.time() - self.last_limit_s
+                    limit = time.time() - limit_s
                     hung = [test for test, at in recording.unfinished(record) if at < limit]
                 if hung:
                     _end(process)

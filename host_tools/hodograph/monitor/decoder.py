@@ -31,8 +31,8 @@ Floats = NDArray[np.float64]
 class Samples:
     """Rows by SYNC, columns by axis: targets sent after it and positions answered to it, in counts.
 
-    `sync` counts SYNCs from the first one received, including lost ones. NaN in targets and actual, -1 in statuswords:
-    no frame came.
+    `sync` counts SYNCs from the first one received, including lost ones; the first has the decoder's `first_sync`. NaN
+    in targets and actual, -1 in statuswords: no frame came.
     """
 
     sync: NDArray[np.int64]
@@ -55,14 +55,14 @@ def nodes_in(frames: Frames) -> tuple[int, ...]:
 class Decoder:
     """Decodes frames; keeps incomplete ticks between two calls of `feed`."""
 
-    def __init__(self, nodes: Sequence[int]) -> None:
+    def __init__(self, nodes: Sequence[int], first_sync: int = 0) -> None:
         self._nodes = tuple(nodes)
         self._tail: Frames | None = None
         self._wanted = np.array([SYNC_ID, *self._identifiers()])
         self._used = dict.fromkeys(
             self._identifiers(), 0
         )  # frames of the tail that are samples already
-        self._sync = 0
+        self._sync = first_sync
         self._counter: int | None = None
 
     def _identifiers(self) -> list[int]:

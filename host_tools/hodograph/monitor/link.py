@@ -3,7 +3,8 @@
 between.
 
 A command does not wait until a state has been read: it is sent between two objects of it, and it breaks off the
-transfer of a program. In virtual time the thread is a participant, and its waits are counted in that time.
+transfer of a program. A hold, a stop and a quick stop do not wait for other commands either, nor for other clients of
+the controller's SDO channel. In virtual time the thread is a participant, and its waits are counted in that time.
 
 Used by monitor/session. Reads and writes objects of the controller by SDO; a participant is a process on a bus in
 virtual time.
@@ -28,6 +29,7 @@ from ..bus.diagnostics.texts import STATES
 from ..bus.sdo.controller import Controller
 from ..bus.sdo.network import open_network
 from ..bus.sdo.objects import (
+    AT_ONCE,
     DISABLE,
     ENABLE,
     HOLD,
@@ -42,6 +44,7 @@ from ..bus.sdo.objects import (
     STOP,
 )
 from ..bus.sdo.status import read_status, stream_dict
+from ..bus.sdo.stream_channel import ENDED, STOPPED
 from ..data import CONTROLLER_EDS, object_dictionary
 from ..errors import BusError, HodographError, InputError, RefusedError
 from ..fixed_point import MM_PER_Q40
@@ -54,6 +57,9 @@ _ANSWER_S = 3.0
 """Longest time until an answer of the controller."""
 _RETRY_S = 1.0
 """Time between two attempts to connect."""
+_OF_A_JOB = -1
+"""In place of a CRC-32: the page shows the path of a streamed job."""
+_MOVES = ("running", "holding", "held")
 LONGEST_UPLOAD = 256 * 1024
 """A program up to this size is read from the controller and drawn; larger ones would occupy the bus for too long."""
 
@@ -87,12 +93,15 @@ class Link:
         self._address, self._node, self._bitrate = address, node, bitrate
         self._publish = publish
         self._show_program = show_program
+        self._given = given
         self._given_crc32 = None if given is None else zlib.crc32(given[16:])
         self._crc32: int | None = self._given_crc32
         self._commands: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
+        self._stops: queue.SimpleQueue[tuple[Command, Future[None]]] = queue.SimpleQueue()
         self._wake = threading.Event()
         self._ending = threading.Event()
-        self._in_command = False
+        self._in_command = self._in_stop = False
+        self._program_runs = False
         self._clock: VirtualClock | None = None
         """Clock of the present connection in virtual time."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
@@ -114,10 +123,13 @@ class Link:
         """Whether the thread works; it ends by `close` alone."""
         return self._thread.is_alive()
 
-    def submit(self, command: Command) -> Future[None]:
-        """Queues a command; the future gets a HodographError if the controller does not accept it."""
+    def submit(self, command: Command, *, at_once: bool = False) -> Future[None]:
+        """Queues a command; the future gets a HodographError if the controller does not accept it.
+
+        `at_once`: the controller accepts it at any time (AT_ONCE), so it overtakes the others.
+        """
         done: Future[None] = Future()
-        self._commands.put((command, done))
+        (self._stops if at_once else self._commands).put((command, done))
         self._wake_up()
         return done
 
@@ -146,6 +158,7 @@ class Link:
             controller = _Prompt(self._address, self._node, remote, network.clock)
             controller.sdo.RESPONSE_TIMEOUT = _ANSWER_S
             controller.before_read = lambda: self._execute(controller)
+            controller.call_while_waiting(lambda: self._execute_stops(controller))
             if isinstance(network.clock, VirtualClock):
                 self._clock = network.clock
             try:
@@ -160,6 +173,7 @@ class Link:
         whole_due_s = 0.0
         failures = 0
         while not self._ending.is_set():
+            self._execute_stops(controller)
             if not controller.answers(_ANSWER_S):
                 status = None
                 self._lost(
@@ -170,7 +184,7 @@ class Link:
             try:
                 if status is None or begun_s >= whole_due_s or _changed(controller, status):
                     status = read_status(controller)
-                    self._look_at_program(controller, status["program"])
+                    self._look_at_program(controller, status)
                     took_s = clock.now_s() - begun_s
                     whole_due_s = begun_s + max(WHOLE_S, 5 * took_s)
                 else:
@@ -201,34 +215,50 @@ class Link:
         self._fail_commands(BusError(note))
 
     def _fail_commands(self, error: HodographError) -> None:
-        with suppress(queue.Empty):
-            while True:
-                self._commands.get_nowait()[1].set_exception(error)
+        for waiting in (self._stops, self._commands):
+            with suppress(queue.Empty):
+                while True:
+                    waiting.get_nowait()[1].set_exception(error)
 
     def _execute(self, controller: Controller) -> None:
         """Executes the queued commands."""
-        if self._in_command:
+        self._execute_stops(controller)
+        if self._in_command or self._in_stop:
             return
         self._in_command = True
         try:
             while not self._commands.empty():
-                command, done = self._commands.get()
-                try:
-                    command(controller)
-                    done.set_result(None)
-                except HodographError as error:
-                    done.set_exception(error)
+                _carry_out(*self._commands.get(), controller)
+                self._execute_stops(controller)
         finally:
             self._in_command = False
 
-    def _look_at_program(self, controller: Controller, program: dict[str, Any]) -> None:
-        """Reads the program to draw if it is not the one before."""
-        crc32 = program["crc32"] if program["state"] == "ready" else None
-        if crc32 == self._crc32 or (crc32 is None and self._given_crc32 is not None):
+    def _execute_stops(self, controller: Controller) -> None:
+        """Executes the queued commands that need not wait, also while another command waits for its turn."""
+        if self._in_stop or self._stops.empty():
+            return
+        patience, controller.sdo.RESPONSE_TIMEOUT = controller.sdo.RESPONSE_TIMEOUT, _ANSWER_S
+        self._in_stop = True
+        try:
+            while not self._stops.empty():
+                _carry_out(*self._stops.get(), controller)
+        finally:
+            self._in_stop = False
+            controller.sdo.RESPONSE_TIMEOUT = patience
+
+    def _look_at_program(self, controller: Controller, status: dict[str, Any]) -> None:
+        """Reads the program to draw if it is not the one before, or the path of a job is drawn in its place."""
+        if self._shows_job(status):
+            return
+        program = status["program"]
+        crc32 = program["crc32"] if program["state"] == "ready" else self._given_crc32
+        if crc32 == self._crc32:
             return
         self._crc32 = crc32
         if crc32 is None:
             self._show_program(None, "no program is loaded")
+        elif crc32 == self._given_crc32:
+            self._show_program(self._given, "")
         elif program["size"] > LONGEST_UPLOAD:
             self._show_program(None, "the program is too long to be fetched: give it as --program")
         else:
@@ -240,8 +270,29 @@ class Link:
             else:
                 self._show_program(image, "")
 
+    def _shows_job(self, status: dict[str, Any]) -> bool:
+        """Whether the path of a streamed job is the one to show: until the controller has none any more, or runs its
+        program though the job is over, in two looks one after the other.
+        """
+        stream = status["stream"]
+        if stream is None:
+            return False
+        if stream["state"] not in (ENDED, STOPPED):
+            self._crc32, self._program_runs = _OF_A_JOB, False
+            return True
+        before, self._program_runs = self._program_runs, status["state"] in _MOVES
+        return self._crc32 == _OF_A_JOB and not (before and self._program_runs)
+
     def _has_other_work(self) -> bool:
-        return self._ending.is_set() or not self._commands.empty()
+        return self._ending.is_set() or not (self._commands.empty() and self._stops.empty())
+
+
+def _carry_out(command: Command, done: Future[None], controller: Controller) -> None:
+    try:
+        command(controller)
+        done.set_result(None)
+    except HodographError as error:
+        done.set_exception(error)
 
 
 def _changed(controller: Controller, status: dict[str, Any]) -> bool:
@@ -310,6 +361,12 @@ def read_command(request: dict[str, Any]) -> Command:
     if not isinstance(name, str) or name not in _BUTTONS:
         raise InputError("there is no such command")
     return _button(_BUTTONS[name])
+
+
+def is_stop(request: dict[str, Any]) -> bool:
+    """Whether the controller accepts the command of a request at any time."""
+    name = request.get("name")
+    return isinstance(name, str) and _BUTTONS.get(name) in AT_ONCE
 
 
 def _button(number: int) -> Command:

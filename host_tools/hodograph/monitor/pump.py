@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ..bus.capture.decode import SYNC_ID
 from ..bus.capture.load import LoadCapture
 from ..bus.capture.setpoint_check import StepLimits
 from ..bus.capture.setpoint_watch import SetpointWatch, jumps
@@ -39,6 +40,8 @@ _STATE_S = 0.25
 """Least time between two messages of states, in real time."""
 _RETRY_S = 1.0
 """Time between two attempts to open the bus."""
+_SILENCE_US = 1_000_000
+"""Without SYNC for this time, by the time stamps of the bus, the last answers of the drives are not shown any more."""
 
 Publish = Callable[[dict[str, Any]], None]
 
@@ -98,6 +101,10 @@ class Pump:
         self._chunks, self._job = ChunkCapture(layout.controller), JobPoints()
         self._job_marks = JobMarks(layout.outputs)
         self._state_due_s = 0.0
+        self._newest: tuple[int, float] | None = None
+        """Number of the last SYNC, and when it was decoded."""
+        self._sync_us: int | None = None
+        """Time stamp of the last SYNC; None: none has come, or its answers are not shown any more."""
         self._thread = threading.Thread(target=self._work, name="monitor-pump", daemon=True)
 
     def start(self) -> None:
@@ -143,23 +150,34 @@ class Pump:
             try:
                 source = self._open_source()
             except BusError as error:
-                self._publish({"type": "bus", "there": False, "note": str(error)})
+                self._bus_lost(str(error))
                 self._ending.wait(_RETRY_S)
                 continue
             self._publish({"type": "bus", "there": True, "note": ""})
             self._emergencies = Emergencies()
             self._load = LoadCapture(self._layout.bitrate)
             self._watch = SetpointWatch(self._layout.nodes)
-            self._decoder = Decoder(self._layout.nodes)
+            self._decoder = Decoder(self._layout.nodes, self._first_sync())
             self._derivation = self._fresh_derivation()
             self._passed = self._passed.anew()
             try:
                 self._look_on(source)
             except BusError as error:
-                self._publish({"type": "bus", "there": False, "note": str(error)})
+                self._bus_lost(str(error))
             finally:
                 with suppress(OSError):
                     source.close()
+
+    def _first_sync(self) -> int:
+        """Number of the first SYNC of a source: after a bus that was lost the time of the plots goes on."""
+        if self._newest is None:
+            return 0
+        sync, at_s = self._newest
+        return sync + 1 + round(1e6 * (time.monotonic() - at_s) / self._layout.period_us)
+
+    def _bus_lost(self, note: str) -> None:
+        self._publish({"type": "bus", "there": False, "note": note})
+        self._show_silence()
 
     def _look_on(self, source: Source) -> None:
         due_s = time.monotonic()
@@ -170,12 +188,14 @@ class Pump:
             self._draw_chunks(taken)
             if taken.frames.size:
                 self._pass_on(taken)
+            self._notice_silence(taken)
             for event in self._emergencies.feed(taken.frames, taken.now_us):
                 self._publish(event)
             self._own_load.busy_s += time.thread_time() - begun_s
             self._publish_load(taken)
             if self._again.is_set():
                 self._again.clear()
+                self._newest = None
                 self._publish({"type": "restart"})
                 return
             due_s = max(due_s + LOOK_S, time.monotonic())
@@ -187,6 +207,8 @@ class Pump:
         self._load.feed(taken.frames, newest_us / 1e6)
         self._check_setpoints(taken)
         samples = self._decoder.feed(taken.frames)
+        if samples.count:
+            self._newest = int(samples.sync[-1]), time.monotonic()
         rows = self._derivation.feed(samples, self._followed())
         if rows.count:
             age_ms = None if taken.now_us is None else (taken.now_us - newest_us) / 1000
@@ -204,6 +226,33 @@ class Pump:
         if samples.count and (taken.ended or time.monotonic() >= self._state_due_s):
             self._state_due_s = time.monotonic() + _STATE_S
             self._publish(self._drives(samples))
+
+    def _notice_silence(self, taken: Taken) -> None:
+        """Shows the drives as silent when no SYNC comes any more: their last answers say nothing of the present."""
+        frames, now_us = taken.frames, taken.now_us
+        syncs_us = frames["time_us"][frames["id"] == SYNC_ID]
+        if syncs_us.size:
+            self._sync_us = int(syncs_us[-1])
+        if now_us is None and frames.size:
+            now_us = int(frames["time_us"][-1])
+        if self._sync_us is None or now_us is None:
+            return
+        if now_us - self._sync_us > _SILENCE_US:
+            self._show_silence()
+
+    def _show_silence(self) -> None:
+        if self._sync_us is None:
+            return
+        self._sync_us = None
+        self._state_due_s = 0.0
+        layout = self._layout
+        drives = [
+            {"name": name, "node": node, "state": "silent", "statusword": -1, "actual_mm": None}
+            for name, node in zip(layout.names, layout.nodes, strict=True)
+        ]
+        self._publish(
+            {"type": "drives", "drives": drives, "load_percent": None, "arc_length_mm": None}
+        )
 
     def _draw_chunks(self, taken: Taken) -> None:
         """Extends the path of a streamed job with the chunks that pass on the bus."""

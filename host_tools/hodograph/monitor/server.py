@@ -34,6 +34,8 @@ _WRONG_TOKEN_S = 0.5
 """Delay of the answer to a wrong token, so that tokens cannot be tried quickly."""
 _BEAT_S = 10.0
 """Time between two pings, which show that a client is still there."""
+MOST_COMMANDS = 512
+"""Commands of all browsers that wait for the controller: a slider gives ten a second, and a wait ends after 30 s."""
 _POLICY, _TOKEN_NEEDED = 1008, 4401
 """Close codes: not from this page, or no slot is free; the token is missing or wrong."""
 
@@ -63,6 +65,7 @@ class Server:
         self._pages = _load_pages()
         self._slots: ClientSlots[web.WebSocketResponse] = ClientSlots()
         self._closing: set[asyncio.Task[None]] = set()
+        self._commands: set[asyncio.Task[None]] = set()
         self.app = web.Application(middlewares=[self._check], client_max_size=_MOST_REQUEST)
         self.app.router.add_get("/ws", self._socket)
         self.app.router.add_get("/{name:[a-z_.]*}", self._page)
@@ -170,21 +173,47 @@ class Server:
             pong = {"type": "pong", "at": _number(request.get("at")), "dropped": client.dropped}
             await socket.send_str(encode(pong))
         elif request.get("type") == "command":
-            answer = await self._command(request, may_command)
-            await socket.send_str(encode(answer))
+            refusal = self._refusal(may_command)
+            if refusal is None:
+                self._begin_command(socket, request)
+            else:
+                await socket.send_str(encode(_answer_to(request, False, refusal)))
 
-    async def _command(self, request: dict[str, Any], may_command: bool) -> dict[str, Any]:
-        answer = {"type": "answer", "id": _number(request.get("id")), "ok": False}
+    def _refusal(self, may_command: bool) -> str | None:
+        """Why no command of this browser is carried out; None: it is."""
         if not may_command:
-            return answer | {"text": "this page was opened without the token: it may only look on"}
+            return "this page was opened without the token: it may only look on"
+        if len(self._commands) >= MOST_COMMANDS:
+            return "too many commands wait for the controller: nothing was sent"
+        return None
+
+    def _begin_command(self, socket: web.WebSocketResponse, request: dict[str, Any]) -> None:
+        """Carries out a command in a task of its own: one that waits does not hold up the next, which may be a stop.
+
+        It is not cancelled when the browser leaves: it may be under way.
+        """
+
+        async def carry_out() -> None:
+            with suppress(ConnectionError):
+                await socket.send_str(encode(await self._command(request)))
+
+        command = asyncio.create_task(carry_out())
+        self._commands.add(command)
+        command.add_done_callback(self._commands.discard)
+
+    async def _command(self, request: dict[str, Any]) -> dict[str, Any]:
         try:
-            return answer | {"ok": True, "text": await self._execute(request)}
+            return _answer_to(request, True, await self._execute(request))
         except HodographError as error:
-            return answer | {"text": str(error)}
+            return _answer_to(request, False, str(error))
 
     async def _shut_down(self, _: web.Application) -> None:
         for socket in self._slots.everybody():
             await socket.close(code=1001, message=b"the monitor ends")
+
+
+def _answer_to(request: dict[str, Any], ok: bool, text: str) -> dict[str, Any]:
+    return {"type": "answer", "id": _number(request.get("id")), "ok": ok, "text": text}
 
 
 async def _close_full(socket: web.WebSocketResponse) -> None:

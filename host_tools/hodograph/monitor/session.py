@@ -19,7 +19,7 @@ from .. import __version__
 from ..bus.address import BusAddress
 from ..errors import HodographError, InputError
 from .clients import Broadcaster
-from .link import Link, read_command
+from .link import Link, is_stop, read_command
 from .pump import Layout, Pump
 from .security import Guard, is_loopback
 from .server import Server
@@ -195,7 +195,8 @@ def _execute(link: Link | None, pump: Pump) -> Callable[[dict[str, Any]], Any]:
                 raise InputError("a recording takes no commands")
             pump.restart()
             return "from the beginning"
-        await asyncio.wrap_future(link.submit(read_command(request)))
+        command = read_command(request)
+        await asyncio.wrap_future(link.submit(command, at_once=is_stop(request)))
         return f"{name}: done"
 
     return execute

@@ -35,10 +35,13 @@ class Case:
         self.executed: list[dict[str, Any]] = []
         self.guard = Guard(host, TOKEN)
         self.broadcaster: Broadcaster
+        self.free = asyncio.Event()  # until then a resume waits
 
     async def execute(self, request: dict[str, Any]) -> str:
         if request.get("name") == "refuse":
             raise RefusedError("not now")
+        if request.get("name") == "resume":
+            await self.free.wait()
         self.executed.append(request)
         return "done"
 
@@ -97,6 +100,37 @@ def test_foreign_hosts_and_origins_get_nothing() -> None:
             await browser.ws_connect("/ws")
 
     Case().run(scenario)
+
+
+def test_a_stop_does_not_wait_for_the_answer_to_another_command() -> None:
+    case = Case()
+
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser, token=TOKEN)
+        await socket.send_json({"type": "command", "id": 1, "name": "resume"})
+        await socket.send_json({"type": "command", "id": 2, "name": "quick-stop"})
+        assert (await answer(socket, "answer"))["id"] == 2
+        case.free.set()
+        assert (await answer(socket, "answer"))["id"] == 1
+
+    case.run(scenario)
+    assert [one["name"] for one in case.executed] == ["quick-stop", "resume"]
+
+
+def test_waiting_commands_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "MOST_COMMANDS", 3)
+    case = Case()
+
+    async def scenario(browser: Browser) -> None:
+        socket = await hello(browser, token=TOKEN)
+        for number in range(4):
+            await socket.send_json({"type": "command", "id": number, "name": "resume"})
+        refused = await answer(socket, "answer")
+        assert (refused["id"], refused["ok"]) == (3, False)
+        case.free.set()
+        assert [(await answer(socket, "answer"))["ok"] for _ in range(3)] == [True] * 3
+
+    case.run(scenario)
 
 
 def test_with_the_token_commands_are_executed() -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -39,6 +39,8 @@ class Turns:
 
     def __init__(self, address: BusAddress, node: int, clock: Clock = REAL_CLOCK) -> None:
         self._clock = clock
+        self.while_waiting: Callable[[], None] = _nothing
+        """Called at each look at a lock that is not free; may use the channel without the lock."""
         self._who = f"node {node} on {address}"
         self._depth = 0
         self._sign = os.urandom(_SIGN_BYTES)
@@ -86,8 +88,13 @@ class Turns:
         while not lock_descriptor(file, blocking=False):
             if self._clock.now_s() >= deadline:
                 return False
+            self.while_waiting()
             self._clock.sleep(_LOOK_S)  # the clock may be that of a bus in virtual time
         return True
+
+
+def _nothing() -> None:
+    """Does nothing."""
 
 
 def _folder(address: BusAddress) -> Path:

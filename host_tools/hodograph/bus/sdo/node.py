@@ -119,6 +119,10 @@ class Node:
         self.sdo.RESPONSE_TIMEOUT = 3.0
         self._answers = self.sdo.responses = _Answers(self.sdo.responses)
 
+    def call_while_waiting(self, function: Callable[[], None]) -> None:
+        """Calls `function` again and again while other clients have the channel. It may use `write_at_once`."""
+        self._turns.while_waiting = function
+
     def close(self) -> None:
         """Closes the channel lock."""
         self._turns.close()
@@ -205,6 +209,7 @@ class Node:
                     raise self._busy() from error
             finally:
                 self._answers.asked = b""
+            self._turns.while_waiting()
             self.clock.sleep(_BUSY_LOOK_S)
 
     def transfer_begun(self) -> None:
@@ -328,6 +333,7 @@ class Node:
                         ) from error
                     if self.clock.now_s() >= begun_s + turn_wait_s:
                         raise self._busy() from error
+                    self._turns.while_waiting()
                     self.clock.sleep(_BUSY_LOOK_S)
                 except (SdoCommunicationError, _SilentError):
                     if self.clock.now_s() >= deadline:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Object 0x2060 of the controller: sends chunks (parts) of a job, and reads the state of the job
-(docs/reference/protocol.md 3.7). Used by bus/, cli/stream_command and stream/sender. Reads and writes objects of the
-controller by SDO.
+(docs/reference/protocol.md 3.7). Used by bus/, cli/stream_command, monitor/link and stream/sender. Reads and writes
+objects of the controller by SDO.
 """
 
 from __future__ import annotations

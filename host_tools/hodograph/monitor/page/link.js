@@ -4,6 +4,7 @@
 const TOKEN_NEEDED = 4401;
 const STORED = "hodograph-token";
 const FIRST_WAIT_MS = 500, LONGEST_WAIT_MS = 5000, PING_MS = 2000;
+const SILENCE_MS = 10000; // the monitor sends something each second; a browser does not notice a pulled cable for minutes
 
 /** The token of the address, once: it is kept for reloads of this tab and taken out of the address bar. */
 export function takeToken() {
@@ -24,7 +25,7 @@ export class Link {
     this.rttMs = 0;
     this.ids = 0;
     this.answers = new Map();
-    setInterval(() => this.send({ type: "ping", at: performance.now() }), PING_MS);
+    setInterval(() => this.ping(), PING_MS);
     this.open();
   }
 
@@ -42,6 +43,7 @@ export class Link {
     const scheme = location.protocol === "https:" ? "wss" : "ws";
     const socket = new WebSocket(`${scheme}://${location.host}/ws`);
     this.socket = socket;
+    this.receivedMs = performance.now();
     socket.onopen = () => socket.send(JSON.stringify({ type: "hello", token: this.token ?? "" }));
     socket.onmessage = (event) => this.receive(JSON.parse(event.data));
     socket.onclose = (event) => {
@@ -49,7 +51,19 @@ export class Link {
     };
   }
 
+  /** Cuts a connection over which nothing comes: what the page shows is old then. */
+  ping() {
+    if (this.socket?.readyState === WebSocket.OPEN && performance.now() - this.receivedMs > SILENCE_MS) {
+      const silent = this.socket;
+      this.socket = null;
+      silent.close();
+      this.lost(0);
+    }
+    this.send({ type: "ping", at: performance.now() });
+  }
+
   receive(message) {
+    this.receivedMs = performance.now();
     if (message.type === "hello") {
       this.waitMs = FIRST_WAIT_MS;
       this.on.up();

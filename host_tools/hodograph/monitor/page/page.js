@@ -91,7 +91,10 @@ function addRows(message, live) {
     arrivedMs = performance.now();
     ageMs = message.age_ms;
     const last = message.t.length - 1;
-    panel.following = store.series.filter((name) => name.startsWith("following")).map((name) => message[name][1][last]);
+    panel.following = store.series.filter((name) => name.startsWith("following")).map((name) => {
+      const [low, high] = message[name].map((values) => values[last]);
+      return Math.abs(low) > Math.abs(high) ? low : high;
+    });
   }
 }
 
@@ -101,6 +104,9 @@ const handlers = {
     makeCharts(message.axes, message.units);
     offerViews(message.drawn > 2, message.axes);
     axisCurves.setAxes(message.axes.slice(message.drawn, message.path_axes), message.units.slice(message.drawn, message.path_axes));
+    plane.setPath([], []); // of another run of the monitor, perhaps: the present ones follow
+    plane.setToolpath(null);
+    $("place").hidden = $("speeds").hidden = true;
     panel.hello(message);
     $("event-rows").replaceChildren();
   },

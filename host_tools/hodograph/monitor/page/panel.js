@@ -57,7 +57,12 @@ export class Panel {
     this.reason("controller", connected ? "" : note, true);
     this.state(connected ? status.state : "no controller", connected ? (LOOKS[status.state] ?? "") : "bad");
     this.buttons(connected ? status.state : null);
-    if (!connected) return;
+    if (!connected) {
+      for (const key of ["fault", "boot"]) this.reason(key, "");
+      $("override-now").textContent = "";
+      facts([]);
+      return;
+    }
     this.reason("fault", status.fault ? faultWords(status.fault) : "", true);
     const trouble = status.boot_trouble;
     this.reason("boot", trouble ? `Not ready, node ${trouble.node}: ${trouble.text}. What to do: ${trouble.remedy}.` : "");
@@ -84,7 +89,7 @@ export class Panel {
     $("override-now").textContent = saturated ? `${now}, all that is allowed here` : now;
   }
 
-  program({ program, motion, statistics, stream }) {
+  program({ state, program, motion, statistics, stream }) {
     const rows = [["program", program.state]];
     if (program.state === "ready") {
       const length = program.length_mm;
@@ -92,7 +97,8 @@ export class Panel {
       rows[0] = ["program", `${this.name ? `${this.name}, ` : ""}${text(length, 2)} mm, ${text(program.duration_s, 2)} s`];
       rows.push(["arc length", `${text(motion.arc_length_mm, 3)} mm`]);
     }
-    if (stream) rows.splice(0, rows.length, ...streamRows(stream));
+    const programRuns = OVER.includes(stream?.state) && MOVES.includes(state);
+    if (stream && !programRuns) rows.splice(0, rows.length, ...streamRows(stream));
     rows.push(
       ["feed", `${text(motion.feed_mm_s, 2)} mm/s`],
       ["missed ticks", String(statistics.deadline_misses)],
@@ -109,7 +115,7 @@ export class Panel {
       const bad = /fault|silent|quick/.test(drive.state);
       return row([drive.name, `axis${i % 3}`], [String(drive.node)], [drive.state, bad ? "bad-text" : ""],
         [`${text(drive.actual_mm, 6)} ${this.units[i] === "deg" ? "°" : "mm"}`, "number"],
-        [`${text(this.following[i], 2)} ${this.units[i] === "deg" ? "m°" : "µm"}`, "number"]);
+        [`${text(drive.state === "silent" ? null : this.following[i], 2)} ${this.units[i] === "deg" ? "m°" : "µm"}`, "number"]);
     }));
     if (this.replay) {
       facts([
@@ -136,6 +142,7 @@ function faultWords(fault) {
   return `Fault: ${fault.text} (${code}, node ${fault.node}${detail}). What to do: ${fault.remedy}, then reset the fault.`;
 }
 
+const OVER = [3, 4], MOVES = ["running", "holding", "held"]; // a job that is over; states of a motion
 const STREAM = ["", "open", "waits for its next part", "ended", "stopped", "waits at a program stop: resume goes on"];
 
 /** A job in chunks: line of its source, motion ahead in the controller, time left. */

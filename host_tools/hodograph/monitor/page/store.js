@@ -33,7 +33,6 @@ export class Ring {
 
 export class Store {
   constructor() {
-    this.marks = []; // [time, text]
     this.names = ["feed", "acceleration", "jerk", "contour"];
     this.setAxes(2);
   }
@@ -44,6 +43,7 @@ export class Store {
     this.groups = new Ring(GROUPS, ["t", ...series.flatMap((name) => [`${name}.low`, `${name}.high`])]);
     this.points = new Ring(POINTS, ["cx", "cy", "cz", "ax", "ay", "az"]);
     this.changes = 0;
+    this.marks = []; // [time, text]
   }
 
   clear() {
