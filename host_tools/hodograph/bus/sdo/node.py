@@ -31,6 +31,8 @@ NOWHERE = 0x5000
 """The first of the 4096 indices that no EDS uses."""
 LET_PASS_S = 1.0
 ABORT, ABORT_BUSY = 0x80, 0x08000021
+NO_OBJECT = (0x06020000, 0x06090011)
+"""Abort codes of a server without the object, or without the subindex."""
 """Command byte of an abort; the code with which a server refuses a second client during a transfer."""
 BUSY_S = 5.0
 """Longest wait while another client has a transfer open: after two seconds the server drops a client that is gone."""
@@ -44,8 +46,8 @@ _SCS, _NAMING = 0xE0, (0x40, 0x60)
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
 _AGAIN_S = 0.25
-READ_AGAIN_S = 1.0
-"""A read without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
+AGAIN_S = 1.0
+"""A request without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
 _T = TypeVar("_T")
 
 
@@ -219,20 +221,23 @@ class Node:
         def action() -> int:
             return int(self._variable(index, sub).raw)
 
-        def twice() -> int:
-            with suppress(SdoCommunicationError, _SilentError), self._patience(READ_AGAIN_S):
-                return self.patiently(index, sub, action)
-            return self.patiently(index, sub, action)
-
-        return self._guarded(twice, index, sub)
+        return self._guarded(lambda: self._twice(index, sub, action), index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
-        """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
+        """Writes an integer object; one whose second write of a value changes nothing: after a lost answer it is written
+        again, once. A refusal is an SdoAbortedError's text in a RefusedError.
+        """
+        self._guarded(
+            lambda: self._twice(index, sub, lambda: self._put(index, sub, value)), index, sub
+        )
 
-        def action() -> None:
-            self._variable(index, sub).raw = value
+    def _put(self, index: int, sub: int | None, value: int) -> None:
+        self._variable(index, sub).raw = value
 
-        self._guarded(lambda: self.patiently(index, sub, action), index, sub)
+    def _twice(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
+        with suppress(SdoCommunicationError, _SilentError), self._patience(AGAIN_S):
+            return self.patiently(index, sub, action)
+        return self.patiently(index, sub, action)
 
     @contextmanager
     def _patience(self, most_s: float) -> Iterator[None]:
