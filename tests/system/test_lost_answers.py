@@ -18,6 +18,7 @@ from hodograph.bus.sdo.node import Node, _Answers
 from hodograph.bus.sdo.objects import COMMAND, ENABLE, NAMED_START, OVERRIDE
 from hodograph.cli.main import main
 from hodograph.config import load_machine
+from hodograph.pipeline import load_pipeline
 
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0
@@ -122,6 +123,23 @@ def test_a_resume_is_not_repeated(
     assert main(["resume"]) == status
     assert losing.lost == 1
     assert controller.state() == (HELD if status else RUNNING)
+
+
+def test_doubled_answers_during_an_upload(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """CAN repeats a frame whose acknowledgement was disturbed in its last bit."""
+    put = _Answers.put
+
+    def twice(self: _Answers, answer: bytes) -> None:
+        put(self, answer)
+        if answer[0] == 0xA2:
+            put(self, answer)
+
+    monkeypatch.setattr(_Answers, "put", twice)
+    image = load_pipeline(ALPHA).image
+    controller.upload(image)
+    assert controller.program_crc() == int.from_bytes(image[12:16], "little")
 
 
 @pytest.mark.parametrize("command", ["goto", "run"])

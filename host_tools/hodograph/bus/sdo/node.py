@@ -45,6 +45,8 @@ _SCS, _NAMING = 0xE0, (0x40, 0x60)
 """Bits of a server's command byte; those of the first answers to an upload and to a download, which name the object."""
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
+_BLOCK_TAKEN = 0xA2
+"""Command byte of the answer to a block of a download."""
 _AGAIN_S = 0.25
 AGAIN_S = 1.0
 """A request without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
@@ -84,6 +86,16 @@ class _Answers:
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
         return self._queued.get(timeout=timeout) if block else self._queued.get(block=False)
+
+    def drop_doubled_acknowledgements(self) -> None:
+        """Between two blocks of a download: a frame that CAN doubled would count for the next block."""
+        waiting = []
+        with suppress(queue.Empty):
+            while True:
+                waiting.append(self._queued.get(block=False))
+        for answer in waiting:
+            if answer[0] != _BLOCK_TAKEN:
+                self._queued.put(answer)
 
     def empty(self) -> bool:
         """Always True: answers from before a request do not belong to it and are discarded here."""
@@ -208,6 +220,10 @@ class Node:
     def transfer_begun(self) -> None:
         """Inside `patiently`: the server has accepted the first request, so later refusals are for another client."""
         self._answers.asked = _NOBODY
+
+    def block_taken(self) -> None:
+        """Inside a block download: the server has acknowledged a block."""
+        self._answers.drop_doubled_acknowledgements()
 
     def _nowhere(self) -> bytes:
         """A different number for each call and client; in virtual time the same in each run."""

@@ -91,6 +91,7 @@ def block_download(node: Node, index: int, image: bytes, progress: Progress | No
             stream.write(image[stream.pos : stream.pos + 7])
             if stream._seqno == 0:  # the block is acknowledged
                 node.clock.sleep(_GAP_S)
+                node.block_taken()
             if progress is not None:
                 progress(stream.pos)
     except BaseException as error:
