@@ -18,6 +18,7 @@ from hodograph.bus.sdo.node import Node, _Answers
 from hodograph.bus.sdo.objects import COMMAND, ENABLE, NAMED_START, OVERRIDE
 from hodograph.cli.main import main
 from hodograph.config import load_machine
+from hodograph.errors import RefusedError
 from hodograph.pipeline import load_pipeline
 
 ALPHA = EXAMPLES / "alpha.toml"
@@ -105,6 +106,21 @@ def test_a_start_that_is_lost_is_said_to_have_begun_nothing(
         capsys.readouterr().err
     )
     assert (losing.lost, controller.state()) == (1, READY)
+
+
+def test_a_start_after_a_refused_upload_says_so(
+    controller: Controller, slow_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What is started is not what was uploaded last."""
+    assert main(["goto", str(slow_file)]) == 0
+    image = load_pipeline(ALPHA).image
+    with pytest.raises(RefusedError):
+        controller.upload(image[:1000] + bytes([image[1000] ^ 4]) + image[1001:])
+    capsys.readouterr()
+    assert main(["start"]) == 0
+    assert "a program has been refused (" in capsys.readouterr().err
+    assert main(["status"]) == 0
+    assert "; refused last: " in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("lost", "status"), [("answer", 0), ("request", 4)])

@@ -14,7 +14,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...errors import BusError, RefusedError, one_line
 from ..diagnostics.texts import STATES
 from .node import Node
-from .objects import PROGRAM, PROGRAM_MEMORY, STATE
+from .objects import PROGRAM, PROGRAM_MEMORY, STATE, STREAM
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 _GAP_S = 0.01
@@ -117,6 +117,14 @@ def _refusal(
         f"{node.who()} refused the program: {program_fault_text(code, index)}; "
         "the old program stays"
     )
+
+
+def refused_last(node: Node) -> str | None:
+    """Why the last upload, or the newest program that was stored, was refused; None: it was not, or a job is open."""
+    code = node.read(PROGRAM, 3)
+    if code == 0 or node.read(STREAM, 2) != 0:
+        return None
+    return program_fault_text(code, node.read(PROGRAM, 4))
 
 
 def program_fault_text(code: int, index: int) -> str:
