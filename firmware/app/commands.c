@@ -182,8 +182,8 @@ static bool is_named(const struct controller *controller, enum start_name name, 
     const bool job = stream_is_open(&controller->stream);
     switch (name) {
     case START_PROGRAM:
-        return !job && (!controller->slot.present ||
-                        controller->slot.program.header.crc32 == number);
+        return !job &&
+               (!controller->slot.present || controller->slot.program.header.crc32 == number);
     case START_JOB:
         return job && controller->stream.job == number;
     case START_ANY:

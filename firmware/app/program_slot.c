@@ -167,8 +167,7 @@ static void recover_bank(struct program_slot *slot, unsigned bank)
     struct program candidate;
     struct program_fault fault = {.code = 0, .index = 0};
     const struct bank_record best = {.sequence = slot->sequence, .size = 0, .tag = 0};
-    if (!bank_record_read(bank, &record) ||
-        (slot->present && !bank_record_newer(&record, &best))) {
+    if (!bank_record_read(bank, &record) || (slot->present && !bank_record_newer(&record, &best))) {
         return;
     }
     if (open_stored(&candidate, bank, &record, &fault) == 0) {

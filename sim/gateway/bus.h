@@ -12,7 +12,7 @@
 
 enum gateway_status { GATEWAY_OK = 0, GATEWAY_GONE = 1, GATEWAY_USAGE = 2, GATEWAY_BUS = 4 };
 
-/* From now on SIGTERM and SIGINT of this process are only counted. 0, or -1 with errno set. */
+/* From now on SIGTERM, SIGINT and the first SIGHUP of this process are only counted. 0, or -1 with errno set. */
 int bus_catch_signals(void);
 unsigned bus_signals(void); /* how many have come */
 

@@ -342,8 +342,7 @@ static void test_limits_beside_the_old_ones(void)
         for (uint32_t i = 0; i < 3u; ++i) {
             const int32_t least = places[i];
             const int32_t most = least + 1000000;
-            TEST_ASSERT_EQUAL_HEX32(
-                SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)least, 4));
+            TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)least, 4));
             TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 1, (uint32_t)most, 4));
             boot();
             TEST_ASSERT_EQUAL_INT32(least, drive(0)->values.software_position_limit[0]);

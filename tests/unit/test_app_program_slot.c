@@ -266,7 +266,8 @@ static void test_after_power_on_the_newest_program_is_there(void)
     fake_port_spoil_store(bank, 48); /* for information only: nothing but the CRC sees it */
     power_on();
     expect_active(first);
-    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CRC, slot.refused.code); /* the operator expects the newer one */
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CRC,
+                          slot.refused.code); /* the operator expects the newer one */
     fake_port_spoil_store(1u - bank, FAKE_PORT_BANK_BYTES - 9u);
     power_on();
     TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));

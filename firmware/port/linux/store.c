@@ -77,9 +77,8 @@ int ram_store_put(uint8_t *at, const uint8_t *data, uint32_t size)
     if (commit && !on_disk(store_fd)) {
         return PORT_ERR_STORE;
     }
-    const bool written =
-        pwrite(store_fd, data, size, at - ram_store.memory) == (ssize_t)size &&
-        (!commit || on_disk(store_fd));
+    const bool written = pwrite(store_fd, data, size, at - ram_store.memory) == (ssize_t)size &&
+                         (!commit || on_disk(store_fd));
     return written ? 0 : PORT_ERR_STORE;
 }
 

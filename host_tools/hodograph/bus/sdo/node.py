@@ -49,7 +49,7 @@ _BLOCK_TAKEN = 0xA2
 """Command byte of the answer to a block of a download."""
 _AGAIN_S = 0.25
 AGAIN_S = 1.0
-"""A request without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
+"""A request without an answer for this long is repeated once: a ring of chunks may hold little more motion."""
 _T = TypeVar("_T")
 
 
@@ -240,8 +240,8 @@ class Node:
         return self._guarded(lambda: self._twice(index, sub, action), index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
-        """Writes an integer object; one whose second write of a value changes nothing: after a lost answer it is written
-        again, once. A refusal is an SdoAbortedError's text in a RefusedError.
+        """Writes an integer object. After a lost answer it is written again, once: for objects where this changes
+        nothing more. A refusal is an SdoAbortedError's text in a RefusedError.
         """
         self._guarded(
             lambda: self._twice(index, sub, lambda: self._put(index, sub, value)), index, sub
