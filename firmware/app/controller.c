@@ -54,6 +54,8 @@ static void reset_values(struct controller *controller)
     controller->configured = (struct configured){.known = restored && controller->store.confirmed,
                                                  .restored = restored,
                                                  .crc32 = controller->store.config_crc32};
+    controller->quiet_us = 0;
+    controller->quiet_due = !restored;
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
 }
