@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from bench import EXAMPLES, MakeAlpha, MakeBench
 from hodograph.bus.goto import line_image
-from hodograph.bus.sdo import node as sdo_node
 from hodograph.bus.sdo.controller import HELD, OFF, READY, RUNNING, Controller
 from hodograph.bus.sdo.node import Node, _Answers
 from hodograph.bus.sdo.objects import COMMAND, ENABLE, NAMED_START, OVERRIDE
@@ -57,7 +57,7 @@ class Losing:
         def sent(this: Node, at: int, sub: int | None, value: int) -> None:
             if request and at == index and not self.lost:
                 self.lost += 1
-                raise sdo_node.SdoCommunicationError("no answer")
+                raise SdoCommunicationError("no answer")
             send(this, at, sub, value)
 
         monkeypatch.setattr(_Answers, "put", answered)
@@ -191,7 +191,7 @@ def test_a_controller_that_knows_no_named_start(
 
     def refused(self: Node, index: int, sub: int | None, value: int) -> None:
         if index == NAMED_START:
-            raise sdo_node.SdoAbortedError(0x06020000)
+            raise SdoAbortedError(0x06020000)
         put(self, index, sub, value)
 
     monkeypatch.setattr(Node, "_put", refused)
