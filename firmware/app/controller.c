@@ -289,6 +289,9 @@ static void poll_nmt(struct controller *controller)
     if (nmt_slave_process(&controller->nmt, &out)) {
         controller_send(&out);
         controller_start_itself(controller);
+        if (controller->quiet_due) { /* at once: before a drive monitors the heartbeats */
+            controller_heartbeat(controller, controller->values.producer_heartbeat_time * 1000u);
+        }
     }
 }
 

@@ -422,7 +422,7 @@ static void test_controller_that_restarts_without_a_configuration(void)
     TEST_ASSERT_EQUAL_INT(MACHINE_OFF, bench.controller.machine.state);
     TEST_ASSERT_EQUAL_UINT32(1, bench.beats);
     app_bench_periods(&bench, 1000);
-    TEST_ASSERT_UINT32_WITHIN(1, 7, bench.beats);
+    TEST_ASSERT_UINT32_WITHIN(1, 9, bench.beats);
 }
 
 static void test_module_that_is_missing_or_another_one(void)
