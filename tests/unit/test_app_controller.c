@@ -667,11 +667,11 @@ static void test_nmt_reset_beside_a_command(void)
     cob_frame(&command, COB_SDO_REQUEST + 1u, 8);
     command.data[0] = 0x2F;
     cob_put16(command.data + 1, 0x2001);
-    for (uint8_t number = COMMAND_ENABLE; number <= COMMAND_HOME; ++number) {
+    for (unsigned number = COMMAND_ENABLE; number <= (unsigned)COMMAND_HOME; ++number) {
         setUp();
         switch_on();
         TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
-        command.data[4] = number;
+        command.data[4] = (uint8_t)number;
         fake_port_receive(&reset);
         fake_port_receive(&command);
         controller_poll(&bench.controller);

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Sends a program image to the controller by SDO block download.
 
-Used by sdo/controller, sdo/status and sdo/stream_channel. Reads and writes objects, and waits by the clock of
-the bus, real or virtual.
+Used by sdo/controller, sdo/status, sdo/stream_channel and cli/bus_commands. Reads and writes objects, and waits by the
+clock of the bus, real or virtual.
 """
 
 from __future__ import annotations
