@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/commands.h (see there): the commands of object 0x2001. Called by app/objects and app/controller. Main
+/* Implements app/commands.h (see there): the commands of objects 0x2001 and 0x2056. Called by app/objects and app/controller. Main
  * loop; command_urgent_request in the receive interrupt. */
 #include "app/commands.h"
 
@@ -176,20 +176,41 @@ static enum machine_refusal dispatch(struct controller *controller, enum command
     }
 }
 
-static enum machine_refusal attempt_start(struct controller *controller, enum command command)
+/* Whether the motion that would be started is the named one. Without any, the reason is that there is none. */
+static bool is_named(const struct controller *controller, enum start_name name, uint32_t number)
 {
+    const bool job = stream_is_open(&controller->stream);
+    switch (name) {
+    case START_PROGRAM:
+        return !job &&
+               (!controller->slot.present || controller->slot.program.header.crc32 == number);
+    case START_JOB:
+        return job && controller->stream.job == number;
+    case START_ANY:
+    default:
+        return true;
+    }
+}
+
+static enum machine_refusal attempt_start(struct controller *controller, enum command command,
+                                          enum start_name name, uint32_t number)
+{
+    if (!is_named(controller, name, number)) {
+        return MACHINE_OTHER_PROGRAM;
+    }
     const enum machine_refusal refusal = stream_is_open(&controller->stream)
                                              ? job_refusal(controller, command)
                                              : program_refusal(controller);
     return refusal == MACHINE_ACCEPTED ? dispatch(controller, command) : refusal;
 }
 
-static enum machine_refusal execute(struct controller *controller, enum command command)
+static enum machine_refusal execute(struct controller *controller, enum command command,
+                                    enum start_name name, uint32_t number)
 {
     enum machine_refusal refusal =
         begins_something(command) ? controller_refusal(controller) : MACHINE_ACCEPTED;
     if (refusal == MACHINE_ACCEPTED) {
-        refusal = starts_program(command) ? attempt_start(controller, command)
+        refusal = starts_program(command) ? attempt_start(controller, command, name, number)
                                           : dispatch(controller, command);
     }
     if (starts_program(command)) { /* the permission is valid for one attempt, also a refused one */
@@ -222,6 +243,12 @@ void commands_execute_urgent(struct machine *machine, uint16_t set)
 
 enum machine_refusal commands_execute(struct controller *controller, enum command command)
 {
-    controller->refusal = execute(controller, command);
+    return commands_start(controller, command, START_ANY, 0);
+}
+
+enum machine_refusal commands_start(struct controller *controller, enum command command,
+                                    enum start_name name, uint32_t number)
+{
+    controller->refusal = execute(controller, command, name, number);
     return controller->refusal;
 }

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * commands: executes the commands of the operator, which are written to object 0x2001. Called by app/objects and
+ * commands: executes the commands of the operator, which are written to objects 0x2001 and 0x2056. Called by app/objects and
  * app/controller. Changes the controller's state.
  *
- * Main loop: objects.c calls commands_execute for each write of 0x2001, controller.c calls it at shut-down. While a
- * chunk (a part of a streamed job) is checked, controller.c calls commands_execute_urgent. Receive interrupt:
- * controller.c calls command_urgent_request.
+ * Main loop: objects.c calls commands_execute for each write of 0x2001 and commands_start for each of 0x2056,
+ * controller.c calls commands_execute at shut-down. While a chunk (a part of a streamed job) is checked, controller.c
+ * calls commands_execute_urgent. Receive interrupt: controller.c calls command_urgent_request.
  */
 #ifndef APP_COMMANDS_H
 #define APP_COMMANDS_H
@@ -23,6 +23,13 @@ enum command {
     COMMAND_START_FROM = 8, /* at the arc length of object 0x2011 */
     COMMAND_QUICK_STOP = 9,
     COMMAND_HOME = 10,
+};
+
+/* What a start names (object 0x2056): another client may have replaced it since the host looked. */
+enum start_name {
+    START_ANY,     /* nothing: the open job, else the active program */
+    START_PROGRAM, /* the active program by its CRC-32 */
+    START_JOB,     /* the open job by its number */
 };
 
 /* Whether a command is executed at once, even while another SDO client has a transfer open, or a chunk is being
@@ -43,5 +50,9 @@ void commands_execute_urgent(struct machine *machine, uint16_t set);
 /* Executes the command, or returns why it is refused. The result is also kept in controller->refusal. Takes port_lock()
  * itself. */
 enum machine_refusal commands_execute(struct controller *controller, enum command command);
+
+/* The same for COMMAND_START and COMMAND_START_FROM: refused if not the motion of this name would be started. */
+enum machine_refusal commands_start(struct controller *controller, enum command command,
+                                    enum start_name name, uint32_t number);
 
 #endif

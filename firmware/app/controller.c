@@ -54,6 +54,8 @@ static void reset_values(struct controller *controller)
     controller->configured = (struct configured){.known = restored && controller->store.confirmed,
                                                  .restored = restored,
                                                  .crc32 = controller->store.config_crc32};
+    controller->quiet_us = 0;
+    controller->quiet_due = !restored;
     od_controller_set_node(&controller->values, controller->node);
     forget_errors(controller);
 }
@@ -287,6 +289,9 @@ static void poll_nmt(struct controller *controller)
     if (nmt_slave_process(&controller->nmt, &out)) {
         controller_send(&out);
         controller_start_itself(controller);
+        if (controller->quiet_due) { /* at once: before a drive monitors the heartbeats */
+            controller_heartbeat(controller, controller->values.producer_heartbeat_time * 1000u);
+        }
     }
 }
 

@@ -38,10 +38,18 @@ void controller_start_itself(struct controller *controller)
 void controller_heartbeat(struct controller *controller, uint32_t elapsed_us)
 {
     struct can_msg out;
+    if (controller->quiet_us > 0u && !controller_configured(controller)) {
+        controller->quiet_us -=
+            elapsed_us < controller->quiet_us ? elapsed_us : controller->quiet_us;
+        return;
+    }
+    controller->quiet_us = 0;
     if (heartbeat_producer_process(&controller->heartbeat,
                                    controller->values.producer_heartbeat_time,
                                    controller->nmt.state, elapsed_us, &out)) {
         controller_send(&out);
+        controller->quiet_us = controller->quiet_due ? CONTROLLER_QUIET_US : 0u;
+        controller->quiet_due = false;
     }
 }
 

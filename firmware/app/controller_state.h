@@ -61,6 +61,8 @@ struct controller {
     struct heartbeat_producer heartbeat;
     struct emcy_producer emcy;
     uint32_t polled_us;                      /* port_time_us() of the last poll */
+    uint32_t quiet_us;                       /* so long no heartbeat is sent, unless it is configured */
+    bool quiet_due;                          /* such a pause follows the next heartbeat */
     uint32_t reported_serial;                /* machine.fault_serial of the last EMCY */
     enum machine_state noted_state;          /* last logged state of the machine, */
     enum cia402_state noted_drive[AXES_MAX]; /* of the drives, */
@@ -77,6 +79,12 @@ bool controller_configured(const struct controller *controller);
 
 /* Whether axes move (machine_moving). Takes the port's lock. */
 bool controller_moving(const struct controller *controller);
+
+/* After a power-on, or a reset, without a stored configuration the controller does not know its I/O module. So its first
+ * heartbeat, at once after the boot-up message, is followed by a pause, in which a module that it has configured before
+ * misses the heartbeats and switches its outputs off. (A consumer that has received the boot-up message waits for a
+ * first heartbeat. A drive that is configured in the pause does so, too.) */
+#define CONTROLLER_QUIET_US ((DRIVE_CONTROLLER_TIMEOUT_MS + 500u) * 1000u)
 
 /* Sends the heartbeat if it is due. elapsed_us: since the last call. */
 void controller_heartbeat(struct controller *controller, uint32_t elapsed_us);

@@ -133,6 +133,17 @@ static uint32_t object_write_command(struct controller *controller, const struct
     return refusal == MACHINE_ACCEPTED ? SDO_OK : SDO_ABORT_STATE;
 }
 
+/* Object 0x2056: one write names the motion and starts it, so that no other client comes in between. */
+static uint32_t object_write_start(struct controller *controller, const struct od_entry *entry,
+                                   uint64_t number)
+{
+    const enum command command = entry->sub == 2u ? COMMAND_START_FROM : COMMAND_START;
+    const enum start_name name = entry->sub == 3u ? START_JOB : START_PROGRAM;
+    const enum machine_refusal refusal =
+        commands_start(controller, command, name, (uint32_t)number);
+    return refusal == MACHINE_ACCEPTED ? SDO_OK : SDO_ABORT_STATE;
+}
+
 /* Hold, stop and quick stop wait for no transfer of another client. */
 static bool object_urgent_command(uint8_t value)
 {
@@ -382,6 +393,7 @@ static const struct object objects[] = {
     {0x2041, 0x2041, 1, 5, OWN, object_read_memory, NULL, NULL, NULL},
     {0x2050, 0x2050, 1, 6, OWN, object_read_configuration, object_write_confirmation, NULL, NULL},
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
+    {0x2056, 0x2056, 1, 3, OWN, NULL, object_write_start, NULL, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
     {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},

@@ -139,26 +139,41 @@ int program_slot_finish(struct program_slot *slot, uint32_t size, const struct c
 }
 
 /* Checks with the limits of the format only; those of a configuration may change. */
-static bool sound(const struct program *program)
+static int check_format(const struct program *program, struct program_fault *fault)
 {
     struct program_limits none = {.period_us = 0};
-    struct program_fault fault;
     for (uint32_t i = 0; i < PROGRAM_AXES; ++i) {
         none.min_q40_mm[i] = INT64_MIN;
         none.max_q40_mm[i] = INT64_MAX;
     }
-    return program_check(program, &none, &fault) == 0;
+    return program_check(program, &none, fault);
+}
+
+/* The program of a bank with a record, or why it is none. */
+static int open_stored(struct program *program, unsigned bank, const struct bank_record *record,
+                       struct program_fault *fault)
+{
+    fault->index = 0;
+    fault->code = program_open(program, port_store_data(bank), record->size);
+    if (fault->code == 0 && program->header.image_size != record->size) {
+        fault->code = PROGRAM_ERR_SIZE;
+    }
+    return fault->code == 0 ? check_format(program, fault) : fault->code;
 }
 
 static void recover_bank(struct program_slot *slot, unsigned bank)
 {
     struct bank_record record;
     struct program candidate;
+    struct program_fault fault = {.code = 0, .index = 0};
     const struct bank_record best = {.sequence = slot->sequence, .size = 0, .tag = 0};
-    if (bank_record_read(bank, &record) && (!slot->present || bank_record_newer(&record, &best)) &&
-        program_open(&candidate, port_store_data(bank), record.size) == 0 &&
-        candidate.header.image_size == record.size && sound(&candidate)) {
+    if (!bank_record_read(bank, &record) || (slot->present && !bank_record_newer(&record, &best))) {
+        return;
+    }
+    if (open_stored(&candidate, bank, &record, &fault) == 0) {
         adopt(slot, &candidate, bank, &record);
+    } else {
+        slot->refused = fault;
     }
 }
 
@@ -181,7 +196,15 @@ void program_slot_recover(struct program_slot *slot)
     for (unsigned bank = 0; bank < PORT_STORE_BANKS; ++bank) {
         recover_bank(slot, bank);
     }
+    const uint32_t active = slot->sequence;
     note_newest(slot);
+    if (slot->present && slot->sequence == active) {
+        slot->refused = (struct program_fault){.code = 0, .index = 0};
+    }
+    if (slot->refused.code != 0) {
+        port_log(PORT_WARNING, "the newest program of the store is not whole, code",
+                 slot->refused.code);
+    }
     slot->checked = false;
 }
 

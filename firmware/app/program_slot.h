@@ -52,7 +52,7 @@ struct program_slot {
 void program_slot_init(struct program_slot *slot);
 
 /* Makes the newest complete program of the store the active one: after power-on, before the first upload. Costs a whole
- * check of each program that it tries. */
+ * check of each program that it tries. If a newer one is not complete, `refused` holds the reason. */
 void program_slot_recover(struct program_slot *slot);
 
 /* Object 0x2041, in bytes: number 1 a bank for image and records; for a kernel the record of 2 a segment in the plane,

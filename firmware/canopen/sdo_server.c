@@ -64,6 +64,7 @@ static void drop(struct sdo_server *s)
 {
     od_transfer_drop(&s->object);
     s->state = SDO_SERVER_IDLE;
+    s->closing = 0;
 }
 
 static uint32_t begin_write(struct sdo_server *s, uint32_t announced)
@@ -301,6 +302,7 @@ static bool block_download_segment(struct sdo_server *s, const uint8_t *data, st
     if (in_order && last) {
         s->state = SDO_SERVER_BLOCK_DOWNLOAD_END;
     }
+    s->closing = in_order ? data[0] : 0u;
     return block_download_acknowledge(s, out);
 }
 
@@ -333,6 +335,7 @@ static bool block_download_end(struct sdo_server *s, const uint8_t *data, struct
         return fail(s, code, out);
     }
     s->state = SDO_SERVER_IDLE;
+    s->closing = data[0];
     frame(s, ANSWER_BLOCK_DOWNLOAD_END, out);
     return true;
 }
@@ -421,8 +424,10 @@ static bool block_upload_acknowledged(struct sdo_server *s, const uint8_t *data,
     }
     if (good == s->sequence && s->object.moved == s->object.size &&
         s->object.size - s->block_start <= good * SEGMENT_BYTES) {
+        s->closing = good;
         return block_upload_end(s, out);
     }
+    s->closing = good;
     s->block_start += good * SEGMENT_BYTES;
     s->block_limit = data[2];
     s->sequence = 0;
@@ -445,9 +450,55 @@ static bool block_upload_command(struct sdo_server *s, const uint8_t *data, stru
     }
     if (s->state == SDO_SERVER_BLOCK_UPLOAD_END && subcommand == REQUEST_UPLOAD_END) {
         s->state = SDO_SERVER_IDLE;
+        s->closing = data[0];
         return false;
     }
     return fail(s, SDO_ABORT_COMMAND, out);
+}
+
+/* ---- Doubled frames ---- */
+
+/* A sender of CAN repeats a frame whose acknowledgement was disturbed in its last bit: the receiver then has it twice.
+ * Within a block the numbers of the segments show it; these are the frames that end a block or a transfer. */
+
+static bool is_doubled_segment(const struct sdo_server *s, const uint8_t *data)
+{
+    return data[0] == s->closing && memcmp(s->last, data + 1, SEGMENT_BYTES) == 0;
+}
+
+static bool is_doubled_upload_command(const struct sdo_server *s, const uint8_t *data)
+{
+    if (data[0] >> 5 != CLIENT_BLOCK_UPLOAD) {
+        return false;
+    }
+    switch (data[0] & BLOCK_UPLOAD_SUBCOMMAND) {
+    case REQUEST_UPLOAD_START:
+        return s->block_start == 0u && s->closing == 0u;
+    case REQUEST_UPLOAD_ACKNOWLEDGE:
+        return s->closing != 0u && data[1] == s->closing &&
+               (s->state == SDO_SERVER_BLOCK_UPLOAD_END || data[1] > s->sequence);
+    default:
+        return false;
+    }
+}
+
+static bool is_doubled(const struct sdo_server *s, const uint8_t *data)
+{
+    switch (s->state) {
+    case SDO_SERVER_IDLE:
+        return s->closing != 0u && data[0] == s->closing;
+    case SDO_SERVER_BLOCK_DOWNLOAD: /* in a block of one segment the next one has the same number */
+        return s->sequence == 0u && s->received == 0u && s->closing > 1u &&
+               is_doubled_segment(s, data);
+    case SDO_SERVER_BLOCK_DOWNLOAD_END:
+        return is_doubled_segment(s, data);
+    case SDO_SERVER_BLOCK_UPLOAD:
+    case SDO_SERVER_BLOCK_UPLOAD_ACK:
+    case SDO_SERVER_BLOCK_UPLOAD_END:
+        return is_doubled_upload_command(s, data);
+    default:
+        return false;
+    }
 }
 
 /* ---- Requests, and who may make them ---- */
@@ -633,7 +684,7 @@ static void take_abort(struct sdo_server *s, const uint8_t *data)
 
 bool sdo_server_receive(struct sdo_server *server, const struct can_msg *in, struct can_msg *out)
 {
-    if (!sdo_server_wants(server, in)) {
+    if (!sdo_server_wants(server, in) || is_doubled(server, in->data)) {
         return false;
     }
     /* After an aborted block also while idle: there it could be taken for a late segment. */

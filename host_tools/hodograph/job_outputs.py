@@ -108,12 +108,17 @@ def section_events(
         own = maker.section(section, following, is_first=i == 0, is_last=last)
         found.append(events_of([*own.repeated, *own.events]))
     if maker.lost:
-        more = f" and {len(maker.lost) - 1} more" if len(maker.lost) > 1 else ""
-        notes.append(
-            f"{file}:{maker.lost[0]}: output switched without effect{more}: it is switched again after a wait, "
-            "with no move between"
-        )
+        notes.append(without_effect(file, maker.lost[0], len(maker.lost) - 1))
     return found
+
+
+def without_effect(file: Path, line: int, others: int = 0) -> str:
+    """The note on a switch that has no effect, and on `others` like it."""
+    more = f" and {others} more" if others else ""
+    return (
+        f"{file}:{line}: output switched without effect{more}: it is switched again after a wait, "
+        "with no move between"
+    )
 
 
 @dataclass(frozen=True)

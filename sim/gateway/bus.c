@@ -24,19 +24,24 @@ static void on_signal(int number)
     clock_note_signal();
 }
 
-int bus_catch_signals(void)
+static bool catch_signal(int number)
 {
     struct sigaction action;
-    struct sigaction before;
     memset(&action, 0, sizeof action); /* without SA_RESTART: a wait ends */
     action.sa_handler = on_signal;
     (void)sigemptyset(&action.sa_mask);
+    return sigaction(number, &action, NULL) == 0;
+}
+
+int bus_catch_signals(void)
+{
+    struct sigaction before;
     (void)signal(SIGPIPE, SIG_IGN);
     if (sigaction(SIGHUP, NULL, &before) != 0 ||
-        (before.sa_handler != SIG_IGN && sigaction(SIGHUP, &action, NULL) != 0)) { /* nohup */
+        (before.sa_handler != SIG_IGN && !catch_signal(SIGHUP))) { /* nohup */
         return -1;
     }
-    return sigaction(SIGTERM, &action, NULL) == 0 ? sigaction(SIGINT, &action, NULL) : -1;
+    return catch_signal(SIGTERM) && catch_signal(SIGINT) ? 0 : -1;
 }
 
 void bus_unblock_signals(void)

@@ -24,7 +24,8 @@ const char gateway_options_help[] =
     "listens,\n"
     "                   or fd:N, a connected socket that the bridge is started with\n"
     "\n"
-    "SIGTERM or SIGINT asks the board to stop the axes and to end; a second one ends the bridge at "
+    "SIGTERM, SIGINT or SIGHUP asks the board to stop the axes and to end; a second one ends the "
+    "bridge at "
     "once.\n"
     "Exit status: 0 ended as asked, 1 the board is gone, 2 wrong usage, 4 bus not usable.\n";
 

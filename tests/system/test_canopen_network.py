@@ -209,12 +209,13 @@ def test_node_guarding_is_refused(request: pytest.FixtureRequest, kind: str) -> 
     slowest_ms = {"drive": 0, "controller": 1000}[kind]  # drives watch a controller: it has to beat
     node.sdo[0x1017].raw = slowest_ms
     if slowest_ms:
+        let_pass(node.network, 3.0)  # without a configuration its heartbeats pause at first
         listened.beats.clear()
         until(node.network, lambda: listened.beats)
     listened.beats.clear()
     for base in (0x700, 0x180, 0x080, 0x580):
         node.network.send_message(base + node.id, b"", remote=True)
-    let_pass(node.network, QUIET_S)
+    let_pass(node.network, 0.9 * QUIET_S)
     assert listened.beats == []
     assert node.sdo[0x1017].raw == slowest_ms
 

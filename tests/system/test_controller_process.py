@@ -303,3 +303,11 @@ def test_a_signal_stops_an_optimal_program(
     for node in (2, 3):
         drive: Any = machine.network.add_node(node, object_dictionary(DRIVE_EDS, node)).sdo
         assert drive[0x6041].raw & 0x6F == 0x40  # Switch on disabled
+
+
+def test_a_controller_without_configuration_pauses_its_heartbeats(machine: Machine) -> None:
+    """For an I/O module that it does not know any more; drives that it configures meanwhile report no error."""
+    machine.until(OFF)
+    machine.clock.sleep(5.0)
+    assert (machine.sdo[0x2002].raw, machine.fault()) == (OFF, [0, 0, 0])
+    assert [machine.sdo[0x200C][axis].raw for axis in (1, 2)] == [0, 0]

@@ -38,6 +38,7 @@ static void watch(struct app_bench *bench, const struct can_msg *frame)
         bench->targets[node - 2][bench->recorded] = setpoint.target_counts;
         bench->recorded += node == 3 ? 1u : 0u;
     }
+    bench->beats += frame->id == COB_HEARTBEAT + 1u && frame->data[0] != 0u ? 1u : 0u;
 }
 
 static void to_controller(struct app_bench *bench, const struct can_msg *frame)

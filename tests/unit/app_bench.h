@@ -26,6 +26,7 @@ struct app_bench {
     uint32_t frames;                   /* seen on the bus */
     uint16_t emergency;                /* code of the controller's last EMCY */
     uint32_t starts;                   /* NMT start commands seen */
+    uint32_t beats;                    /* heartbeats of the controller seen, not its boot-up */
     int32_t targets[2][BENCH_TARGETS]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
     bool

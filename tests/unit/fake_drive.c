@@ -32,6 +32,17 @@ static uint32_t read_hook(void *context, const struct od_entry *entry)
     return lacks(drive, entry->index) ? SDO_ABORT_NO_OBJECT : SDO_OK;
 }
 
+static bool takes_limit(const struct fake_drive *drive, uint32_t object, int32_t value)
+{
+    const int32_t least = drive->values.software_position_limit[0];
+    const int32_t most = drive->values.software_position_limit[1];
+    if (object == 0x607D01u && drive->no_open_limits && value == INT32_MIN) {
+        return false;
+    }
+    return !drive->ordered_limits || (object != 0x607D01u && object != 0x607D02u) ||
+           (object == 0x607D01u ? value <= most : value >= least);
+}
+
 static uint32_t write_hook(void *context, const struct od_entry *entry, const uint8_t *value,
                            uint32_t size)
 {
@@ -47,7 +58,7 @@ static uint32_t write_hook(void *context, const struct od_entry *entry, const ui
         cob_get(value, size) == drive->unmappable) {
         return SDO_ABORT_NOT_MAPPABLE;
     }
-    if (object == drive->refuses) {
+    if (object == drive->refuses || !takes_limit(drive, object, (int32_t)cob_get(value, size))) {
         return SDO_ABORT_VALUE;
     }
     if (entry->index == 0x6060u && drive->values.modes_of_operation == CIA402_MODE_HOMING) {

@@ -51,6 +51,8 @@ struct fake_drive {
     bool fixed_mapping;  /* PDO parameters are read-only */
     uint16_t lacks[8];   /* objects that it has not */
     uint32_t refuses;    /* object (index << 8 + sub) that takes no value */
+    bool ordered_limits; /* 0x607D: refuses a minimum above the maximum */
+    bool no_open_limits; /* 0x607D: takes no minimum of -2^31 */
     uint32_t unmappable; /* mapping entry that no PDO takes */
     int8_t mode_stuck;   /* mode that 0x6061 never leaves; 0: none */
     uint32_t reads;      /* of objects, by SDO */

@@ -236,10 +236,59 @@ static void test_configuration_and_upload_in_every_state(void)
     }
 }
 
+/* ---- Object 0x2056: a start that names its program ---- */
+
+static uint32_t named_start(uint8_t sub, uint32_t number)
+{
+    return app_bench_write(&bench, 0x2056, sub, number, 4);
+}
+
+static void expect_other_program(uint8_t sub, uint32_t number)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, named_start(sub, number));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OTHER_PROGRAM, app_bench_read(&bench, 0x2003, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_READY, machine()->state);
+}
+
+static void test_a_named_start_starts_that_program_only(void)
+{
+    for (uint8_t sub = 1; sub <= 2u; ++sub) {
+        ready();
+        const uint32_t crc32 = (uint32_t)app_bench_read(&bench, 0x2000, 5);
+        app_image_make(image, 10, -4); /* another client uploads */
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
+        expect_other_program(sub, crc32);
+        expect_other_program(3, crc32);
+        app_image_make(image, 10, -5);
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_upload(&bench, image, sizeof image));
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, named_start(sub, crc32));
+        TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    }
+}
+
+static void test_a_named_start_that_is_refused_ends_the_permission(void)
+{
+    ready();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2055, 1, 1, 1));
+    expect_other_program(1, 0x12345678u);
+    TEST_ASSERT_EQUAL_INT64(0, app_bench_read(&bench, 0x2055, 1));
+}
+
+static void test_a_named_start_without_a_program(void)
+{
+    app_bench_init(&bench, X_COUNTS, Y_COUNTS);
+    app_bench_make_ready(&bench);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, named_start(1, 1));
+    TEST_ASSERT_EQUAL_INT(MACHINE_NO_PROGRAM, app_bench_read(&bench, 0x2003, 4));
+}
+
 int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_every_command_in_every_state);
     RUN_TEST(test_configuration_and_upload_in_every_state);
+    RUN_TEST(test_a_named_start_starts_that_program_only);
+    RUN_TEST(test_a_named_start_that_is_refused_ends_the_permission);
+    RUN_TEST(test_a_named_start_without_a_program);
     return UNITY_END();
 }

@@ -658,6 +658,37 @@ static void test_nmt_reset_is_executed_only_while_off(void)
     TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
 }
 
+/* A reset and commands that come in the same round of the main loop, in either order. */
+static void test_nmt_reset_beside_a_command(void)
+{
+    struct can_msg reset;
+    struct can_msg command;
+    nmt_master_command(NMT_RESET_NODE, 1, &reset);
+    cob_frame(&command, COB_SDO_REQUEST + 1u, 8);
+    command.data[0] = 0x2F;
+    cob_put16(command.data + 1, 0x2001);
+    for (unsigned number = COMMAND_ENABLE; number <= (unsigned)COMMAND_HOME; ++number) {
+        setUp();
+        switch_on();
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_DISABLE));
+        command.data[4] = (uint8_t)number;
+        fake_port_receive(&reset);
+        fake_port_receive(&command);
+        controller_poll(&bench.controller);
+        TEST_ASSERT_EQUAL_INT(MACHINE_BOOT, machine()->state);
+    }
+    setUp();
+    load();
+    switch_on();
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    command.data[4] = COMMAND_START;
+    fake_port_receive(&command);
+    fake_port_receive(&reset);
+    controller_poll(&bench.controller);
+    TEST_ASSERT_EQUAL_INT(MACHINE_RUNNING, machine()->state);
+    TEST_ASSERT_EQUAL_INT(NMT_OPERATIONAL, bench.controller.nmt.state);
+}
+
 static void test_a_reset_gives_objects_their_defaults(void)
 {
     struct can_msg reset;
@@ -725,6 +756,7 @@ int main(void)
     RUN_TEST(test_shutting_down_is_bounded_when_ticks_do_not_come);
     RUN_TEST(test_a_full_port_is_counted);
     RUN_TEST(test_nmt_reset_is_executed_only_while_off);
+    RUN_TEST(test_nmt_reset_beside_a_command);
     RUN_TEST(test_a_reset_gives_objects_their_defaults);
     return UNITY_END();
 }

@@ -331,6 +331,26 @@ static void test_a_value_that_is_refused_is_reported(void)
     boot();
 }
 
+/* A drive that compares the two takes a travel beside its old one, above and below, also without "no minimum". */
+static void test_limits_beside_the_old_ones(void)
+{
+    static const int32_t places[] = {3000000, -3000000, 0};
+    for (int open = 0; open < 2; ++open) {
+        setUp();
+        drive(0)->ordered_limits = true;
+        drive(0)->no_open_limits = open == 0;
+        for (uint32_t i = 0; i < 3u; ++i) {
+            const int32_t least = places[i];
+            const int32_t most = least + 1000000;
+            TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)least, 4));
+            TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 1, (uint32_t)most, 4));
+            boot();
+            TEST_ASSERT_EQUAL_INT32(least, drive(0)->values.software_position_limit[0]);
+            TEST_ASSERT_EQUAL_INT32(most, drive(0)->values.software_position_limit[1]);
+        }
+    }
+}
+
 static void test_a_node_that_is_given_twice_is_reported(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2005, 2, 2, 1));
@@ -393,6 +413,7 @@ int main(void)
     RUN_TEST(test_a_device_of_another_profile);
     RUN_TEST(test_a_mode_that_is_not_taken);
     RUN_TEST(test_a_value_that_is_refused_is_reported);
+    RUN_TEST(test_limits_beside_the_old_ones);
     RUN_TEST(test_a_node_that_is_given_twice_is_reported);
     RUN_TEST(test_an_axis_at_the_controllers_own_node_is_reported);
     RUN_TEST(test_what_a_drive_reports_is_kept);

@@ -405,6 +405,26 @@ static void test_controller_that_restarts_switches_off(void)
     TEST_ASSERT_EQUAL_INT16(0, analogue(1));
 }
 
+/* It does not know its module any more. The module misses its heartbeats, as if the power had stayed off. */
+static void test_controller_that_restarts_without_a_configuration(void)
+{
+    make_ready();
+    app_bench_periods(&bench, 1000); /* the module has received a heartbeat */
+    start();
+    app_bench_periods(&bench, 100);
+    app_bench_power_cycle(&bench);
+    bench.beats = 0;
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital() & LAMP);
+    app_bench_periods(&bench, 2200);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+    TEST_ASSERT_EQUAL_INT16(0, analogue(1));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OFF, bench.controller.machine.state);
+    TEST_ASSERT_EQUAL_UINT32(1, bench.beats);
+    app_bench_periods(&bench, 1000);
+    TEST_ASSERT_UINT32_WITHIN(1, 9, bench.beats);
+}
+
 static void test_module_that_is_missing_or_another_one(void)
 {
     bench.module_dead = true;
@@ -469,6 +489,7 @@ int main(void)
     RUN_TEST(test_module_that_is_lost_before_its_first_heartbeat);
     RUN_TEST(test_boot_that_waits_for_a_drive_switches_off);
     RUN_TEST(test_controller_that_restarts_switches_off);
+    RUN_TEST(test_controller_that_restarts_without_a_configuration);
     RUN_TEST(test_module_that_is_missing_or_another_one);
     RUN_TEST(test_refused_values);
     RUN_TEST(test_module_without_its_controller_switches_off);

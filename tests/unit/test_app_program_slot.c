@@ -258,6 +258,7 @@ static void test_after_power_on_the_newest_program_is_there(void)
         power_on();
         expect_active(image);
         TEST_ASSERT_TRUE(slot.acceptable);
+        TEST_ASSERT_EQUAL_INT(0, slot.refused.code);
         TEST_ASSERT_EQUAL_PTR(kernel_find(0), slot.program.coefficients_for);
         TEST_ASSERT_EQUAL_INT32(x * 1000000, slot.start_counts[0]);
     }
@@ -265,10 +266,29 @@ static void test_after_power_on_the_newest_program_is_there(void)
     fake_port_spoil_store(bank, 48); /* for information only: nothing but the CRC sees it */
     power_on();
     expect_active(first);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CRC,
+                          slot.refused.code); /* the operator expects the newer one */
     fake_port_spoil_store(1u - bank, FAKE_PORT_BANK_BYTES - 9u);
     power_on();
     TEST_ASSERT_EQUAL_INT(PROGRAM_SLOT_NONE, program_slot_state(&slot));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_CRC, slot.refused.code);
     TEST_ASSERT_EQUAL_INT(0, upload());
+}
+
+/* The older program of the two is spoiled, in either bank: nobody misses it. */
+static void test_a_spoiled_older_program_is_not_reported(void)
+{
+    for (int32_t uploads = 2; uploads <= 3; ++uploads) {
+        setUp();
+        for (int32_t x = 0; x < uploads; ++x) {
+            app_image_make(image, x, 20);
+            TEST_ASSERT_EQUAL_INT(0, upload());
+        }
+        fake_port_spoil_store(1u - slot.bank, 48);
+        power_on();
+        expect_active(image);
+        TEST_ASSERT_EQUAL_INT(0, slot.refused.code);
+    }
 }
 
 /* A firmware with stricter rules refuses the newer program of two, or both; then the first one is back. */
@@ -324,6 +344,7 @@ int main(void)
     RUN_TEST(test_the_records_are_those_of_the_kernel);
     RUN_TEST(test_no_room_for_the_records);
     RUN_TEST(test_after_power_on_the_newest_program_is_there);
+    RUN_TEST(test_a_spoiled_older_program_is_not_reported);
     RUN_TEST(test_an_upload_is_the_newest_for_each_firmware);
     RUN_TEST(test_a_program_without_its_record_is_refused);
     return UNITY_END();

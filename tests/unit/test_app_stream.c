@@ -486,6 +486,20 @@ static void expect_stopped(uint32_t wanted)
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_START));
 }
 
+/* Object 0x2056 sub 3: another client may have replaced the job since the host looked. */
+static void test_a_named_start_starts_that_job_only(void)
+{
+    expect_sent(&alone);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2056, 3, JOB + 1u, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OTHER_PROGRAM, app_bench_read(&bench, 0x2003, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2056, 1, 0, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_OTHER_PROGRAM, app_bench_read(&bench, 0x2003, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2056, 3, JOB, 4));
+    expect_end();
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2056, 3, JOB, 4));
+    TEST_ASSERT_EQUAL_INT(MACHINE_JOB_STARTED, app_bench_read(&bench, 0x2003, 4));
+}
+
 static void test_stop_while_a_takeover_is_pending(void)
 {
     for (uint32_t tick = 100; tick < 2200; tick += 131) {
@@ -1104,6 +1118,7 @@ int main(void)
     RUN_TEST(test_a_chunk_in_the_tail);
     RUN_TEST(test_hold_in_the_shared_part);
     RUN_TEST(test_hold_and_resume_in_an_underrun);
+    RUN_TEST(test_a_named_start_starts_that_job_only);
     RUN_TEST(test_stop_while_a_takeover_is_pending);
     RUN_TEST(test_stops_do_not_wait_for_a_check);
     RUN_TEST(test_stop_in_an_underrun);

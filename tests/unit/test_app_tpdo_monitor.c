@@ -168,6 +168,25 @@ static void test_lost_takes_the_patience_too(void)
 }
 
 /* Doubled frames make up for nothing that is missed later. */
+/* After 2^32 us the time since the last answer begins at 0 again. */
+static void test_a_drive_that_is_lost_for_an_hour_stays_lost(void)
+{
+    wait_us = 5u * PERIOD_US;
+    (void)sync(1);
+    const uint32_t answered_us = now_us;
+    for (unsigned i = 0; i < 10u; ++i) {
+        (void)sync(0);
+    }
+    TEST_ASSERT_TRUE(monitor.lost);
+    now_us = answered_us - 2u * PERIOD_US;
+    for (unsigned i = 0; i < 10u; ++i) {
+        (void)sync(0);
+        TEST_ASSERT_TRUE(monitor.lost);
+    }
+    (void)sync(1);
+    TEST_ASSERT_FALSE(monitor.lost);
+}
+
 static void test_a_doubled_answer_is_one(void)
 {
     wait_us = 5000;
@@ -207,6 +226,7 @@ int main(void)
     RUN_TEST(test_each_absent_one_has_its_own_time);
     RUN_TEST(test_more_than_can_be_remembered_are_missed);
     RUN_TEST(test_lost_takes_the_patience_too);
+    RUN_TEST(test_a_drive_that_is_lost_for_an_hour_stays_lost);
     RUN_TEST(test_a_doubled_answer_is_one);
     RUN_TEST(test_restart_keeps_the_presence_only);
     return UNITY_END();

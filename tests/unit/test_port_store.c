@@ -10,6 +10,23 @@
 
 #include <unity.h>
 
+/* Waits for the disk, and the byte that was on it before at the end of the first bank of parameters. */
+static unsigned syncs;
+static uint8_t *watched;
+static uint8_t seen[8];
+
+static int counted_sync(int fd)
+{
+    (void)fd;
+    if (watched != NULL && syncs < sizeof seen) {
+        seen[syncs] = *watched;
+    }
+    ++syncs;
+    return 0;
+}
+
+#define fdatasync counted_sync
+
 #define port_stream_memory linux_stream_memory
 #define port_cache_memory  linux_cache_memory
 #include "port/linux/store.c" /* NOLINT(bugprone-suspicious-include) */
@@ -30,6 +47,23 @@ static void test_what_is_written_is_read(void)
     uint8_t *const at = ram_store.memory + 4091; /* in two pages */
     TEST_ASSERT_EQUAL_INT(0, ram_store_put(at, some, sizeof some));
     TEST_ASSERT_EQUAL_MEMORY(some, at, sizeof some);
+}
+
+/* The content is on the disk before the record, and the record before the save is answered. */
+static void test_a_commit_record_is_written_after_the_content(void)
+{
+    uint8_t *const end = ram_store.parameters + PORT_STORE_PARAMETER_BYTES;
+    syncs = 0;
+    watched = end - 1;
+    TEST_ASSERT_EQUAL_INT(0, ram_store_put(ram_store.parameters, some, sizeof some));
+    TEST_ASSERT_EQUAL_UINT(0, syncs);
+    TEST_ASSERT_EQUAL_INT(0, ram_store_put(end - sizeof some, some, sizeof some));
+    TEST_ASSERT_EQUAL_UINT(2, syncs);
+    TEST_ASSERT_EQUAL_UINT8(0, seen[0]);
+    TEST_ASSERT_EQUAL_UINT8(7, seen[1]);
+    watched = NULL;
+    TEST_ASSERT_EQUAL_INT(0, ram_store_put(ram_store.parameters - sizeof some, some, sizeof some));
+    TEST_ASSERT_EQUAL_UINT(2, syncs); /* a program: drives may be on */
 }
 
 /* As a full disk: the file may not be written any more. */
@@ -55,6 +89,7 @@ int main(void)
     (void)close(fd);
     (void)unlink(name);
     RUN_TEST(test_what_is_written_is_read);
+    RUN_TEST(test_a_commit_record_is_written_after_the_content);
     RUN_TEST(test_a_full_disk_is_an_error);
     return UNITY_END();
 }

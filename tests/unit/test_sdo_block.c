@@ -338,6 +338,45 @@ static void test_a_segment_doubled_on_the_bus_is_taken_once(void)
     TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
 }
 
+/* A sender repeats the last frame of a block, or of the transfer, whose acknowledgement was disturbed. */
+static void test_frames_at_the_end_of_a_download_may_be_doubled(void)
+{
+    for (uint32_t size = 1; size <= 2 * 7 * TALK_BLOCK + 8; size++) {
+        uint32_t at = 0;
+        initiate(size);
+        while (at < size) {
+            const uint32_t begin = at;
+            uint32_t sent = 0;
+            at += 7 * send_block(at, size, never, &sent);
+            const uint32_t final = begin + 7 * (sent - 1);
+            const uint32_t bytes = size - final < 7 ? size - final : 7;
+            const uint8_t first = (uint8_t)(sent | (final + bytes == size ? 0x80u : 0u));
+            TEST_ASSERT_FALSE(sdo_talk_segment(&talk, first, image + final, bytes));
+        }
+        finish(size, sdo_block_crc(0, image, size));
+        TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
+        uint8_t end[8] = {(uint8_t)(0xC1u | ((7 - size % 7) % 7) << 2)};
+        cob_put(end + 1, sdo_block_crc(0, image, size), 2);
+        TEST_ASSERT_FALSE(sdo_talk_send(&talk, end));
+        TEST_ASSERT_EQUAL_UINT32(size, talk.small.domain_size);
+        TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, size);
+    }
+    TEST_ASSERT_EQUAL_INT(0, talk.small.aborted);
+}
+
+/* In blocks of one segment equal segments are no doubles. */
+static void test_equal_segments_in_blocks_of_one(void)
+{
+    const uint8_t zeros[21] = {0};
+    talk.server.block_size = 1;
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0xC6, 0x2005, 0, 21));
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 1, zeros, 7));
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 1, zeros, 7));
+    TEST_ASSERT_TRUE(sdo_talk_segment(&talk, 0x81, zeros, 7));
+    finish(21, sdo_block_crc(0, zeros, 21));
+    TEST_ASSERT_EQUAL_HEX8(0xA1, talk.answer.data[0]);
+}
+
 static void test_abort_by_the_client_inside_a_block(void)
 {
     initiate(100);
@@ -480,6 +519,28 @@ static void test_upload_repeats_what_was_lost(void)
     upload(IMAGE_MAX, 127, every_fifth);
 }
 
+/* The double comes before the segments that the request asks for have been sent. */
+static void test_commands_of_an_upload_may_be_doubled(void)
+{
+    const uint8_t go[8] = {0xA3};
+    const uint8_t finished[8] = {0xA1};
+    start_upload(100, 8);
+    TEST_ASSERT_FALSE(sdo_talk_send(&talk, go));
+    while (sdo_server_process(&talk.server, 0, &talk.answer)) {
+    }
+    TEST_ASSERT_TRUE(acknowledge(8, 8));
+    TEST_ASSERT_FALSE(acknowledge(8, 8));
+    while (sdo_server_process(&talk.server, 0, &talk.answer)) {
+    }
+    TEST_ASSERT_EQUAL_HEX8(0x87, talk.answer.data[0]);
+    TEST_ASSERT_TRUE(acknowledge(7, 8));
+    TEST_ASSERT_FALSE(acknowledge(7, 8));
+    TEST_ASSERT_EQUAL_HEX8(0xC1, talk.answer.data[0] & 0xE3);
+    TEST_ASSERT_FALSE(sdo_talk_send(&talk, finished));
+    TEST_ASSERT_FALSE(sdo_talk_send(&talk, finished));
+    TEST_ASSERT_FALSE(sdo_talk_busy(&talk));
+}
+
 static void test_upload_refusals(void)
 {
     sdo_talk_ask(&talk, 0xA4, 0x2005, 0, 0);
@@ -567,6 +628,8 @@ int main(void)
     RUN_TEST(test_domain_refuses_in_the_middle);
     RUN_TEST(test_the_rest_of_a_block_after_an_abort_is_no_request);
     RUN_TEST(test_a_request_after_an_abort_is_answered);
+    RUN_TEST(test_frames_at_the_end_of_a_download_may_be_doubled);
+    RUN_TEST(test_equal_segments_in_blocks_of_one);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
     RUN_TEST(test_a_second_client_inside_a_block);
     RUN_TEST(test_a_second_client_that_hits_the_next_number);
@@ -576,6 +639,7 @@ int main(void)
     RUN_TEST(test_silence_inside_a_block);
     RUN_TEST(test_upload_of_every_size);
     RUN_TEST(test_upload_repeats_what_was_lost);
+    RUN_TEST(test_commands_of_an_upload_may_be_doubled);
     RUN_TEST(test_upload_refusals);
     RUN_TEST(test_upload_times_out);
     RUN_TEST(test_an_urgent_write_beside_a_block_download);

@@ -101,6 +101,8 @@ struct drive_pdo {
 #define ON_CHANGE     255u
 #define INHIBIT_MS    10u /* between two PDOs sent on change */
 
+#define LEAST_POSITION UINT32_C(0x80000000) /* 0x607D sub 1: no minimum */
+
 enum { QUICK_STOP = 3 };     /* 0x6007: the reaction to a lost connection */
 enum { QUICK_STOP_OFF = 2 }; /* 0x605A, 0x605E: by 0x6085, then off, then Fault */
 enum { MINUS_THREE = 0xFD }; /* 0x60C2 sub 2: the time is sub 1 * 10^-3 s */
@@ -233,6 +235,9 @@ static const struct drive_row drive_rows[] = {
     {WHEN_FEED, ROW_MUST, 0x6092, 1, 4, FROM_AXIS, FIELD(feed_constant_counts)},
     {WHEN_FEED, ROW_MUST, 0x6092, 2, 4, FROM_ROW, 1},
     /* limits and reactions */
+    /* a drive may refuse a minimum above the maximum that it still has, and the reverse */
+    {WHEN_ALWAYS, ROW_TRY, 0x607D, 1, 4, FROM_ROW, LEAST_POSITION},
+    {WHEN_ALWAYS, ROW_TRY, 0x607D, 2, 4, FROM_TRAVEL_MAX, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x607D, 1, 4, FROM_TRAVEL_MIN, 0},
     {WHEN_ALWAYS, ROW_MUST, 0x607D, 2, 4, FROM_TRAVEL_MAX, 0},
     {WHEN_ALWAYS, ROW_MAY, 0x6085, 0, 4, FROM_AXIS, FIELD(quick_stop_counts_s2)},

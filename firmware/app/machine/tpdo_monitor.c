@@ -71,7 +71,9 @@ uint32_t tpdo_monitor_close_sync(struct tpdo_monitor *monitor, uint32_t now_us, 
         note_present(monitor);
     }
     monitor->count = 0;
-    monitor->lost = monitor->absent_in_row > missed_max && now_us - monitor->last_us > wait_us;
+    /* a lost drive stays lost: its time since the last TPDO1 wraps to 0 every 71 min */
+    monitor->lost = monitor->absent_in_row > missed_max &&
+                    (monitor->lost || now_us - monitor->last_us > wait_us);
     while (monitor->pending > 0u &&
            (monitor->lost || now_us - monitor->absent_us[monitor->first] >= wait_us)) {
         drop_oldest_pending(monitor);

@@ -6,6 +6,8 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/file.h>
@@ -41,10 +43,28 @@ static const char *prepare(int fd)
     if (found.st_size != 0 && (size_t)found.st_size != STORE_BYTES) {
         return "is no store of this controller: name another file";
     }
-    return ftruncate(fd, (off_t)STORE_BYTES) == 0 ? NULL : strerror(errno);
+    if (ftruncate(fd, (off_t)STORE_BYTES) != 0) {
+        return strerror(errno);
+    }
+    (void)fsync(fd);
+    return NULL;
 }
 
 static int store_fd = -1;
+
+/* Waits until the disk has what was written; some file systems cannot. */
+static bool on_disk(int fd)
+{
+    return fdatasync(fd) == 0 || errno == EINVAL || errno == ENOSYS;
+}
+
+/* The end of a bank of parameters is its commit record: a computer that loses its power has either all of a bank or its
+ * old record. Programs are not waited for, because a disk may take seconds and drives may be on: they have a CRC. */
+static bool is_commit_record(const uint8_t *end)
+{
+    return end > ram_store.parameters &&
+           (size_t)(end - ram_store.parameters) % PORT_STORE_PARAMETER_BYTES == 0u;
+}
 
 /* If the disk is full, pwrite() fails. A write to the mapped page would end the process (SIGBUS). */
 int ram_store_put(uint8_t *at, const uint8_t *data, uint32_t size)
@@ -53,8 +73,27 @@ int ram_store_put(uint8_t *at, const uint8_t *data, uint32_t size)
         memcpy(at, data, size);
         return 0;
     }
-    return pwrite(store_fd, data, size, at - ram_store.memory) == (ssize_t)size ? 0
-                                                                                : PORT_ERR_STORE;
+    const bool commit = is_commit_record(at + size);
+    if (commit && !on_disk(store_fd)) {
+        return PORT_ERR_STORE;
+    }
+    const bool written = pwrite(store_fd, data, size, at - ram_store.memory) == (ssize_t)size &&
+                         (!commit || on_disk(store_fd));
+    return written ? 0 : PORT_ERR_STORE;
+}
+
+/* A new file is in its folder also after a loss of power. A folder that may not be read stays as it is. */
+static void sync_folder(const char *file)
+{
+    char path[PATH_MAX];
+    if (snprintf(path, sizeof path, "%s", file) >= (int)sizeof path) {
+        return;
+    }
+    const int fd = open(dirname(path), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd >= 0) {
+        (void)fsync(fd);
+        (void)close(fd);
+    }
 }
 
 static bool map(int flags, int fd)
@@ -91,6 +130,7 @@ int store_open(const char *file)
         (void)close(fd);
         return failed(file, why);
     }
+    sync_folder(file);
     return 0;
 }
 

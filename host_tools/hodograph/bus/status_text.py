@@ -117,7 +117,7 @@ def _configuration_words(status: Status) -> str:
 
 
 def _program_words(program: LoadedProgram) -> str:
-    refused = f"; the last upload was refused: {program.refused}" if program.refused else ""
+    refused = f"; refused last: {program.refused}" if program.refused else ""
     if program.state != "ready":
         return program.state + refused
     return (

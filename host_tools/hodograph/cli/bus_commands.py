@@ -25,6 +25,7 @@ from ..bus.sdo.controller import (
 )
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.objects import HOLD, MOVING, STOP
+from ..bus.sdo.upload import refused_last
 from ..errors import BusyError
 from .output import note
 from .targets import target
@@ -83,6 +84,8 @@ def start(options: Namespace) -> None:
     with reached(address, to.node, to.bitrate, options.wait) as controller:
         if options.reset:
             actions.reset(controller)
+        if (reason := refused_last(controller)) is not None:
+            note(f"a program has been refused ({reason}): the one before it is started")
         with stopping(controller):
             controller.enable()
             controller.start(from_mm=options.from_mm, unhomed=options.unhomed)

@@ -29,7 +29,7 @@ from ..job import (
     section_commands,
     toolpath_commands,
 )
-from ..job_outputs import EventMaker
+from ..job_outputs import EventMaker, without_effect
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
@@ -180,7 +180,7 @@ class StreamReader:
         sections = SectionMaker(self.file, self.machine, self.reading.feed_mm_s, self.notes)
         outputs = self.machine.outputs
         events = None if outputs is None else EventMaker(outputs, self.file)
-        first = True
+        first, noted = True, False
         for divided in self._divided():
             if events is None:
                 yield from (_Part(made) for made in sections.made(divided.section))
@@ -192,6 +192,9 @@ class StreamReader:
                     is_first=first,
                     is_last=divided.is_last and final,
                 )
+                if events.lost and not noted:  # the first one only: the axes move meanwhile
+                    self.notes.append(without_effect(self.file, events.lost[0]))
+                    noted = True
                 yield _Part(made, events_of(own.events))
                 first = False
 

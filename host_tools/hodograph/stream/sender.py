@@ -143,6 +143,8 @@ class Sender:
     """The feed override before that."""
     _sending_s: float = 0.0
     """Time that the transfers of `_bytes` took."""
+    _job_number: int | None = None
+    """Of the chunk sent last."""
     _done_s: float = 0.0
     """Motion of finished jobs of the controller."""
     _ahead: deque[PlannedSection] = field(default_factory=deque)
@@ -280,7 +282,7 @@ class Sender:
                 raise self._unplanned
             if not started and sent and (all_sent or self._may_start(first_s)):
                 self._slow_down()
-                controller.start(unhomed=self.unhomed)
+                controller.start(unhomed=self.unhomed, job=self._job_number)
                 started = True
 
     def _may_start(self, first_s: float) -> bool:
@@ -365,6 +367,7 @@ class Sender:
         if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
             return None
         self._sending_s += self.at.controller.clock.now_s() - begun_s
+        self._job_number = header.job
         self._next += 1
         self._bytes += len(data)
         self._motion_s += new_s

@@ -286,9 +286,15 @@ class _Reader:
             self._blocks[name] = block
         for block in self._blocks.values():
             for insert in block.inserts:
-                if insert.block.lower() not in self._blocks:
-                    text = f'INSERT: block "{insert.block}" is not in the file'
-                    raise tags.error(insert.line, text)
+                try:
+                    self._require_block(insert)
+                except ShapeError as error:
+                    raise tags.error(insert.line, f"INSERT: {error}") from None
+
+    def _require_block(self, insert: _Insert) -> None:
+        """Raises ShapeError: the file does not have the block that is inserted."""
+        if insert.block.lower() not in self._blocks:
+            raise ShapeError(f'block "{insert.block}" is not in the file')
 
     def _add_to_block(self, block: _Block, entity: Entity) -> None:
         with _Place(self._drawing, entity):
@@ -304,7 +310,7 @@ class _Reader:
     def _insert(self, entity: Entity, left_out: list[tuple[str, int]]) -> _Insert:
         left_out += [(part.kind, part.line) for part in entity.parts]
         name = "".join(self._text(tag) for tag in entity.all(2)[:1])
-        scale = [entity.number(code, 1.0) for code in (41, 42, 43)]
+        scale = [entity.number(code, 1.0) or 1.0 for code in (41, 42, 43)]  # 0: not set, as in CAD
         inner = Affine.scaling(scale[0], scale[1], scale[2])
         outer = entity_system(entity).after(Affine.translation(*entity.point(10)))
         outer = outer.after(Affine.rotation(entity.number(50, 0.0)))
@@ -349,8 +355,7 @@ class _Reader:
                 drawing.leave_out("entity of a layout (paper space)", entity.line)
             elif entity.kind == "INSERT":
                 insert = self._insert(entity, left_out)
-                if insert.block.lower() not in self._blocks:
-                    raise ShapeError(f'block "{insert.block}" is not in the file')
+                self._require_block(insert)
                 self._copy(insert, self._placement, None, (), 1)
             elif entity.kind not in CURVES:
                 left_out.append((entity.kind, entity.line))

@@ -220,14 +220,19 @@ class _Reader:
         return True
 
     def _style(self, name: str, element: _Element) -> dict[str, str]:
-        """The properties of an element that are used here: from attributes, then style sheets, then its own style."""
+        """The properties of an element that are used here: from attributes, then style sheets, then its own style, then
+        those that are `!important` in the same order.
+        """
         given = element.attributes
         style = {key: given[key].strip() for key in _STYLED if key in given}
         classes = frozenset(given.get("class", "").split())
         rules = [rule for rule in self._rules if rule.fits(name, classes, given.get("id", ""))]
+        important: dict[str, str] = {}
         for rule in sorted(rules, key=lambda each: each.rank):
             style |= rule.properties
-        return style | declarations(given.get("style", ""))
+            important |= rule.important
+        own, own_important = declarations(given.get("style", ""))
+        return style | own | important | own_important
 
     def _inherited(self, name: str, element: _Element, style: Mapping[str, str]) -> _State:
         given = element.attributes

@@ -305,6 +305,7 @@ def _space(point: tuple[float, float]) -> Point:
 
 # ---- styles
 
+_IMPORTANT = re.compile(r"!\s*important\s*$", re.IGNORECASE)
 _SELECTOR = re.compile(r"(\*|[\w-]+)?((?:[.#][\w-]+)*)")
 
 
@@ -313,20 +314,21 @@ def _without_comments(text: str) -> str:
     return first + "".join(other.partition("*/")[2] for other in others)
 
 
-def declarations(text: str) -> dict[str, str]:
-    """The properties of a style attribute, or of a rule of a style sheet."""
-    pairs = (part.partition(":") for part in _without_comments(text).split(";"))
-    return {
-        name.strip().lower(): value.replace("!important", "").strip()
-        for name, _, value in pairs
-        if value
-    }
+def declarations(text: str) -> tuple[dict[str, str], dict[str, str]]:
+    """The properties of a style attribute, or of a rule of a style sheet: those without and those with `!important`."""
+    found: tuple[dict[str, str], dict[str, str]] = ({}, {})
+    for part in _without_comments(text).split(";"):
+        name, _, value = part.partition(":")
+        if value:
+            plain = _IMPORTANT.sub("", value)
+            found[plain != value][name.strip().lower()] = plain.strip()
+    return found
 
 
 @dataclass(frozen=True, slots=True)
 class Rule:
     """A rule of a style sheet: the name, classes and identities that an element needs; rules with a higher `rank` have
-    precedence.
+    precedence, and `important` properties over all others.
     """
 
     name: str
@@ -334,6 +336,7 @@ class Rule:
     ids: frozenset[str]
     rank: tuple[int, int, int]
     properties: Mapping[str, str]
+    important: Mapping[str, str]
 
     def fits(self, name: str, classes: frozenset[str], identity: str) -> bool:
         """Whether the rule applies to an element."""
@@ -366,5 +369,5 @@ def style_rules(text: str) -> tuple[list[Rule], list[str]]:
             classes = frozenset(each for mark, each in marks if mark == ".")
             ids = frozenset(each for mark, each in marks if mark == "#")
             rank = (len(ids), len(classes), int(found[1] not in (None, "*")))
-            rules.append(Rule(found[1] or "", classes, ids, rank, declarations(body)))
+            rules.append(Rule(found[1] or "", classes, ids, rank, *declarations(body)))
     return rules, others

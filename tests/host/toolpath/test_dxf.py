@@ -351,6 +351,16 @@ def text_with_blocks(blocks: dict[str, str], entities: str, tables: str = "") ->
     return text[:at] + "\n".join(sections) + "\n" + text[at:]
 
 
+@pytest.mark.parametrize("zero", [(41,), (43,), (41, 42, 43)])
+def test_a_scale_of_zero_is_one(tmp_path: Path, zero: tuple[int, ...]) -> None:
+    """Programs write it where a block is not scaled."""
+    line = "0 LINE 8 0 10 0 20 0 30 1 11 3 21 4 31 6"
+    scale = " ".join(f"{code} 0" for code in zero)
+    text = text_with_blocks({"B": line}, f"0 INSERT 2 B 10 1 20 0 {scale}")
+    (contour,) = contours_of(dxf_commands(write(tmp_path, text)))
+    assert contour[0][[0, -1], :3] == pytest.approx(np.array([[0.0, 0, 1], [3, 4, 6]]))
+
+
 def test_a_block_may_follow_the_one_that_it_is_inserted_in(tmp_path: Path) -> None:
     insert = "0 INSERT 2 Later 10 3 20 0"
     text = text_with_blocks({"First": insert, "LATER": LINE}, "0 INSERT 2 First 10 0 20 0")

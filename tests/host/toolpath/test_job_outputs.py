@@ -217,6 +217,11 @@ def test_the_end_of_the_program_switches_off_what_the_same_rest_switches_on(
 def test_a_switch_that_another_one_replaces_after_a_wait_is_noted(
     tmp_path: Path, machine: Machine, text: str, line: int | None
 ) -> None:
-    notes = [note for note in job(tmp_path, machine, text).notes if "without effect" in note]
-    assert len(notes) == (line is not None)
-    assert all(f":{line}: output switched without effect" in note for note in notes)
+    found = job(tmp_path, machine, text)
+    reader = StreamReader(found.file, machine, 0.01, ReadOptions())
+    for section in reader.sections():
+        assert list(section.blocks)
+    for given in (found.notes, reader.notes):  # of the whole job, and of the streamed one
+        notes = [note for note in given if "without effect" in note]
+        assert len(notes) == (line is not None)
+        assert all(f":{line}: output switched without effect" in note for note in notes)

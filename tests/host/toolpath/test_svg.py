@@ -161,6 +161,25 @@ def test_copies_are_drawn_where_they_are_used(tmp_path: Path) -> None:
     assert [length_of(contour) for contour in found] == pytest.approx([2.0, 1.0, 1.0, 20.0])
 
 
+@pytest.mark.parametrize(
+    ("rules", "own", "drawn"),
+    [
+        (".a{display:none!important}", "display:inline", False),
+        (".a{display:none ! IMPORTANT}#b{display:inline}", "", False),
+        (".a{display:none!important}", "display:inline!important", True),
+        (".a{display:none!important;display:inline}", "", False),
+        (".a{display:none!important}#b{display:inline!important}", "", True),
+        (".a{display:none}", "display:inline", True),
+    ],
+)
+def test_an_important_style_has_precedence(
+    tmp_path: Path, rules: str, own: str, *, drawn: bool
+) -> None:
+    shape = f'<path id="b" class="a" style="{own}" d="M1 1H3"/>'
+    page = svg_page(f'<style>{rules}</style><path d="M5 5h1"/>{shape}')
+    assert len(contours_of(svg_commands(tmp_path, page))) == 1 + drawn
+
+
 def test_a_symbol_has_a_style(tmp_path: Path) -> None:
     def symbol(attributes: str) -> str:
         text = f'<symbol id="s" {attributes}><path d="M0 0h1"/></symbol><use href="#s"/>'

@@ -68,6 +68,7 @@ REFUSALS = {
     18: "the program has more path axes than are configured: configure the machine it was compiled for "
     "(hodograph configure MACHINE), or compile it for this one",
     19: "a streamed job is open that was started before or begins elsewhere: end it with an upload, or stream again",
+    20: "another client has loaded another program or job meanwhile: upload it again",
     16: "the drives are real and this computer does not permit real-time priority: run the controller with "
     "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }

@@ -34,7 +34,7 @@ from ..diagnostics.texts import (
 from ..signals import interrupts_ignored
 from .configuration import configuration, configuration_crc32
 from .network import open_network
-from .node import IDENTITY_OBJECT, Node
+from .node import IDENTITY_OBJECT, NO_OBJECT, Node
 from .objects import (
     AT_ONCE,
     AXIS_NODE,
@@ -54,8 +54,10 @@ from .objects import (
     HOLD,
     HOLDING,
     HOME,
+    HOMING,
     LOAD,
     MOVING,
+    NAMED_START,
     NODE_NUMBER,
     OFF,
     ON_PATH,
@@ -63,6 +65,7 @@ from .objects import (
     PROGRAM,
     READY,
     REFUSED_MOVING,
+    REFUSED_OTHER,
     RESET,
     RESTORE_DEFAULTS,
     RESUME,
@@ -203,26 +206,43 @@ class Controller(Node):
 
     def command(self, command: int) -> None:
         """Sends a command; raises RefusedError with the controller's reason. Commands to stop never wait for the
-        channel.
+        channel. If the answer is lost, the state tells whether the command has been executed.
         """
+        self._give(command, COMMAND, None, command)
+
+    def _give(self, command: int, index: int, sub: int | None, value: int) -> None:
+        """A command, given by writing this value to an object."""
         moved, self.moved = self.moved, self.moved or command in _SETS_IN_MOTION
         try:
             if command in AT_ONCE:
-                self.write_at_once(COMMAND, command)
+                self.write_at_once(index, value)
             else:
-                self.patiently(COMMAND, None, lambda: self._give(command))
+                self.patiently(index, sub, lambda: self._put(index, sub, value))
         except SdoAbortedError as error:
             self.moved = moved
+            if index == NAMED_START and error.code in NO_OBJECT:
+                raise
             reason = self.read(FAULT, 4)
             text = REFUSALS.get(reason, str(error))
             if reason == 5:
                 text = self.fault_advice()
             raise CommandRefusedError(f"{self.who()} refused: {text}", reason) from error
         except SdoCommunicationError as error:
-            raise BusError(f"{self.who()} stopped answering a command") from error
+            self._require_executed(command, error)
 
-    def _give(self, command: int) -> None:
-        self.sdo[COMMAND].raw = command
+    def _require_executed(self, command: int, cause: Exception) -> None:
+        """After a lost answer. Raises BusError: the state does not show that the command has been executed."""
+        state = self.state()
+        if state in _EXECUTED.get(command, ()):
+            return
+        if command in _TWICE:
+            with suppress(SdoCommunicationError):
+                self.patiently(COMMAND, None, lambda: self._put(COMMAND, None, command))
+                return
+        raise BusError(
+            f"{self.who()} did not answer a command and is {STATES.get(state, state)}: the command did not reach it, "
+            "or what it began is over already: see hodograph status"
+        ) from cause
 
     def wait_for(
         self, states: tuple[int, ...], wait_s: float, tick: Callable[[], None] | None = None
@@ -316,14 +336,16 @@ class Controller(Node):
         *,
         unhomed: bool = False,
         image: bytes | None = None,
+        job: int | None = None,
     ) -> None:
-        """Starts the program, after waiting while the controller reports that axes still move.
+        """Starts the program, or the streamed job, after waiting while the controller reports that axes still move.
 
         from_mm  start at this arc length of the path, where the axes have to stand
         unhomed  also if axes with a homing method are not homed
         image    the program that was uploaded to be started; None: any
+        job      number of the streamed job to be started; None: any
 
-        Raises InputError: the path does not have the place. Raises RefusedError: another program is loaded.
+        Raises InputError: the path does not have the place. Raises RefusedError: another program or job is there.
         """
         if from_mm is not None:
             self._require_place(from_mm)
@@ -333,23 +355,38 @@ class Controller(Node):
             if unhomed:
                 self.write(UNHOMED_START, 1, 1)  # for one attempt
             try:
-                with self.turn():  # no other command of this computer uploads in between
-                    if image is not None:
-                        self._require_program(image)
-                    self.command(START if from_mm is None else START_FROM)
+                with self.turn():
+                    self._start(START if from_mm is None else START_FROM, image, job)
                 return
             except CommandRefusedError as error:
+                if error.reason == REFUSED_OTHER:
+                    raise RefusedError(self._other_text()) from error
                 moving = self.state() in MOVING
                 if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
             self.clock.sleep(POLL_S)
 
-    def _require_program(self, image: bytes) -> None:
-        if self.program_crc() != zlib.crc32(image[_PREFIX:]):
-            raise RefusedError(
-                f"{self.who()}: another command has loaded another program meanwhile, nothing was started: "
-                "wait until it is done, then give this command again"
-            )
+    def _start(self, command: int, image: bytes | None, job: int | None) -> None:
+        """One attempt. The start names its program or job, since a client on another computer may replace it at any
+        time.
+        """
+        if image is None and job is None:
+            self.command(command)
+            return
+        sub = _NAMED_JOB if image is None else _NAMED_PROGRAM[command]
+        number = job if image is None else zlib.crc32(image[_PREFIX:])
+        try:
+            self._give(command, NAMED_START, sub, int(number or 0))
+        except SdoAbortedError:  # a controller of an older minor version
+            if image is not None and self.program_crc() != number:
+                raise RefusedError(self._other_text()) from None
+            self.command(command)
+
+    def _other_text(self) -> str:
+        return (
+            f"{self.who()}: another command has loaded another program meanwhile, nothing was started: "
+            "wait until it is done, then give this command again"
+        )
 
     def _require_place(self, arc_length_mm: float) -> None:
         """Checks a place on the path; the controller takes one just beyond an end of the path as this end."""
@@ -433,6 +470,20 @@ _PROGRAM = (
     ("end_y_counts", 15),
 )
 _SETS_IN_MOTION = (START, START_FROM, HOME, RESUME)
+_EXECUTED = {
+    ENABLE: (ENABLING, READY),
+    START: MOVING,
+    START_FROM: MOVING,
+    RESUME: (RUNNING,),
+    DISABLE: (OFF, BOOT),
+    RESET: (OFF, BOOT),
+    HOME: (HOMING,),
+}
+"""States that show that a command without an answer has been executed."""
+_TWICE = (ENABLE, DISABLE, RESET)
+"""Commands that may be given again: the second one changes nothing more."""
+_NAMED_PROGRAM, _NAMED_JOB = {START: 1, START_FROM: 2}, 3
+"""Subindices of NAMED_START."""
 _PREFIX = 16
 """Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")

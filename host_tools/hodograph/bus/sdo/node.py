@@ -33,6 +33,8 @@ LET_PASS_S = 1.0
 """Least time that a request waits until the transfer of another client has ended."""
 ABORT, ABORT_BUSY = 0x80, 0x08000021
 """Command byte of an abort; the code with which a server refuses a second client during a transfer."""
+NO_OBJECT = (0x06020000, 0x06090011)
+"""Abort codes of a server without the object, or without the subindex."""
 BUSY_S = 5.0
 """Longest wait while another client has a transfer open: after two seconds the server drops a client that is gone."""
 _BUSY_LOOK_S = 0.05
@@ -46,10 +48,12 @@ _SCS, _NAMING = 0xE0, (0x40, 0x60)
 """Bits of a server's command byte; those of the first answers to an upload and to a download, which name the object."""
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
+_BLOCK_TAKEN = 0xA2
+"""Command byte of the answer to a block of a download."""
 _AGAIN_S = 0.25
 """Time after which `write_at_once` sends a request without answer again."""
-READ_AGAIN_S = 1.0
-"""A read without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
+AGAIN_S = 1.0
+"""A request without an answer for this long is repeated once: a ring of chunks may hold little more motion."""
 _T = TypeVar("_T")
 
 
@@ -86,6 +90,16 @@ class _Answers:
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
         return self._queued.get(timeout=timeout) if block else self._queued.get(block=False)
+
+    def drop_doubled_acknowledgements(self) -> None:
+        """Between two blocks of a download: a frame that CAN doubled would count for the next block."""
+        waiting = []
+        with suppress(queue.Empty):
+            while True:
+                waiting.append(self._queued.get(block=False))
+        for answer in waiting:
+            if answer[0] != _BLOCK_TAKEN:
+                self._queued.put(answer)
 
     def empty(self) -> bool:
         """Always True: answers from before a request do not belong to it and are discarded here."""
@@ -216,6 +230,10 @@ class Node:
         """Inside `patiently`: the server has accepted the first request, so later refusals are for another client."""
         self._answers.asked = _NOBODY
 
+    def block_taken(self) -> None:
+        """Inside a block download: the server has acknowledged a block."""
+        self._answers.drop_doubled_acknowledgements()
+
     def _nowhere(self) -> bytes:
         """A different number for each call and client; in virtual time the same in each run."""
         if self.clock.is_virtual:
@@ -228,20 +246,23 @@ class Node:
         def action() -> int:
             return int(self._variable(index, sub).raw)
 
-        def twice() -> int:
-            with suppress(SdoCommunicationError, _SilentError), self._patience(READ_AGAIN_S):
-                return self.patiently(index, sub, action)
-            return self.patiently(index, sub, action)
-
-        return self._guarded(twice, index, sub)
+        return self._guarded(lambda: self._twice(index, sub, action), index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
-        """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
+        """Writes an integer object. After a lost answer it is written again, once: for objects where this changes
+        nothing more. A refusal is an SdoAbortedError's text in a RefusedError.
+        """
+        self._guarded(
+            lambda: self._twice(index, sub, lambda: self._put(index, sub, value)), index, sub
+        )
 
-        def action() -> None:
-            self._variable(index, sub).raw = value
+    def _put(self, index: int, sub: int | None, value: int) -> None:
+        self._variable(index, sub).raw = value
 
-        self._guarded(lambda: self.patiently(index, sub, action), index, sub)
+    def _twice(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
+        with suppress(SdoCommunicationError, _SilentError), self._patience(AGAIN_S):
+            return self.patiently(index, sub, action)
+        return self.patiently(index, sub, action)
 
     @contextmanager
     def _patience(self, most_s: float) -> Iterator[None]:

@@ -87,7 +87,9 @@ class LongestStops:
 
 @dataclass(frozen=True)
 class LoadedProgram:
-    """The active program; numbers are 0 without one. `refused` is why the last upload was refused, None: it was not."""
+    """The active program; numbers are 0 without one. `refused`: why the last upload, or after power-on the
+    newest stored program, was refused; None: it was not.
+    """
 
     state: str
     refused: str | None

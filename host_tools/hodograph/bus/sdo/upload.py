@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Sends a program image to the controller by SDO block download.
 
-Used by sdo/controller, sdo/status and sdo/stream_channel. Reads and writes objects, and waits by the clock of
-the bus, real or virtual.
+Used by sdo/controller, sdo/status, sdo/stream_channel and cli/bus_commands. Reads and writes objects, and waits by the
+clock of the bus, real or virtual.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 from ...errors import BusError, RefusedError, one_line
 from ..diagnostics.texts import STATES
 from .node import Node
-from .objects import PROGRAM, PROGRAM_MEMORY, STATE
+from .objects import PROGRAM, PROGRAM_MEMORY, STATE, STREAM
 
 ABORT_VALUE_RANGE, ABORT_STATE = 0x06090030, 0x08000022
 _GAP_S = 0.01
@@ -91,6 +91,7 @@ def block_download(node: Node, index: int, image: bytes, progress: Progress | No
             stream.write(image[stream.pos : stream.pos + 7])
             if stream._seqno == 0:  # the block is acknowledged
                 node.clock.sleep(_GAP_S)
+                node.block_taken()
             if progress is not None:
                 progress(stream.pos)
     except BaseException as error:
@@ -116,6 +117,14 @@ def _refusal(
         f"{node.who()} refused the program: {program_fault_text(code, index)}; "
         "the old program stays"
     )
+
+
+def refused_last(node: Node) -> str | None:
+    """Why the last upload, or the newest program that was stored, was refused; None: it was not, or a job is open."""
+    code = node.read(PROGRAM, 3)
+    if code == 0 or node.read(STREAM, 2) != 0:
+        return None
+    return program_fault_text(code, node.read(PROGRAM, 4))
 
 
 def program_fault_text(code: int, index: int) -> str:

@@ -294,6 +294,7 @@ class Interpreter:
 
     def _go_home(self, block: Block, point: int, commands: list[Command]) -> None:
         """G28 and G30: by the programmed point, if there is one, to the stored point."""
+        self.modes.spline_handle = None
         home, words, where = (
             self.coordinates.stored(point),
             self._axis_words(block),
@@ -438,7 +439,9 @@ def _output(block: Block, code: int) -> Command:
     line = block.line.number
     if code in (67, 68):
         output = _needed_output(block, code, "e")
-        return AnalogOutput(line, output, block.values.get("q", 0.0), code == 67)
+        if "q" not in block.values:  # LinuxCNC sets -1
+            raise block.error(f"m{code}", f"M{code} needs Q, the value of the output")
+        return AnalogOutput(line, output, block.values["q"], code == 67)
     output = _needed_output(block, code, "p")
     return DigitalOutput(line, output, code in (62, 64), code in (62, 63))
 
