@@ -278,7 +278,10 @@ class SectionChunks:
                     self._kept = before
                     if first == 0 and self._begin_alone(window):
                         continue
-                    if not self._rest() and not self._feed.halve(window):
+                    if self._tail_ends_section():
+                        yield self._closing()
+                        return
+                    if not self._rest() and not (first == 0 and self._feed.halve(window)):
                         raise
                     break
                 yield planned
@@ -302,14 +305,39 @@ class SectionChunks:
         self._kept, self._alone_q40 = _Kept(), begin_q40
         return True
 
+    def _tail_ends_section(self) -> bool:
+        """Whether the newest chunk has a tail, and the tail ends where the section does."""
+        last, path = self._last, self._feed.path
+        if last is None or not len(last.tail) or last.end_q40 != int(path.start_q40[-1]):
+            return False
+        return not self._feed.read_more()
+
+    def _closing(self) -> PlannedChunk:
+        """The last chunk of the section, if the controller accepts no other: its new pieces are the tail of the newest
+        chunk. Raises SectionPlanError.
+        """
+        last, before = self._last, self._kept
+        assert last is not None
+        repeated, piece_shift, time_shift_q32_s = before.repeated(LEAST_SHARED_PIECES)
+        self._kept = repeated.with_new(last.tail, last.tail_codes)
+        assert self._kept.pieces is not None
+        stretch = Stretch(self._kept.pieces, last.end_q40)
+        program = self._program_with_events(stretch, self._kept.codes)
+        header = self._header(True, program)
+        header = self._shared(header, repeated, piece_shift, time_shift_q32_s)
+        self._require_room(program, header.line)
+        _require_accepted(self._fault(program), header.line)
+        self._last = self._made(header, program)
+        new_s = self._rested_s + last.tail.total_q32_s * 2.0**-32
+        line = self._feed.path.line_at(last.end_q40)
+        return PlannedChunk(Chunk(self._in_job(header), encode(program)), new_s, line, last.end_q40)
+
     def _rest(self) -> bool:
         """Lets the axes come to rest at the end of the newest chunk, whose tail is then kept, because no chunk
-        continues in motion. False: they rest there already, or the path ends there.
+        continues in motion. False: they rest there already.
         """
         last, path = self._last, self._feed.path
         if last is None or not len(last.tail):
-            return False
-        if last.end_q40 == int(path.start_q40[-1]) and not self._feed.read_more():
             return False
         self._rested_s += last.tail.total_q32_s * 2.0**-32
         self.rest_lines.append(path.line_at(last.end_q40))
@@ -324,16 +352,9 @@ class SectionChunks:
         """
         tried = self._largest(window, first, joints)
         program, joint = tried.program, joints[tried.used - 1]
-        header = self._header(window, joint, program)
-        if self._last is not None and header.rest is None:
-            # At least one piece of the predecessor is after the joint (docs/reference/protocol.md 1.7).
-            shared = min(len(tried.repeated.codes), self._last.pieces - tried.piece_shift - 1)
-            header = replace(
-                header,
-                piece_shift=tried.piece_shift,
-                time_shift_q32_s=tried.time_shift_q32_s,
-                shared_pieces=shared,
-            )
+        is_last = window.rests and joint == window.count and self._feed.at_end(window)
+        header = self._header(is_last, program)
+        header = self._shared(header, tried.repeated, tried.piece_shift, tried.time_shift_q32_s)
         self._require_room(program, header.line)
         _require_accepted(tried.fault, header.line)
         self._last = self._made(header, program)
@@ -447,15 +468,30 @@ class SectionChunks:
                 f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory",
             )
 
-    def _header(self, window: Window, joint: int, program: Program) -> ChunkHeader:
-        """The header, still without its fields of shared pieces."""
+    def _shared(
+        self, header: ChunkHeader, repeated: _Kept, piece_shift: int, time_shift_q32_s: int
+    ) -> ChunkHeader:
+        """The header with its fields of shared pieces. At least one piece of the predecessor is after the joint
+        (docs/reference/protocol.md 1.7).
+        """
+        if self._last is None or header.rest is not None:
+            return header
+        return replace(
+            header,
+            piece_shift=piece_shift,
+            time_shift_q32_s=time_shift_q32_s,
+            shared_pieces=min(len(repeated.codes), self._last.pieces - piece_shift - 1),
+        )
+
+    def _header(self, is_last: bool, program: Program) -> ChunkHeader:
+        """The header, still without its fields of shared pieces. `is_last`: the section ends with this chunk."""
         last, path = self._last, self._feed.path
         assert self._kept.pieces is not None
         begin_q40 = int(self._kept.pieces.start_q40[0])
         segment = path.segment_at(begin_q40)
         header = ChunkHeader(
             first=last is None,
-            last=window.rests and joint == window.count and self._feed.at_end(window),
+            last=is_last,
             job=self._job,
             sequence=0 if last is None else last.header.sequence + 1,
             job_start_q40=int(path.start_q40[segment]),

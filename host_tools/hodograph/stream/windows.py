@@ -233,8 +233,8 @@ class SectionFeed:
         self._rest = end_q40, last_s
 
     def halve(self, window: Window) -> bool:
-        """Lets the present window be planned again, to a rest within the first half of its kept part. False: it begins
-        in motion, or keeps one segment.
+        """Lets the present window, of which no chunk is made yet, be planned again, to a rest within the first half of
+        its kept part. False: it begins in motion, or keeps one segment.
         """
         ends, low = self.path.curve.segment_starts_mm, self._low_mm + _SAME_MM
         first = int(np.searchsorted(ends, low, side="right"))

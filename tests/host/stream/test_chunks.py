@@ -22,10 +22,11 @@ from hodograph.feed.optimal.window import Solution
 from hodograph.job import load_job
 from hodograph.machine_limits import program_limits
 from hodograph.native import NativeProgram
-from hodograph.native.program import NativeLimits
+from hodograph.native.program import NativeFault, NativeLimits
 from hodograph.native.stream import OfflineStream
-from hodograph.program import encode
+from hodograph.program import Program, encode
 from hodograph.program.check import REACH_Q40, check, check_image
+from hodograph.program.codes import ProgramError
 from hodograph.spline import PHSpline, from_control_polygon
 from hodograph.stream.chunk import LEAST_SHARED_PIECES, Chunk, parse, shared_fault
 from hodograph.stream.chunks import FEWEST_SHARED_PIECES, RAMP_S, SectionChunks
@@ -33,6 +34,7 @@ from hodograph.stream.geometry import Block, StreamPath, blocks_from, with_joint
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlanRests
 from hodograph.stream.reading import StreamReader
 from hodograph.stream.simulation import concatenated, from_rest_to_rest, simulate_chunks
+from hodograph.stream.tails import Tails
 from hodograph.stream.windows import SectionFeed
 from hodograph.toolpath.files import ReadOptions
 
@@ -203,6 +205,35 @@ def test_axes_rest_where_no_chunk_goes_on(tmp_path: Path, machine: Machine, most
     duration_s = concatenated(tight).duration_s
     assert duration_s > concatenated(roomy).duration_s + 0.02
     assert sum(one.new_s for one in made) == pytest.approx(duration_s, abs=1e-9)
+
+
+def test_where_the_end_is_refused_the_tail_to_it_ends_the_section(
+    tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No part of the section that is in a chunk is planned again."""
+    file = tmp_path / "wave.ngc"
+    file.write_text(_wave(60))
+    (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
+    maker = SectionChunks(machine, "wave", section.blocks, 1, MOST)
+    accepted, refused = maker._with_stops, []
+
+    def stops(tails: Tails, joint: int) -> tuple[Program, NativeFault | None]:
+        program, fault = accepted(tails, joint)
+        if joint == tails.window.count and maker._feed.at_end(tails.window):
+            fault = NativeFault(ProgramError.AXIS_JERK, 0, "jerk")
+            refused.append(joint)
+        return program, fault
+
+    monkeypatch.setattr(maker, "_with_stops", stops)
+    made = list(maker.chunks())
+    assert refused
+    chunks = [one.chunk for one in made]
+    _verify(chunks, machine, shared=1, rests=True)
+    places = [one.arc_q40 for one in made]
+    assert places == sorted(places)
+    assert sum(one.new_s for one in made) == pytest.approx(
+        concatenated(chunks).duration_s, abs=1e-9
+    )
 
 
 def test_rests_that_no_command_asks_for_are_counted(tmp_path: Path, machine: Machine) -> None:
