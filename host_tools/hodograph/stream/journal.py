@@ -25,7 +25,9 @@ from ..errors import InputError
 VERSION = 4
 
 _BESIDE_Q40 = 1 << 20
-"""2^-20 mm: a rest this close before the start of a section counts as a rest at the start."""
+"""2^-20 mm: a rest this close to the start of a section counts as a rest at the start, where its commands at rest
+follow.
+"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,8 @@ class Entry:
         for number, begin_q40 in self.starts:
             if begin_q40 <= arc_q40 + _BESIDE_Q40:
                 section, start_q40 = number, begin_q40
-        return section, max(arc_q40 - start_q40, 0)
+        within_q40 = arc_q40 - start_q40
+        return section, within_q40 if within_q40 > _BESIDE_Q40 else 0
 
 
 def mark(file: Path) -> FileMark:

@@ -471,6 +471,61 @@ def test_the_journal_has_the_end_of_a_chunk_before_it_is_sent(
     assert known["committed_q40"] == 130
 
 
+def test_the_arc_length_in_the_journal_is_that_of_its_section() -> None:
+    """Not that of the section before, which is the last one that was reported."""
+    known: dict[str, object] = {}
+    sender = _sender_of_one_chunk(SimpleNamespace(update=known.update))
+    sender._ahead.append(PlannedSection(1, Path("part.ngc"), 2, (), start_q40=5 << 40))
+    sender._note_place(arc_q40=4 << 40)
+    sender._note_place(committed_q40=7 << 40)
+    assert (known["section"], known["arc_q40"]) == (0, 4 << 40)
+    sender._ahead.popleft()
+    sender._note_place(committed_q40=9 << 40)
+    assert (known["section"], known["arc_q40"]) == (1, 0)
+    sender._note_place(arc_q40=2 << 40)
+    sender._note_place(committed_q40=10 << 40)
+    assert (known["section"], known["arc_q40"]) == (1, 2 << 40)
+
+
+@pytest.mark.parametrize(("job", "state"), [(0, RUNNING), (JOB + 1, RUNNING), (JOB, OFF)])
+def test_a_chunk_that_is_refused_because_the_controller_has_lost_the_job(
+    monkeypatch: pytest.MonkeyPatch, job: int, state: int
+) -> None:
+    """The motion does not rest on the path then: the message must not say so."""
+
+    def refused(*_: object) -> bool:
+        raise RefusedError("of another job: the motion rests on the path")
+
+    monkeypatch.setattr("hodograph.stream.sender.send_chunk", refused)
+    monkeypatch.setattr(
+        "hodograph.stream.sender.stream_status", lambda _: replace(_status(OPEN), job=job)
+    )
+    sender = _sender_of_one_chunk(None)
+    controller: Any = sender.at.controller
+    controller.state = lambda: state
+    controller.who = lambda: "node 1"
+    with pytest.raises(RunError, match=r"no longer has the job: .*--continue"):
+        sender._send_one(replace(_status(OPEN), free_bytes=100))
+    controller.state = lambda: RUNNING
+    monkeypatch.setattr("hodograph.stream.sender.stream_status", lambda _: _status(OPEN))
+    with pytest.raises(RefusedError, match="of another job"):
+        sender._send_one(replace(_status(OPEN), free_bytes=100))
+
+
+def test_a_job_that_the_controller_loses_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its power was gone for a moment."""
+    sender = _sender_of_one_chunk(None)
+    controller: Any = sender.at.controller
+    controller.who = lambda: "node 1"
+    found = iter([_status(OPEN), replace(_status(OPEN), job=0)])
+    monkeypatch.setattr("hodograph.stream.sender.stream_status", lambda _: next(found))
+    monkeypatch.setattr(Sender, "_check_bus", lambda _: None)
+    monkeypatch.setattr(Sender, "_send_one", lambda *_: False)
+    monkeypatch.setattr(Sender, "_may_start", lambda *_: False)
+    with pytest.raises(RunError, match="no longer has the job"):
+        sender._stream(JOB)
+
+
 def test_underruns_of_all_jobs_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The controller counts those of each job from 0."""
     sender = _sender_of_one_chunk(None)
@@ -481,7 +536,7 @@ def test_underruns_of_all_jobs_are_counted(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(Sender, "_check_bus", over)
     for underruns in (3, 2):
         with pytest.raises(InterruptedError):
-            sender._stream()
+            sender._stream(JOB)
         sender._note_underruns(_status(OPEN, underruns), 0.0)
     assert sender._underruns_before + sender._underruns == 5
 

@@ -209,7 +209,7 @@ class Controller(Node):
             if command in AT_ONCE:
                 self.write_at_once(COMMAND, command)
             else:
-                self.patiently(COMMAND, None, lambda: self._give(command))
+                self._deliver(command)
         except SdoAbortedError as error:
             self.moved = moved
             reason = self.read(FAULT, 4)
@@ -219,6 +219,18 @@ class Controller(Node):
             raise CommandRefusedError(f"{self.who()} refused: {text}", reason) from error
         except SdoCommunicationError as error:
             raise BusError(f"{self.who()} stopped answering a command") from error
+
+    def _deliver(self, command: int) -> None:
+        """Gives a command. If its answer is lost, one that has no effect the second time is given again, and of a start
+        the state shows whether it was executed.
+        """
+        with self.broken_ignored():
+            self.patiently(COMMAND, None, lambda: self._give(command))
+            return
+        if command in (ENABLE, RESUME):
+            self.patiently(COMMAND, None, lambda: self._give(command))
+        elif command not in (START, START_FROM) or self.state() != RUNNING:
+            raise BusError(f"{self.who()} stopped answering a command")
 
     def _give(self, command: int) -> None:
         self.sdo[COMMAND].raw = command

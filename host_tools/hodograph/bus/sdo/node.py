@@ -44,6 +44,8 @@ _SCS, _NAMING = 0xE0, (0x40, 0x60)
 _COMMAND = struct.pack("<HB", COMMAND, 0)
 _COMMAND_TAKEN = b"\x60" + _COMMAND + bytes(4)
 _AGAIN_S = 0.25
+BROKEN = (0x05030000, 0x05040000, 0x05040001)
+"""Aborts of a server in another state of the transfer than the client: toggle bit, time-out, unexpected command."""
 READ_AGAIN_S = 1.0
 """A read without an answer for this long is repeated once: a ring of chunks may hold little more motion than this."""
 _T = TypeVar("_T")
@@ -111,6 +113,7 @@ class Node:
         self._left_s: float | None = None
         """The remaining time of a request; None: it has no limit of its own."""
         self._identified = False
+        self._remote = node
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
         self._answers = self.sdo.responses = _Answers(self.sdo.responses)
@@ -214,25 +217,47 @@ class Node:
         return _nowhere(int.from_bytes(os.urandom(3), "little"))
 
     def read(self, index: int, sub: int | None = None) -> int:
-        """An integer object. A lost answer is asked for again, once."""
+        """An integer object. If the answer is lost, or the transfer broke off, it is asked for again, once."""
 
         def action() -> int:
             return int(self._variable(index, sub).raw)
 
         def twice() -> int:
-            with suppress(SdoCommunicationError, _SilentError), self._patience(READ_AGAIN_S):
+            with self.broken_ignored(), self._patience(READ_AGAIN_S):
                 return self.patiently(index, sub, action)
             return self.patiently(index, sub, action)
 
         return self._guarded(twice, index, sub)
 
     def write(self, index: int, sub: int | None, value: int) -> None:
-        """Writes an integer object. A refusal is an SdoAbortedError's text in a RefusedError."""
+        """Writes an integer object, again if the answer is lost. A refusal is an SdoAbortedError's text in a
+        RefusedError.
+        """
 
         def action() -> None:
             self._variable(index, sub).raw = value
 
-        self._guarded(lambda: self.patiently(index, sub, action), index, sub)
+        def twice() -> None:
+            with self.broken_ignored():
+                self.patiently(index, sub, action)
+                return
+            self.patiently(index, sub, action)
+
+        self._guarded(twice, index, sub)
+
+    @contextmanager
+    def broken_ignored(self) -> Iterator[None]:
+        """Ignores that a transfer broke off: no answer, or one to a transfer that the server has ended meanwhile, as
+        after this process was stopped for a while.
+        """
+        try:
+            yield
+        except (SdoCommunicationError, _SilentError):
+            self._under_way = True
+        except SdoAbortedError as error:
+            if error.code not in BROKEN:
+                raise
+            self._under_way = True
 
     @contextmanager
     def _patience(self, most_s: float) -> Iterator[None]:
@@ -330,6 +355,11 @@ class Node:
                         return False
         finally:
             self.sdo.RESPONSE_TIMEOUT, self._left_s = patience, None
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether a heartbeat of the node has come: it is there, though it may not answer."""
+        return self._remote.nmt.timestamp is not None
 
     def _check_identity(self) -> None:
         """Raises BusError when the node is not what the EDS file describes."""
