@@ -4,8 +4,8 @@
 
     .venv/bin/python tools/stream_cuts.py [--seeds 1-100] [--kind kill ...] [--json FILE]
 
-Run by `make cuts-stream` and the system tests. Starts machines and commands on local buses in virtual time, receives
-all frames, and writes journals into a temporary folder; writes FILE.
+Run by `make cuts-stream` and by tests/system/test_stream_cuts.py. Starts machines and commands on local buses in
+virtual time, receives all frames, and writes journals into a temporary folder; writes FILE.
 
 Each seed draws a job, a controller memory and disturbances: the host killed, stopped, terminated, its cable pulled,
 frames lost or doubled, the controller without power. After each of them `hodograph stream --continue` runs, which may
@@ -86,6 +86,7 @@ _SIGNALS = {
     "terminate": (signal.SIGTERM, 143),
     "hang-up": (signal.SIGHUP, 129),
 }
+_ENDED_BY_SIGNAL = (-signal.SIGKILL, -signal.SIGINT, -signal.SIGTERM, -signal.SIGHUP, 129, 130, 143)
 _RULED = ("cable", "answers-lost", "requests-lost", "doubled")
 """Kinds that the injector makes by rules, from the start of the machine on."""
 _RULED_TICKS = 14_000
@@ -99,7 +100,7 @@ _CABLE_S = 25.0
 """After it the cable is in again."""
 _ATTEMPTS = 14
 _WINDOW, _BLOCK = 1500, 64
-_BUSY_STATUS, _INPUT_STATUS, _BUS_STATUS, _REFUSED_STATUS, _FAULT_STATUS = 4, 2, 4, 5, 6
+_INPUT_STATUS, _BUS_STATUS, _REFUSED_STATUS = 2, 4, 5
 
 Counts = NDArray[np.float64]
 
@@ -155,6 +156,8 @@ JOBS = (
 )
 _SHARES = (0.25, 0.25, 0.2, 0.15, 0.02, 0.13)
 """Of the jobs among the seeds: long ones are rare."""
+_INPUT_SHARE = 0.1
+"""Of the jobs of one file that come from standard input."""
 
 
 @cache
@@ -244,8 +247,11 @@ def _at_syncs(
 class Rig:
     """Controller and drives on one bus, the host on another, the injector between them."""
 
-    def __init__(self, hub: LocalHub, machine: Machine, clock: VirtualClock, rules: Path) -> None:
+    def __init__(
+        self, hub: LocalHub, machine: Machine, clock: VirtualClock, rules: Path, ring_kib: int
+    ) -> None:
         self.machine, self.clock = machine, clock
+        self._controller = f"{find_program(CONTROLLER)} --ring {ring_kib}"
         self.bus, self.host_bus = hub.addresses
         self._injector = Process(
             "injector",
@@ -261,7 +267,7 @@ class Rig:
 
     def start_controller(self) -> None:
         """A controller after power-on."""
-        command = controller_command(self.machine, self.bus, "real-time")
+        command = controller_command(self.machine, self.bus, "real-time", self._controller)
         self.controller = Process(f"controller-{self.machine.node}", command, self.clock)
 
     def end(self) -> None:
@@ -377,6 +383,8 @@ class Case:
     kinds: tuple[str, ...]
     waits_s: tuple[float, ...]
     """Pause before each --continue."""
+    from_input: bool = False
+    """The job comes from standard input, and cannot be continued."""
 
 
 def draw(seed: int, kinds: Sequence[str] = KINDS) -> Case:
@@ -405,6 +413,7 @@ def draw(seed: int, kinds: Sequence[str] = KINDS) -> Case:
         "\n".join(rules) + "\n",
         tuple(wanted),
         waits,
+        len(job.texts) == 1 and float(rng.random()) < _INPUT_SHARE,
     )
 
 
@@ -446,6 +455,7 @@ class Run:
         self.journal = folder / "stream.json"
         self.found = Found(case)
         self.cuts = list(case.cuts)
+        self.ended = True
         self.aside: list[tuple[int, int]] = []
         """Parts of the recording in which axes are moved beside the job."""
 
@@ -462,7 +472,7 @@ class Run:
             assert clock is not None
             stack.callback(_released, clock)
             self.clock = clock
-            self.rig = Rig(hub, self.machine, clock, rules)
+            self.rig = Rig(hub, self.machine, clock, rules, self.case.ring_kib)
             stack.callback(self.rig.end)
             self.recorder = stack.enter_context(Recorder(hub.address))
             clock.sleep(0.3)
@@ -477,10 +487,13 @@ class Run:
         words: tuple[str, ...] = (
             *map(str, self.files), "--machine", str(self.machine.file), "--no-stops",
         )  # fmt: skip
+        if self.case.from_input:
+            self._stream_input()
+            return
         for attempt in range(_ATTEMPTS):
             cut = self.cuts.pop(0) if self.cuts else None
             status = self._once(words, cut)
-            if status == 0:
+            if status == 0 or (status in _ENDED_BY_SIGNAL and self._is_done()):
                 self._expect_end()
                 return
             self._pause(attempt, status)
@@ -490,12 +503,25 @@ class Run:
                 words = ("--continue", "--no-stops")
         raise _Failed("the job does not come to its end")
 
-    def _once(self, words: Sequence[str], cut: Cut | None) -> int:
-        host = Host(
-            self.clock, self.rig.host_bus, ("stream", *words, "--journal", str(self.journal))
-        )
+    def _stream_input(self) -> None:
+        """A job from standard input, which cannot be continued: it ends, or rests on its path."""
+        words = ("-", "--machine", str(self.machine.file), "--no-stops")
+        cut = self.cuts[0] if self.cuts else None
+        if self._once(words, cut, self.files[0]) == 0:
+            self._expect_end()
+            return
+        self.ended = False
+        self.clock.sleep(_CABLE_S)
+        if self._once(("--continue",), None, None, _INPUT_STATUS) != _INPUT_STATUS:
+            self.found.troubles.append(f"--continue of standard input: {self.found.said[-1]}")
+
+    def _once(
+        self, words: Sequence[str], cut: Cut | None, read: Path | None = None, status: int = 0
+    ) -> int:
+        words = ("stream", *words, "--journal", str(self.journal))
+        host = Host(self.clock, self.rig.host_bus, words, read)
         try:
-            expected: tuple[int, ...] = (0,)
+            expected: tuple[int, ...] = (status,)
             if cut is not None and host.live(cut.after_s):
                 expected = self._act(host, cut)
             status = host.wait()
@@ -528,10 +554,9 @@ class Run:
             return (0, 4, 5, 6)  # 0: before the command has come to the bus
         number, status = _SIGNALS[cut.kind]
         host.signal(number)
-        statuses: tuple[int, ...] = (status,)
+        statuses = (status, -number)  # by the signal itself: the end of Python catches none
         if cut.kind == "interrupt-twice" and host.live(min(0.02 * cut.length_s, 0.3)):
             host.signal_again(number)
-            statuses = (status, -number)
         return statuses
 
     def _note(self, head: str, said: str) -> None:
@@ -586,9 +611,11 @@ class Run:
         finally:
             host.close()
 
+    def _is_done(self) -> bool:
+        return self.journal.exists() and entry_of(self.journal).done
+
     def _expect_end(self) -> None:
-        entry = entry_of(self.journal)
-        if not entry.done:
+        if not self.case.from_input and not self._is_done():
             self.found.troubles.append("the job has ended, and the journal does not say so")
         _, status, targets = self.rig.status()
         end = job_counts(self.case.job, self.case.period_us)[-1]
@@ -609,7 +636,8 @@ class Run:
         points = executed(frames[keep], nodes)
         line = job_counts(self.case.job, self.case.period_us)
         found.away_um = away_um(points, line) if len(points) else 0.0
-        found.left_out_um = away_um(line[::5], points) if len(points) else np.inf
+        if self.ended:
+            found.left_out_um = away_um(line[::5], points) if len(points) else np.inf
         if "power" not in self.case.kinds and found.away_um > NEAR_UM:
             found.troubles.append(f"setpoints {found.away_um:.3f} um off the path")
         if found.left_out_um > NEAR_UM:
@@ -654,6 +682,16 @@ def run_case(case: Case) -> Found:
 # -- all cases --------------------------------------------------------------------------------
 
 
+def _summary(found: Found) -> str:
+    case = found.case
+    cuts = ", ".join(f"{c.kind} {c.after_s:.3f} s {c.length_s:.2f} s" for c in case.cuts)
+    return (
+        f"{case.job.name}{' from -' if case.from_input else ''} {case.period_us} us {case.ring_kib} KiB "
+        f"[{', '.join(case.kinds)}] ({cuts}) statuses {found.statuses}, off {found.away_um:.3f} um, "
+        f"left out {found.left_out_um:.3f} um: {'FAILED' if found.troubles else 'ok'}"
+    )
+
+
 def _numbers(text: str) -> list[int]:
     first, _, last = text.partition("-")
     return list(range(int(first), int(last or first) + 1))
@@ -680,13 +718,7 @@ def main(arguments: list[str]) -> int:
             case = found.case
             counts.update(set(case.kinds))
             bad.update(set(case.kinds) if found.troubles else ())
-            cuts = ", ".join(f"{c.kind} {c.after_s:.3f} s {c.length_s:.2f} s" for c in case.cuts)
-            print(
-                f"{seed}: {case.job.name} {case.period_us} us {case.ring_kib} KiB [{', '.join(case.kinds)}] ({cuts}) "
-                f"statuses {found.statuses}, off {found.away_um:.3f} um, left out {found.left_out_um:.3f} um: "
-                f"{'FAILED' if found.troubles else 'ok'}",
-                flush=True,
-            )
+            print(f"{seed}: {_summary(found)}", flush=True)
             for trouble in found.troubles:
                 print(f"    {trouble}", flush=True)
             if found.troubles or options.verbose:

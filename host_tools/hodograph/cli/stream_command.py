@@ -355,8 +355,8 @@ def _off_the_path(machine: Machine, found: Nearest) -> str:
     return (
         f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
         f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
-        f"--to {point[0]} {point[1]}{more}{along} (line {back.line}, which they have passed), then hodograph stream "
-        "--continue"
+        f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue: back to line {back.line}, which "
+        "they have passed"
     )
 
 

@@ -195,7 +195,7 @@ def load(file: Path) -> Entry:
         ) from None
     except OSError as error:
         raise InputError(f"{file}: the journal cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
         raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
     if entry.done:
         raise InputError(f"{file}: the last job came to its end: nothing to continue")

@@ -99,3 +99,20 @@ def test_a_resume_is_given_again(controller: Controller, monkeypatch: pytest.Mon
     found = Spoilt(monkeypatch, COMMAND, [None])
     controller.command(RESUME)
     assert not found.left
+
+
+def test_an_answer_that_comes_twice_is_no_refusal_of_what_is_asked_next(
+    controller: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The one to the probe, which reads an object that does not exist; after the first wait of a command."""
+    asked, put = list[bytes](), _Answers.put
+
+    def doubled(answers: _Answers, answer: bytes) -> None:
+        if answer[1:3] == STATE.to_bytes(2, "little") and not asked:
+            asked.append(answer)
+            put(answers, b"\x80" + (0x5123).to_bytes(2, "little") + b"\x01\x00\x00\x02\x06")
+        put(answers, answer)
+
+    monkeypatch.setattr(_Answers, "put", doubled)
+    assert controller.answers(1.0)
+    assert asked

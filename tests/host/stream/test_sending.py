@@ -266,6 +266,7 @@ def test_no_journal(tmp_path: Path) -> None:
         ("machine", 1),
         ("files", 3),
         ("starts", [1]),
+        ("starts", [[0, float("inf")]]),
     ],
 )
 def test_a_journal_with_a_wrong_value_is_refused(tmp_path: Path, key: str, value: object) -> None:

@@ -339,7 +339,7 @@ class Node:
                 try:
                     self._left_s = max(deadline - self.clock.now_s(), 0.001)
                     with self.turn(turn_wait_s, min(turn_wait_s, BUSY_S)):
-                        self._variable(STATE, None).raw  # noqa: B018
+                        self._read_in_turn(STATE, None)
                     self._check_identity()
                     return True
                 except SdoAbortedError as error:
@@ -356,6 +356,14 @@ class Node:
         finally:
             self.sdo.RESPONSE_TIMEOUT, self._left_s = patience, None
 
+    def _read_in_turn(self, index: int, sub: int | None) -> int:
+        """An integer object, inside `turn`; answers about others are discarded."""
+        self._answers.asked = _frame_bytes(index, sub)
+        try:
+            return int(self._variable(index, sub).raw)
+        finally:
+            self._answers.asked = b""
+
     @property
     def is_heard(self) -> bool:
         """Whether a heartbeat of the node has come: it is there, though it may not answer."""
@@ -368,8 +376,8 @@ class Node:
         for sub, name, kept in IDENTITY:
             wanted = int(self.sdo.od[IDENTITY_OBJECT][sub].default or 0) >> kept
             with self.turn():
-                found = int(
-                    self._variable(IDENTITY_OBJECT, sub).raw
+                found = self._read_in_turn(
+                    IDENTITY_OBJECT, sub
                 )  # the caller decides about a slow answer
             if found >> kept != wanted:
                 raise BusError(
