@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import canopen
 import pytest
@@ -25,7 +26,8 @@ def controller() -> Iterator[Controller]:
     network = canopen.Network()
     network.connect(interface=BUS.interface, channel=BUS.channel)
     local = network.create_node(1, str(CONTROLLER_EDS))
-    local.sdo[STATE].raw = READY
+    state: Any = local.sdo[STATE]
+    state.raw = READY
     with connect(BUS, 1, 1_000_000) as found:
         found.require(5.0)
         found.sdo.RESPONSE_TIMEOUT = 0.2
