@@ -340,12 +340,17 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     return found.place
 
 
+def _coordinate(value: float) -> str:
+    """A coordinate to 1 nm: with six digits far from zero it would be another place than that of the path."""
+    return f"{round(value, 6) + 0.0:.6f}".rstrip("0").rstrip(".")
+
+
 def _off_the_path(machine: Machine, found: Nearest) -> str:
     """The refusal of axes that stand beside the path. They have left it after the last place in the journal: they are
     sent back there, so that nothing is left out.
     """
     back = found.passed or found
-    point = [number(one) for one in back.point_mm]
+    point = [_coordinate(one) for one in back.point_mm]
     more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
     turned = [
         f"{axis.name} {at}"

@@ -46,6 +46,7 @@ from hodograph.stream.journal import (
     require_same_machine,
 )
 from hodograph.stream.plan import Place, PlannedSection
+from hodograph.stream.resuming import Nearest
 from hodograph.stream.sender import Sender
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -758,3 +759,12 @@ def test_a_job_continues_where_the_axes_rest_and_not_where_they_brake(
     machine = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
     place = _rests_at(_entry(part), machine, parse_address("socketcan:vcan0"), 1.0)
     assert place == Place(0, 3 << 40)
+
+
+def test_the_way_back_to_the_path_is_exact() -> None:
+    """Far from zero too; of axes that stand off the path the last place in the journal is named, not the nearest."""
+    passed = Nearest(Place(0, 0), 4, (1234.567891, -0.0000004, -0.5), 3.0)
+    found = Nearest(Place(0, 5), 6, (1236.0, 0.0, -0.5), 1.5, passed)
+    text = stream_command._off_the_path(_MACHINE, found)
+    assert "--to 1234.567891 0 --z -0.5, then hodograph stream --continue: back to line 4" in text
+    assert "1.5 mm from the path of the job, at line 6" in text
