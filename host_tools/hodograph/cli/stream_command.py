@@ -183,6 +183,12 @@ def _continue(options: Namespace) -> None:
     """Continues the job of the journal."""
     if options.files:
         raise InputError("stream --continue: goes on with the files of the last job: give none")
+    reading = reading_of(options)
+    if options.machine is not None or options.tolerance is not None or reading != ReadOptions():
+        raise InputError(
+            "stream --continue: goes on with the machine, the tolerance and the reading options of the last job: "
+            "give none, or stream the job from its start"
+        )
     file = journal_file(options)
     with journal_lock(file):
         entry = load(file)

@@ -32,6 +32,7 @@ from hodograph.bus.sdo.stream_channel import (
 )
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli import stream_command
+from hodograph.cli.main import main
 from hodograph.cli.stream_command import _free_rate, _rests_at, journal_file
 from hodograph.config import Homing, Machine, Supervision, load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError, RunError
@@ -768,3 +769,16 @@ def test_the_way_back_to_the_path_is_exact() -> None:
     text = stream_command._off_the_path(_MACHINE, found)
     assert "--to 1234.567891 0 --z -0.5, then hodograph stream --continue: back to line 4" in text
     assert "1.5 mm from the path of the job, at line 6" in text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("part.ngc",), ("--tolerance", "0.1"), ("--machine", "mill.toml"), ("--feed", "600")],
+)
+def test_a_job_goes_on_with_its_own_files_and_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    """Others would have no effect, which must not go unsaid."""
+    journal = str(tmp_path / "stream.json")
+    assert main(["stream", "--continue", "--journal", journal, *words]) == 2
+    assert "of the last job: give none" in capsys.readouterr().err
