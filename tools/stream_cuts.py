@@ -549,6 +549,7 @@ class Run:
             return (0,)
         if cut.kind == "power":
             self.rig.controller.kill()
+            self.rig.controller.end()
             self.clock.sleep(min(cut.length_s, 3.0))
             self.rig.start_controller()
             return (0, 4, 5, 6)  # 0: before the command has come to the bus
