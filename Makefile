@@ -121,7 +121,7 @@ VARIANTS := host asan clang fuzz
 
 ## ---- entry points ----------------------------------------------------------------------------
 
-.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all test-repeat unit unit-plain pytest run til faults lint format soak soak-stream bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
+.PHONY: build c dist site wheels $(MACHINES:%=wheel-%) check test test-all test-repeat unit unit-plain pytest run til faults lint format soak soak-stream cuts-stream bench compare butterfly share figures options mutants fuzz clean distclean help lock packages venv FORCE
 
 help: ## this list
 	@echo "make TARGET, from the root of the tree:"
@@ -179,6 +179,9 @@ run: build ## run the alpha and the heart on a CAN bus, write a report to out/, 
 SOAK_S ?= 3600
 soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a quarter at each period), every frame checked
 	@$(PY) tools/soak.py --seconds $(SOAK_S) --json $(BUILD)/soak.json
+CUTS ?= 1-100
+cuts-stream: build ## streamed jobs cut at random instants and continued (CUTS="1-100"): all setpoints on the path, journal, statuses
+	@$(PY) tools/stream_cuts.py --seeds $(CUTS) --json $(BUILD)/stream_cuts.json
 soak-stream: build firmware ## a streamed job of SOAK_S seconds of motion on the emulated M4F in virtual time: setpoints against the offline simulation, memory of both sides
 	@$(PY) tools/stream_soak.py --seconds $(SOAK_S) --json $(BUILD)/stream_soak.json
 

@@ -591,14 +591,22 @@ static bool go_on(struct sdo_server *s, const uint8_t *data, struct can_msg *out
     }
 }
 
-/* A request by all its bits, for an existing object: few segments with such a first byte have this form. */
+/* A read of an index without objects, by which host tools find out whether the server is free
+ * (docs/reference/protocol.md 3.6). */
+static bool is_probe(const uint8_t *data)
+{
+    return data[0] == 0x40u && (data[2] & 0xF0u) == 0x50u && cob_get(data + 4, 4) == 0u;
+}
+
+/* A request by all its bits, for an existing object or a probe: few segments with such a first byte have this form. */
 static bool is_sound_initiate(const struct sdo_server *s, const uint8_t *data)
 {
     const uint8_t first = data[0];
     const bool expedited = (first & 0xF3u) == 0x23u || first == 0x22u;
     const bool known = expedited || first == 0x20u || first == 0x21u || first == 0x40u ||
                        first == 0xA0u || first == 0xA4u || (first & 0xF9u) == 0xC0u;
-    return known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL;
+    return is_probe(data) ||
+           (known && od_find(s->object.od, (uint16_t)cob_get(data + 1, 2), data[3]) != NULL);
 }
 
 /* Within a block: by its number not a segment of this client. (After a loss this may also be one of its segments, if

@@ -311,6 +311,23 @@ static void test_a_second_client_inside_a_block(void)
     TEST_ASSERT_EQUAL_MEMORY(image, talk.small.domain, 100);
 }
 
+/* A client that asks again and again whether the server is free must not keep a transfer alive whose client is gone. */
+static void test_probes_inside_a_block_whose_client_is_gone(void)
+{
+    const uint32_t asked = 8;
+    initiate(300);
+    sdo_talk_segment(&talk, 1, image, 7);
+    for (uint32_t i = 1; i < asked; ++i) {
+        (void)sdo_server_process(&talk.server, TALK_TIMEOUT_US / asked, &talk.answer);
+        TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x40, (uint16_t)(0x5000u + i), (uint8_t)i, 0));
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_LOCAL, sdo_talk_abort_code(&talk));
+    }
+    TEST_ASSERT_TRUE(sdo_server_process(&talk.server, TALK_TIMEOUT_US / asked, &talk.answer));
+    expect_abort(SDO_ABORT_TIMEOUT);
+    TEST_ASSERT_TRUE(sdo_talk_ask(&talk, 0x40, 0x5FFF, 0xFF, 0));
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_NO_OBJECT, sdo_talk_abort_code(&talk));
+}
+
 /* The one request whose number is the next one in the block: the transfer does not survive it, and nobody takes the
  * value. */
 static void test_a_second_client_that_hits_the_next_number(void)
@@ -632,6 +649,7 @@ int main(void)
     RUN_TEST(test_equal_segments_in_blocks_of_one);
     RUN_TEST(test_abort_by_the_client_inside_a_block);
     RUN_TEST(test_a_second_client_inside_a_block);
+    RUN_TEST(test_probes_inside_a_block_whose_client_is_gone);
     RUN_TEST(test_a_second_client_that_hits_the_next_number);
     RUN_TEST(test_a_segment_doubled_on_the_bus_is_taken_once);
     RUN_TEST(test_a_pause_inside_a_block_is_no_loss);

@@ -85,10 +85,11 @@ def run_session(
     with ExitStack() as stack:
         controller = stack.enter_context(connect(address, machine.node, machine.bitrate))
         rig = None
-        if is_virtual(address) and not controller.answers(0.3):
+        answered = is_virtual(address) and controller.answers(0.3)
+        if is_virtual(address) and not answered and not controller.is_heard:
             rig = stack.enter_context(SimulatedMachine(machine, address, pace, controller_program))
             _await_rig(controller, rig, max(wait_s, 5.0))
-        elif not is_virtual(address):
+        elif not answered:
             controller.require(wait_s)
         if rig is None:
             controller.require_standing()
@@ -253,7 +254,7 @@ def rig_until_interrupted(
     if not is_virtual(address):
         raise BusError(f"{address}: not a virtual CAN: a simulated machine stays off real buses")
     with connect(address, machine.node, machine.bitrate) as controller:
-        if controller.answers(0.3):
+        if controller.answers(0.3) or controller.is_heard:
             raise BusError(f"{address}: node {machine.node} is there already: end it first")
         with SimulatedMachine(machine, address, pace, controller_program) as rig:
             _await_rig(controller, rig, 5.0)

@@ -23,6 +23,7 @@ from ..bus.capture.bus_recording import BusRecording
 from ..bus.capture.recordings import check_suffix
 from ..bus.capture.setpoint_check import step_limits
 from ..bus.capture.setpoint_watch import jumps
+from ..bus.goto import SHORTEST_MOVE_MM
 from ..bus.own_bus import opened_bus
 from ..bus.run import RunSession, bring_up
 from ..bus.sdo.controller import connect
@@ -52,7 +53,7 @@ from ..stream.journal import (
 )
 from ..stream.output_check import require_outputs
 from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place, PlanRests
-from ..stream.resuming import nearest_place
+from ..stream.resuming import Nearest, nearest_place
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
@@ -70,6 +71,8 @@ from .output import (
 from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
 
 _EVERY_S = 5.0
+_EXACT_COUNTS = 1.5
+"""Axes that are so near to a place stand at it."""
 _FRAME_BITS, _FRAME_BYTES, _USED = 135, 7, 0.85
 """Bits, with all stuff bits, and bytes of a frame of a block download; share of the free bus that it can use besides
 answers and pauses.
@@ -180,6 +183,12 @@ def _continue(options: Namespace) -> None:
     """Continues the job of the journal."""
     if options.files:
         raise InputError("stream --continue: goes on with the files of the last job: give none")
+    reading = reading_of(options)
+    if options.machine is not None or options.tolerance is not None or reading != ReadOptions():
+        raise InputError(
+            "stream --continue: goes on with the machine, the tolerance and the reading options of the last job: "
+            "give none, or stream the job from its start"
+        )
     file = journal_file(options)
     with journal_lock(file):
         entry = load(file)
@@ -324,19 +333,42 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
         tuple(one / per for one, per in zip(counts, machine.path_counts, strict=True)),
     )
     if found.distance_mm > machine.start_tolerance_mm:
-        point = [number(one) for one in found.point_mm]
-        more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
-        turned = [
-            f"{axis.name} {at}"
-            for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
-        ]
-        along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
-        raise RefusedError(
-            f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
-            f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
-            f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue"
-        )
+        raise RefusedError(_off_the_path(machine, found))
+    scales = machine.path_counts
+    off_counts = max(
+        abs(one - point * per)
+        for one, point, per in zip(counts, found.point_mm, scales, strict=False)
+    )
+    if off_counts > _EXACT_COUNTS and found.distance_mm < SHORTEST_MOVE_MM:
+        # A move this short makes a detour, which would mark the part: a longer one goes back along the path.
+        back_q40 = nearest_q40(2.0 * SHORTEST_MOVE_MM)
+        return replace(found.place, arc_q40=max(found.place.arc_q40 - back_q40, 0))
     return found.place
+
+
+def _coordinate(value: float) -> str:
+    """A coordinate to 1 nm: with six digits far from zero it would be another place than that of the path."""
+    return f"{round(value, 6) + 0.0:.6f}".rstrip("0").rstrip(".")
+
+
+def _off_the_path(machine: Machine, found: Nearest) -> str:
+    """The refusal of axes that stand beside the path. They have left it after the last place in the journal: they are
+    sent back there, so that nothing is left out.
+    """
+    back = found.passed or found
+    point = [_coordinate(one) for one in back.point_mm]
+    more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
+    turned = [
+        f"{axis.name} {at}"
+        for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
+    ]
+    along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
+    return (
+        f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
+        f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
+        f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue: back to line {back.line}, which "
+        "they have passed"
+    )
 
 
 def _free_rate(machine: Machine, address: BusAddress) -> float | None:

@@ -25,7 +25,9 @@ from ..errors import InputError
 VERSION = 4
 
 _BESIDE_Q40 = 1 << 20
-"""2^-20 mm: a rest this close before the start of a section counts as a rest at the start."""
+"""2^-20 mm: a rest this close to the start of a section counts as a rest at the start, where its commands at rest
+follow.
+"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,8 @@ class Entry:
         for number, begin_q40 in self.starts:
             if begin_q40 <= arc_q40 + _BESIDE_Q40:
                 section, start_q40 = number, begin_q40
-        return section, max(arc_q40 - start_q40, 0)
+        within_q40 = arc_q40 - start_q40
+        return section, within_q40 if within_q40 > _BESIDE_Q40 else 0
 
 
 def mark(file: Path) -> FileMark:
@@ -192,7 +195,7 @@ def load(file: Path) -> Entry:
         ) from None
     except OSError as error:
         raise InputError(f"{file}: the journal cannot be read: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError):
         raise InputError(f"{file}: is no journal of a streamed job, or it is damaged") from None
     if entry.done:
         raise InputError(f"{file}: the last job came to its end: nothing to continue")

@@ -33,6 +33,7 @@ from .geometry import Block
 from .reading import StreamReader, StreamSection
 
 _Point = NDArray[np.float64]
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
 _PR_SET_PDEATHSIG = 1
 """Of prctl(2)."""
 
@@ -134,11 +135,13 @@ def _unknown() -> None:
 def _started(
     reader: StreamReader, source: Connection, sink: Connection
 ) -> multiprocessing.context.ForkProcess:
-    """The process that reads. Ctrl-C is for this one alone: the signal stays blocked there."""
+    """The process that reads. Ctrl-C is for this one alone: the signal stays blocked there. The others are blocked
+    until the handlers of this one have been removed there.
+    """
     process = multiprocessing.get_context("fork").Process(
         target=_read, args=(reader, source, sink), daemon=True
     )
-    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, *_ENDING))
     try:
         process.start()
     finally:
@@ -150,9 +153,10 @@ def _started(
 def _read(reader: StreamReader, source: Connection, sink: Connection) -> NoReturn:
     """Sends all items of a reader."""
     _end_with_parent()
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in _ENDING:
         if callable(signal.getsignal(number)):
             signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
     source.close()
     known = len(reader.notes)
 

@@ -34,17 +34,23 @@ _ALIKE_MM = 2e-6
 leaving it out.
 """
 
+_START_MM = 1e-5
+
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """A place of a job with its source line, its point in machine coordinates, and its distance from the axes."""
+    """A place of a job with its source line, its point in machine coordinates, and its distance from the axes.
+
+    passed  the last place in the journal, which the axes have passed
+    """
 
     place: Place
     line: int
     point_mm: tuple[float, ...]
     distance_mm: float
+    passed: Nearest | None = None
 
 
 def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Nearest:
@@ -58,6 +64,7 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
     offset_mm = np.array(job.machine.offset_mm[: len(at_mm)])
     at = np.array(at_mm) - offset_mm
     found: list[Nearest] = []
+    passed: Nearest | None = None
     for number, blocks, standing_mm in _sections(job):
         if number > max(starts):
             break
@@ -70,12 +77,16 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
                 high = (entry.committed_q40 - start_q40) * MM_PER_Q40 + _BESIDE_MM - begin_mm
                 if high > 0.0 and low < length_mm:
                     own = at[len(standing_mm) :]
-                    arcs = _nearest_arcs(block.curve, own, max(low, 0.0), min(high, length_mm))
+                    low, high = max(low, 0.0), min(high, length_mm)
+                    arcs = _nearest_arcs(block.curve, own, low, high)
+                    if passed is None:
+                        place = _place(number, begin_mm + low)
+                        passed = _found(block, low, place, at, standing_mm)
                     found += [
                         _found(
                             block,
                             arc,
-                            Place(number, nearest_q40(begin_mm + arc)),
+                            _place(number, begin_mm + arc),
                             at,
                             standing_mm,
                         )
@@ -88,7 +99,17 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
         )
     least = min(one.distance_mm for one in found) + _ALIKE_MM
     nearest = next(one for one in found if one.distance_mm <= least)
-    return replace(nearest, point_mm=tuple((np.array(nearest.point_mm) + offset_mm).tolist()))
+    assert passed is not None
+    return replace(_moved(nearest, offset_mm), passed=_moved(passed, offset_mm))
+
+
+def _place(section: int, arc_mm: float) -> Place:
+    """A place at the start, within the rounding of positions, is the start: commands at rest follow there."""
+    return Place(section, nearest_q40(arc_mm) if arc_mm > _START_MM else 0)
+
+
+def _moved(found: Nearest, offset_mm: Real) -> Nearest:
+    return replace(found, point_mm=tuple((np.array(found.point_mm) + offset_mm).tolist()))
 
 
 def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float, ...]]]:

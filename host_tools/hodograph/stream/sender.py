@@ -32,7 +32,7 @@ from ..bus.sdo.stream_channel import (
     stream_status,
 )
 from ..config import Machine
-from ..errors import HodographError, PlanError, RunError
+from ..errors import HodographError, PlanError, RefusedError, RunError
 from ..fixed_point import nearest_q40
 from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
 from ..native.program import NativeLimits, NativeProgram
@@ -148,6 +148,8 @@ class Sender:
     _done_s: float = 0.0
     """Motion of finished jobs of the controller."""
     _ahead: deque[PlannedSection] = field(default_factory=deque)
+    _noted: int = -1
+    """The section in the journal."""
     _unplanned: HodographError | None = None
     """The error that ended the planning. What was sent before it is still executed."""
 
@@ -222,11 +224,15 @@ class Sender:
         self._to_start(section, chunk)
         execute_at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(section, chunk)
+        self._note_begin(section, chunk)
+        close_stream(self.at.controller)
+        self._stream(chunk.header.job)
+
+    def _note_begin(self, section: PlannedSection, chunk: Chunk) -> None:
+        """Writes the place where a job of the controller begins to the journal."""
         begin_q40 = chunk.header.job_start_q40
         self._ahead = deque([section])
         self._note_place(first=section.number, arc_q40=begin_q40, committed_q40=begin_q40)
-        close_stream(self.at.controller)
-        self._stream()
 
     @property
     def _section(self) -> PlannedSection:
@@ -236,8 +242,12 @@ class Sender:
     def _note_place(self, *coming: PlannedSection, **changes: int) -> None:
         """Writes the place of the job to the journal; `coming`: a section whose first chunk is sent next."""
         if self.journal is not None:
+            section = self._section.number
             starts = tuple((one.number, one.start_q40) for one in (*self._ahead, *coming))
-            self.journal.update(section=self._section.number, starts=starts, **changes)
+            if section != self._noted:  # the arc length in the journal is that in another section
+                self._noted = section
+                changes.setdefault("arc_q40", 0)
+            self.journal.update(section=section, starts=starts, **changes)
 
     def _to_start(self, section: PlannedSection, chunk: Chunk) -> None:
         """Moves the axes to the start of a section, unless they stand there."""
@@ -248,11 +258,13 @@ class Sender:
         start = program_start_counts(program, self.machine, self.kernel, section.standing_mm)
         off = np.abs(np.subtract(self.at.controller.targets(len(start)), start)).max()
         if off > _START_COUNTS:
+            # Before the move: if this process is killed during it, the axes end at this start, not at the last job.
+            self._note_begin(section, chunk)
             close_stream(self.at.controller)
             goto(self.at.controller, self.machine, start, unhomed=self.unhomed)
 
-    def _stream(self) -> None:
-        """Sends the chunks of a job and waits for its end."""
+    def _stream(self, job: int) -> None:
+        """Sends the chunks of the job of this number and waits for its end."""
         controller = self.at.controller
         follower = Follower(controller, self.at.note)
         self._underruns_before, self._underruns = self._underruns_before + self._underruns, 0
@@ -261,6 +273,8 @@ class Sender:
         while True:
             self._check_bus()
             status = stream_status(controller) if sent else None
+            if status is not None and status.job != job:
+                raise self._lost()
             if started and status is not None:
                 self._pass_sections(status)
                 self._report(status)
@@ -364,8 +378,14 @@ class Sender:
         coming = () if header.rest is None else (section,)
         committed_q40 = header.job_start_q40 + chunk.program.length_q40
         self._note_place(*coming, committed_q40=committed_q40)
-        if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
-            return None
+        try:
+            if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
+                return None
+        except RefusedError:
+            kept = status is None or stream_status(self.at.controller).job == header.job
+            if kept and self.at.controller.state() not in (BOOT, OFF):
+                raise
+            raise self._lost() from None
         self._sending_s += self.at.controller.clock.now_s() - begun_s
         self._job_number = header.job
         self._next += 1
@@ -374,6 +394,13 @@ class Sender:
         if header.rest is not None:
             self._ahead.append(section)
         return header.last
+
+    def _lost(self) -> RunError:
+        return RunError(
+            f"{self.at.controller.who()} no longer has the job: it has restarted (the drives have stopped by "
+            "themselves), or another command has closed the job: hodograph status, hodograph home if axes are homed, "
+            "then hodograph stream --continue"
+        )
 
     def _slow_down(self) -> None:
         """Lowers the feed override if the bus carries fewer bytes than the job needs."""

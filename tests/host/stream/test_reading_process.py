@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import multiprocessing.util
 import os
 import signal
 import subprocess
@@ -165,3 +166,28 @@ def test_interrupt_is_not_for_the_process_that_reads(wave: Path, machine: Machin
     os.kill(process.pid, signal.SIGINT)
     first, second = next(section.blocks), next(section.blocks)
     assert first.line[0] < first.line[-1] <= second.line[0]
+
+
+def test_process_that_is_ended_while_it_starts_says_nothing(
+    wave: Path,
+    machine: Machine,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """The handlers of the command would raise their exception in it, as a traceback on the terminal."""
+
+    def terminate(number: int, frame: object) -> None:
+        raise KeyboardInterrupt
+
+    def early() -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    monkeypatch.setattr(multiprocessing.util, "_close_stdin", early)
+    try:
+        reader = StreamReader(wave, machine, 0.01, ReadOptions())
+        with pytest.raises(HodographError, match="the process that reads it has ended"):
+            next(ParallelReader(reader).sections())
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert capfd.readouterr().err == ""

@@ -71,6 +71,26 @@ def test_nearest_places(
     assert abs(off - found.distance_mm) < 1e-9
 
 
+def test_the_way_back_leaves_nothing_out(job: JobFiles) -> None:
+    """Axes that coasted beyond a corner are nearest to a place that the motion has not come to."""
+    found = nearest_place(job, _entry(0, 9.0, 25.0), (10.5, 1.0, 0.0))
+    assert (found.place.section, found.passed is not None) == (1, True)
+    assert found.passed is not None
+    assert found.passed.place.section == 0
+    np.testing.assert_allclose(found.passed.point_mm, (8.99, 0.0, 0.0), atol=1e-6)
+    assert found.passed.line == 3
+
+
+def test_a_place_at_the_start_of_a_section_is_its_start(job: JobFiles) -> None:
+    """Otherwise its program stop or tool change would be passed over."""
+    starts = ((2, 0),)
+    entry = Entry((), "", {}, 1, 2, 0, 5 * Q40, first=2, starts=starts)
+    found = nearest_place(job, entry, (10.0 - 1e-6, 10.0, 0.0))
+    assert (found.place.section, found.place.arc_q40) == (2, 0)
+    assert entry.place_at(1 << 20) == (2, 0)
+    assert entry.place_at(1 << 30) == (2, 1 << 30)
+
+
 def test_work_offset(job: JobFiles, machine: Machine) -> None:
     moved = replace(job, machine=replace(machine, offset_mm=(5.0, -3.0, 1.0)))
     found = nearest_place(moved, _entry(0, 1.0, 10.0), (9.0, -3.0, 1.0))

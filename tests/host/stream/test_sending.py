@@ -32,6 +32,7 @@ from hodograph.bus.sdo.stream_channel import (
 )
 from hodograph.bus.sdo.upload import ABORT_VALUE_RANGE
 from hodograph.cli import stream_command
+from hodograph.cli.main import main
 from hodograph.cli.stream_command import _free_rate, _rests_at, journal_file
 from hodograph.config import Homing, Machine, Supervision, load_machine
 from hodograph.errors import BusError, InputError, PlanError, RefusedError, RunError
@@ -46,6 +47,7 @@ from hodograph.stream.journal import (
     require_same_machine,
 )
 from hodograph.stream.plan import Place, PlannedSection
+from hodograph.stream.resuming import Nearest
 from hodograph.stream.sender import Sender
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -266,6 +268,7 @@ def test_no_journal(tmp_path: Path) -> None:
         ("machine", 1),
         ("files", 3),
         ("starts", [1]),
+        ("starts", [[0, float("inf")]]),
     ],
 )
 def test_a_journal_with_a_wrong_value_is_refused(tmp_path: Path, key: str, value: object) -> None:
@@ -471,6 +474,61 @@ def test_the_journal_has_the_end_of_a_chunk_before_it_is_sent(
     assert known["committed_q40"] == 130
 
 
+def test_the_arc_length_in_the_journal_is_that_of_its_section() -> None:
+    """Not that of the section before, which is the last one that was reported."""
+    known: dict[str, object] = {}
+    sender = _sender_of_one_chunk(SimpleNamespace(update=known.update))
+    sender._ahead.append(PlannedSection(1, Path("part.ngc"), 2, (), start_q40=5 << 40))
+    sender._note_place(arc_q40=4 << 40)
+    sender._note_place(committed_q40=7 << 40)
+    assert (known["section"], known["arc_q40"]) == (0, 4 << 40)
+    sender._ahead.popleft()
+    sender._note_place(committed_q40=9 << 40)
+    assert (known["section"], known["arc_q40"]) == (1, 0)
+    sender._note_place(arc_q40=2 << 40)
+    sender._note_place(committed_q40=10 << 40)
+    assert (known["section"], known["arc_q40"]) == (1, 2 << 40)
+
+
+@pytest.mark.parametrize(("job", "state"), [(0, RUNNING), (JOB + 1, RUNNING), (JOB, OFF)])
+def test_a_chunk_that_is_refused_because_the_controller_has_lost_the_job(
+    monkeypatch: pytest.MonkeyPatch, job: int, state: int
+) -> None:
+    """The motion does not rest on the path then: the message must not say so."""
+
+    def refused(*_: object) -> bool:
+        raise RefusedError("of another job: the motion rests on the path")
+
+    monkeypatch.setattr("hodograph.stream.sender.send_chunk", refused)
+    monkeypatch.setattr(
+        "hodograph.stream.sender.stream_status", lambda _: replace(_status(OPEN), job=job)
+    )
+    sender = _sender_of_one_chunk(None)
+    controller: Any = sender.at.controller
+    controller.state = lambda: state
+    controller.who = lambda: "node 1"
+    with pytest.raises(RunError, match=r"no longer has the job: .*--continue"):
+        sender._send_one(replace(_status(OPEN), free_bytes=100))
+    controller.state = lambda: RUNNING
+    monkeypatch.setattr("hodograph.stream.sender.stream_status", lambda _: _status(OPEN))
+    with pytest.raises(RefusedError, match="of another job"):
+        sender._send_one(replace(_status(OPEN), free_bytes=100))
+
+
+def test_a_job_that_the_controller_loses_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its power was gone for a moment."""
+    sender = _sender_of_one_chunk(None)
+    controller: Any = sender.at.controller
+    controller.who = lambda: "node 1"
+    found = iter([_status(OPEN), replace(_status(OPEN), job=0)])
+    monkeypatch.setattr("hodograph.stream.sender.stream_status", lambda _: next(found))
+    monkeypatch.setattr(Sender, "_check_bus", lambda _: None)
+    monkeypatch.setattr(Sender, "_send_one", lambda *_: False)
+    monkeypatch.setattr(Sender, "_may_start", lambda *_: False)
+    with pytest.raises(RunError, match="no longer has the job"):
+        sender._stream(JOB)
+
+
 def test_underruns_of_all_jobs_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The controller counts those of each job from 0."""
     sender = _sender_of_one_chunk(None)
@@ -481,7 +539,7 @@ def test_underruns_of_all_jobs_are_counted(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(Sender, "_check_bus", over)
     for underruns in (3, 2):
         with pytest.raises(InterruptedError):
-            sender._stream()
+            sender._stream(JOB)
         sender._note_underruns(_status(OPEN, underruns), 0.0)
     assert sender._underruns_before + sender._underruns == 5
 
@@ -702,3 +760,25 @@ def test_a_job_continues_where_the_axes_rest_and_not_where_they_brake(
     machine = load_machine(ROOT / "examples" / "machines" / "paper_alpha.toml")
     place = _rests_at(_entry(part), machine, parse_address("socketcan:vcan0"), 1.0)
     assert place == Place(0, 3 << 40)
+
+
+def test_the_way_back_to_the_path_is_exact() -> None:
+    """Far from zero too; of axes that stand off the path the last place in the journal is named, not the nearest."""
+    passed = Nearest(Place(0, 0), 4, (1234.567891, -0.0000004, -0.5), 3.0)
+    found = Nearest(Place(0, 5), 6, (1236.0, 0.0, -0.5), 1.5, passed)
+    text = stream_command._off_the_path(_MACHINE, found)
+    assert "--to 1234.567891 0 --z -0.5, then hodograph stream --continue: back to line 4" in text
+    assert "1.5 mm from the path of the job, at line 6" in text
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("part.ngc",), ("--tolerance", "0.1"), ("--machine", "mill.toml"), ("--feed", "600")],
+)
+def test_a_job_goes_on_with_its_own_files_and_options(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    """Others would have no effect, which must not go unsaid."""
+    journal = str(tmp_path / "stream.json")
+    assert main(["stream", "--continue", "--journal", journal, *words]) == 2
+    assert "of the last job: give none" in capsys.readouterr().err

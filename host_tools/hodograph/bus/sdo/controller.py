@@ -34,7 +34,7 @@ from ..diagnostics.texts import (
 from ..signals import interrupts_ignored
 from .configuration import configuration, configuration_crc32
 from .network import open_network
-from .node import IDENTITY_OBJECT, NO_OBJECT, Node
+from .node import BROKEN, IDENTITY_OBJECT, NO_OBJECT, Node
 from .objects import (
     AT_ONCE,
     AXIS_NODE,
@@ -219,6 +219,9 @@ class Controller(Node):
             else:
                 self.patiently(index, sub, lambda: self._put(index, sub, value))
         except SdoAbortedError as error:
+            if error.code in BROKEN:
+                self._require_executed(command, error)
+                return
             self.moved = moved
             if index == NAMED_START and error.code in NO_OBJECT:
                 raise
@@ -231,7 +234,9 @@ class Controller(Node):
             self._require_executed(command, error)
 
     def _require_executed(self, command: int, cause: Exception) -> None:
-        """After a lost answer. Raises BusError: the state does not show that the command has been executed."""
+        """After a lost answer, or a transfer that broke off. Raises BusError: the state does not show that the command
+        has been executed.
+        """
         state = self.state()
         if state in _EXECUTED.get(command, ()):
             return

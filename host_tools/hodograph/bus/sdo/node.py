@@ -54,6 +54,8 @@ _AGAIN_S = 0.25
 """Time after which `write_at_once` sends a request without answer again."""
 AGAIN_S = 1.0
 """A request without an answer for this long is repeated once: a ring of chunks may hold little more motion."""
+BROKEN = (0x05030000, 0x05040000, 0x05040001)
+"""Aborts of a server in another state of the transfer than the client: toggle bit, time-out, unexpected command."""
 _T = TypeVar("_T")
 
 
@@ -129,6 +131,7 @@ class Node:
         self._left_s: float | None = None
         """The remaining time of a request; None: it has no limit of its own."""
         self._identified = False
+        self._remote = node
         self.sdo: Any = node.sdo
         self.sdo.RESPONSE_TIMEOUT = 3.0
         self._answers = self.sdo.responses = _Answers(self.sdo.responses)
@@ -241,7 +244,7 @@ class Node:
         return _nowhere(int.from_bytes(os.urandom(3), "little"))
 
     def read(self, index: int, sub: int | None = None) -> int:
-        """An integer object. A lost answer is asked for again, once."""
+        """An integer object. If the answer is lost, or the transfer broke off, it is asked for again, once."""
 
         def action() -> int:
             return int(self._variable(index, sub).raw)
@@ -260,9 +263,23 @@ class Node:
         self._variable(index, sub).raw = value
 
     def _twice(self, index: int, sub: int | None, action: Callable[[], _T]) -> _T:
-        with suppress(SdoCommunicationError, _SilentError), self._patience(AGAIN_S):
+        with self.broken_ignored(), self._patience(AGAIN_S):
             return self.patiently(index, sub, action)
         return self.patiently(index, sub, action)
+
+    @contextmanager
+    def broken_ignored(self) -> Iterator[None]:
+        """Ignores that a transfer broke off: no answer, or one to a transfer that the server has ended meanwhile, as
+        after this process was stopped for a while.
+        """
+        try:
+            yield
+        except (SdoCommunicationError, _SilentError):
+            self._under_way = True
+        except SdoAbortedError as error:
+            if error.code not in BROKEN:
+                raise
+            self._under_way = True
 
     @contextmanager
     def _patience(self, most_s: float) -> Iterator[None]:
@@ -344,7 +361,7 @@ class Node:
                 try:
                     self._left_s = max(deadline - self.clock.now_s(), 0.001)
                     with self.turn(turn_wait_s, min(turn_wait_s, BUSY_S)):
-                        self._variable(STATE, None).raw  # noqa: B018
+                        self._read_in_turn(STATE, None)
                     self._check_identity()
                     return True
                 except SdoAbortedError as error:
@@ -362,6 +379,19 @@ class Node:
         finally:
             self.sdo.RESPONSE_TIMEOUT, self._left_s = patience, None
 
+    def _read_in_turn(self, index: int, sub: int | None) -> int:
+        """An integer object, inside `turn`; answers about others are discarded."""
+        self._answers.asked = _frame_bytes(index, sub)
+        try:
+            return int(self._variable(index, sub).raw)
+        finally:
+            self._answers.asked = b""
+
+    @property
+    def is_heard(self) -> bool:
+        """Whether a heartbeat of the node has come: it is there, though it may not answer."""
+        return self._remote.nmt.timestamp is not None
+
     def _check_identity(self) -> None:
         """Raises BusError when the node is not what the EDS file describes."""
         if self._identified:
@@ -369,8 +399,8 @@ class Node:
         for sub, name, kept in IDENTITY:
             wanted = int(self.sdo.od[IDENTITY_OBJECT][sub].default or 0) >> kept
             with self.turn():
-                found = int(
-                    self._variable(IDENTITY_OBJECT, sub).raw
+                found = self._read_in_turn(
+                    IDENTITY_OBJECT, sub
                 )  # the caller decides about a slow answer
             if found >> kept != wanted:
                 raise BusError(

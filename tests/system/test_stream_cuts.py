@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: MIT
+"""Streamed jobs that are cut at random instants, and continued: a few seeds of tools/stream_cuts.py."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from marks import long  # noqa: E402
+from stream_cuts import KINDS, away_um, draw, run_case  # noqa: E402
+
+
+@pytest.mark.parametrize(("seed", "kind"), [(131, "kill"), *(long(7, kind) for kind in KINDS)])
+def test_a_job_that_is_cut_comes_to_its_end_on_its_path(seed: int, kind: str) -> None:
+    found = run_case(draw(seed, (kind,)))
+    assert not found.troubles, "\n".join([*found.troubles, *found.said])
+
+
+@pytest.mark.long
+def test_many_kinds_in_one_job() -> None:
+    for seed in range(1, 11):
+        found = run_case(draw(seed))
+        assert not found.troubles, "\n".join([str(found.case), *found.troubles, *found.said])
+
+
+def test_what_is_off_the_path_or_left_out_is_found() -> None:
+    """Of a square with 1000 points a side, in counts."""
+    side = np.linspace(0.0, 1e6, 1000)
+    nothing, whole = np.zeros(1000), np.full(1000, 1e6)
+    path = np.concatenate(
+        [np.stack(pair, axis=1) for pair in ((side, nothing), (whole, side), (side[::-1], whole))]
+    )
+    slower = path[np.repeat(np.arange(len(path)), 3)]
+    assert away_um(slower, path) < 1e-9
+    aside = slower.copy()
+    aside[1500, 1] += 5000.0
+    assert 4.9 < away_um(aside, path) < 5.1
+    cut = np.delete(slower, range(2800, 3200), axis=0)  # over the corner
+    assert away_um(path, cut) > 1.0
