@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Splines in space: convergence and bending over random walks, order of approximation, criteria, time.
+"""Measures splines in space: convergence and bending on random walks, order of approximation, criteria, time.
 
     python benchmarks/spatial.py [--json OUT] [--paths N]
 
-Run by `make bench`.
+Run by `make bench`. Prints the figures and writes them to OUT as one JSON object.
 
-Campaigns: N (200) random walks, seeds 0 … N - 1 of tests/host/spline/polygons.py, for each kind of knots. Prints the
-figures and writes them as one JSON object.
+Random walks are those of tests/host/spline/polygons.py with seeds 0 … N - 1 (N = 200). Splines through their points are
+made with each kind of knots, and splines with them as control polygon. The criteria are compared on N / 10 walks.
 """
 
 from __future__ import annotations
@@ -47,10 +47,11 @@ from hodograph.spline.spatial.system import SpaceSystem, cubic_end  # noqa: E402
 
 Real = np.ndarray[Any, np.dtype[np.float64]]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
+"""Quadrature of a span for `energies`, on -1 … 1."""
 
 
 def campaign(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[str, Any]:
-    """Convergence and bending over seeds 0 … count - 1."""
+    """Convergence and bending of the splines that `attempt` makes of seeds 0 … count - 1."""
     found, refused = [], 0
     for seed in range(count):
         try:
@@ -70,7 +71,11 @@ def campaign(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[
 
 
 def campaigns(count: int) -> dict[str, Any]:
-    """Walks of even legs, and of log-normal ones, turning by up to 90, 120 and 180 degrees."""
+    """Figures of `campaign` for walks that turn by up to 90, 120 and 180 degrees at each point.
+
+    The legs of a walk have uniformly distributed lengths of 3 to 15 mm ("even"), or log-normal ones ("sigma_…"). Those
+    of control polygons are "even".
+    """
     out: dict[str, Any] = {}
     for degrees in (90, 120, 180):
         for sigma in (None, 1.0, 2.0, 3.0):
@@ -96,7 +101,7 @@ def campaigns(count: int) -> dict[str, Any]:
 
 
 def helix_errors() -> dict[str, Any]:
-    """Greatest errors in the middle half of two turns of a helix."""
+    """Greatest errors of splines through points of a helix of two turns, in the middle half of their length."""
     out = {}
     for per_turn in (16, 32, 64, 128):
         spline = spatial_through_points(helix(per_turn), False).spline
@@ -111,7 +116,10 @@ def helix_errors() -> dict[str, Any]:
 
 
 def distance_from(spline: SpatialPHSpline, exact: Real) -> float:
-    """Greatest distance (mm) of the spline from a curve given by many points, its tangents taken from them."""
+    """Greatest distance (mm) of the spline from a curve that is given by many points (`exact`).
+
+    It is measured at 8001 places of the spline, as the distance from the tangent of the curve at its nearest point.
+    """
     along = np.gradient(exact, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     p = spline.point(np.linspace(0, spline.length_mm, 8001))
@@ -120,7 +128,7 @@ def distance_from(spline: SpatialPHSpline, exact: Real) -> float:
 
 
 def knot_errors() -> dict[str, float]:
-    """Distance (mm) of splines through points of the trefoil from it."""
+    """Distance (mm) from the trefoil of splines through 24 to 384 of its points."""
     exact = torus_knot(400_000)
     exact = np.vstack((exact[-9:], exact, exact[:9]))
     return {
@@ -134,9 +142,9 @@ def knot_errors() -> dict[str, float]:
 def published() -> SpatialPHSpline:
     """A PH quintic with the end points and directions of Farouki (2019), example 1, and arc length 1.25.
 
-    Farouki, Giannelli, Manni and Sestini (2008), equations (47) to (55), give the quintics with these ends. Both free
-    angles are chosen here (nearest in the fibre), so this is not the curve of a printed figure. Bisection on the arc
-    length finds the end speed.
+    Farouki, Giannelli, Manni and Sestini (2008), equations (47) to (55), give the quintics with these ends. They have
+    two free angles. Here each angle makes a root the nearest one of its fibre to other roots (`phase_between`), so this
+    is not the curve of a printed figure. The parametric speed at both ends is found by bisection on the arc length.
     """
     angles = ((0.65 * np.pi, -0.25 * np.pi), (0.25 * np.pi, 0.25 * np.pi))
     tangents = np.array(
@@ -161,7 +169,10 @@ def published() -> SpatialPHSpline:
 
 
 def published_errors() -> dict[str, float]:
-    """Distance of splines through points of the published curve from it, end tangents given."""
+    """Figures of the curve `published`, and of splines through its points with its end tangents.
+
+    Of the splines: distance from the curve, and bending energy.
+    """
     curve = published()
     exact = curve.position(np.zeros(400_001, dtype=int), np.linspace(0, 1, 400_001))
     out: dict[str, float] = {
@@ -179,7 +190,7 @@ def published_errors() -> dict[str, float]:
 
 
 def system_through(p: Real) -> SpaceSystem:
-    """The system of an open path with cubic ends and chord-length knots."""
+    """The equations of the spline through the points of an open path, with cubic ends and chord-length knots."""
     knots = knot_spans(np.linalg.norm(np.diff(p, axis=0), axis=1), "chord", False)
     free = SpaceEnd("cubic", None)
     guide = points_guide(p, False, free, free, knots)
@@ -199,7 +210,10 @@ def energies(preimage: Real) -> tuple[float, float]:
 
 
 def compare(p: Real) -> dict[str, tuple[float, float]]:
-    """Energies by four criteria for the freedom that interpolation leaves, the phases of the frame."""
+    """Energies of splines through the same points by four criteria.
+
+    Interpolation leaves one unknown for each span, the phase of its frame. Each criterion chooses all phases.
+    """
     system = system_through(p)
 
     def solution(phases: Real) -> tuple[SpaceSystem, Any]:
@@ -237,7 +251,10 @@ def compare(p: Real) -> dict[str, tuple[float, float]]:
 
 
 def criteria(count: int) -> dict[str, Any]:
-    """Median energies over those of the guide's frame, over short walks with turns of up to 60 and 120 degrees."""
+    """Medians of the energies of each criterion, divided by those of the guide's frame.
+
+    They are taken over the first 9 points of walks that turn by up to 60 and 120 degrees.
+    """
     out: dict[str, Any] = {}
     for degrees in (60, 120):
         rows = [compare(walk(seed, np.radians(degrees))[:9]) for seed in range(count)]
@@ -255,7 +272,7 @@ def criteria(count: int) -> dict[str, Any]:
 
 
 def speed() -> dict[str, float]:
-    """Least of three wall times, s."""
+    """Wall times (s), each the least of three runs; of the random walk, the time and iterations of one run."""
     out = {}
     for count in (1000, 10_000, 100_000):
         long = count / 24 * torus_knot(count, 2, 9)
@@ -279,7 +296,7 @@ def speed() -> dict[str, float]:
 
 
 def main() -> None:
-    """Entry point."""
+    """Measures, prints and writes."""
     parser = figures_parser(__doc__)
     parser.add_argument("--paths", type=int, default=200)
     options = parser.parse_args()

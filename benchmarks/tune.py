@@ -1,20 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Measures the contour error of simulated drives with the loops of the paper and with tuned ones: at SYNCs, between
-SYNCs, where the plant differs from its model, and where the plant is identified from noisy positions.
+"""Measures the contour error of simulated drives with the paper's loops and tuned ones, and errors of identification.
 
 Run by `make bench`. Uses no bus; writes the file of --json and temporary path files.
 
-Paths: alpha and heart, at the paper's feed and in the least time within all limits. Loops:
+Paths: alpha and heart, at the paper's feed and in the least time within all limits. There are three groups of figures:
+
+contour      Contour errors at SYNCs and between them. For those between SYNCs, this file simulates the drives again,
+             one servo sample after the other. It also counts the samples at the voltage limit.
+sensitivity  Contour errors where the plant differs from its model. Optimal feeds are planned for 4.5 V, as in the
+             examples, and for 3.5 V.
+identify     Errors of the plant that is identified from noisy positions and voltages.
+
+Loops in the first group:
 
 - the paper's
 - tuned: examples/machines/tuned.toml
 - the tuned poles, in drives that interpolate setpoints by straight lines
-- poles that `tune` finds for such drives
+- poles that `hodograph tune` found for such drives
 - the tuned poles, in drives whose speed is a difference of encoder positions and whose voltage acts one servo sample
   late
 
-Between SYNCs this file simulates the drives again, servo sample by servo sample, and counts the samples at the voltage
-limit. With another plant than the modelled one, optimal feeds are planned for 4.5 V, as in the examples, and for 3.5 V.
+Loops in the second group: the paper's, and the tuned ones with and without feedforward.
 """
 
 from __future__ import annotations
@@ -44,10 +50,11 @@ PATHS = ("alpha", "heart", "alpha_optimal", "heart_optimal")
 TUNED_HZ, TUNED_DAMPING = 214.5, 0.85
 """Bandwidth and damping that `hodograph tune` found for tuned.toml."""
 LINES_HZ, LINES_DAMPING = 155.8, 0.6
-"""The same for straight lines, on all four paths."""
+"""The same for drives that interpolate setpoints by straight lines, found for all four paths."""
 WEAKER_VOLTS = 3.5
-"""Of the drives' 5 V: what a plan leaves is for plants that are weaker than their model."""
+"""Voltage limit of a plan. The drives have 5 V; the difference is a margin for plants with less gain than the model."""
 SEEDS, NOISE_COUNTS, NOISE_MV = 10, 20.0, 10.0
+"""Identification: number of noise seeds, and standard deviations of the noise of positions and of voltages."""
 
 Float = NDArray[np.float64]
 Drives = tuple[Drive, Drive]
@@ -55,7 +62,7 @@ Forward = tuple[Feedforward, Feedforward] | None
 
 
 def forward_of(machine: Machine) -> Forward:
-    """The feedforward of its axes x and y."""
+    """The feedforward of the axes x and y of a machine; None: it has none."""
     if machine.path_feedforward is None:
         return None
     x, y = machine.path_feedforward
@@ -63,7 +70,7 @@ def forward_of(machine: Machine) -> Forward:
 
 
 def loops() -> dict[str, tuple[Drives, Forward]]:
-    """Drives and feedforward by name, but the paper's, which each path has its own of."""
+    """Drives and feedforward of all loops but the paper's, by name. The paper's loop depends on the path."""
     machine, example = (load_machine(MACHINES / f"{n}.toml") for n in ("paper_alpha", "tuned"))
     x, y = example.models(example.path_axes)
     late = [replace(drive, speed="differences", delay_samples=1) for drive in (x, y)]
@@ -83,8 +90,11 @@ def loops() -> dict[str, tuple[Drives, Forward]]:
 def between_um(
     pipeline: Pipeline, motion: Motion, drives: Drives, forward: Forward
 ) -> dict[str, float]:
-    """Greatest distance of the true position from the curve at any servo sample; how far this model is off at SYNCs;
-    samples of both axes at the voltage limit.
+    """Figures of a run from a second simulation, in which each servo sample is known.
+
+    contour_um        greatest distance of the true position from the curve at any servo sample
+    off_um            greatest difference of an axis from the position in `motion` at a SYNC
+    at_limit_percent  share of the servo samples of both axes at the voltage limit
     """
     places, at_limit = zip(
         *(_axis(motion, axis, drives[axis], forward) for axis in range(2)), strict=True
@@ -96,7 +106,7 @@ def between_um(
     parts = np.arange(1, per + 1) / per
     arcs = np.rint(before[:, None] + (arc - before)[:, None] * parts).astype(np.int64)
     contour = Contour(NativeProgram(pipeline.image))
-    fine = 8_000_000  # counts a mm, so that rounding does not count
+    fine = 8_000_000  # counts per mm, so fine that rounding does not matter
     positions = np.stack([np.rint(p.ravel() * fine).astype(np.int32) for p in places], axis=1)
     errors = contour.errors_um(arcs.ravel(), positions, fine)
     at_sync = np.stack([p[:, -1] for p in places], axis=1) - motion.act_mm
@@ -108,8 +118,9 @@ def between_um(
 
 
 def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> tuple[Float, int]:
-    """True positions (periods, samples), mm, and how many samples meet the limit: sim/plant in Python, for exact speed
-    and no delay.
+    """True positions (periods, samples) in mm, and the number of samples at the voltage limit.
+
+    This is sim/plant in Python, for drives with exact speed and no delay.
     """
     loop, per = loop_of(drive), drive.loop_rate_hz * motion.period_us // 1_000_000
     step_s, period_s = loop.step_s, motion.period_us * 1e-6
@@ -157,7 +168,7 @@ def _axis(motion: Motion, axis: int, drive: Drive, forward: Forward) -> tuple[Fl
 
 
 def contours() -> dict[str, Any]:
-    """By path and loop."""
+    """Errors and voltage by path and loop. Late drives have no figures between SYNCs."""
     figures: dict[str, Any] = {}
     tuned = loops()
     for name in PATHS:
@@ -179,7 +190,7 @@ def contours() -> dict[str, Any]:
 
 
 def weaker_volts(name: str, folder: Path) -> Path:
-    """The example with less voltage to plan with."""
+    """Writes the path file of an example with voltage limit WEAKER_VOLTS to the folder; returns the file."""
     text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
     file = folder / f"{name}_{WEAKER_VOLTS:g}_v.toml"
     text = text.replace("volts = 4.5", f"volts = {WEAKER_VOLTS:g}")
@@ -188,7 +199,7 @@ def weaker_volts(name: str, folder: Path) -> Path:
 
 
 def sensitivity() -> dict[str, Any]:
-    """Contour errors by path, plant and loop, um, and whether the voltage limit was met."""
+    """Contour errors (um) by path, loop and plant, and whether the voltage limit was reached."""
     figures: dict[str, Any] = {}
     example = load_machine(MACHINES / "tuned.toml")
     x, y = example.models(example.path_axes)
@@ -215,7 +226,7 @@ def sensitivity() -> dict[str, Any]:
 
 
 def plants() -> dict[str, Any]:
-    """Errors of the plants found from noisy reports of the alpha and the heart, %, by friction."""
+    """Errors (%) of the plants that are identified from noisy runs of the alpha and the heart, by path and friction."""
     figures: dict[str, Any] = {}
     for name in ("alpha", "heart"):
         pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
@@ -240,6 +251,7 @@ def plants() -> dict[str, Any]:
 
 
 def _found(motion: Motion, axis: int, truth: Drive, seed: int) -> tuple[list[float], list[float]]:
+    """Relative errors of gain and time constant, and the half widths of their intervals, both over the true value."""
     noise = np.random.default_rng(1000 * axis + seed)
     rows = motion.program_rows
     still = np.zeros(len(rows), dtype=np.int32)
@@ -258,7 +270,7 @@ def _found(motion: Motion, axis: int, truth: Drive, seed: int) -> tuple[list[flo
 
 
 def main() -> None:
-    """Measure and write."""
+    """Measures and writes."""
     out: Path = figures_parser(__doc__, required=True).parse_args().json
     figures = {"contour": contours(), "sensitivity": sensitivity(), "identify": plants()}
     write_figures(out, figures)

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The figure of `make compare`: a corner of the toolpath zigzag by each planner, and its speed and jerk over time. Used
-by peers/compare. Writes the file that it is given.
+"""Draws the figure of `make compare`. It shows three things for each planner: a corner of the toolpath zigzag, and the
+speed and the jerk of x at the beginning of its motion. Used by peers/compare. Writes the file that it is given.
 """
 
 from __future__ import annotations
@@ -20,12 +20,15 @@ from .motion import RATE_HZ, Motion, Real
 
 COLOURS = {"Hodograph": BLUE, "LinuxCNC": ORANGE, "Klipper": RED, "TOPP-RA": GREY, "Ruckig": GREEN}
 CORNER_MM = (10.0, 0.0)
+"""The corner that is drawn: the first of the zigzag."""
 REACH_MM = 0.06
+"""Shown length of the programmed path before and after the corner."""
 SHOWN_S = 0.5
+"""Shown time of speed and jerk, from the start of the motion."""
 
 
 def draw(motions: Mapping[str, Motion], tolerance_mm: float, jerk_mm_s3: float, file: Path) -> None:
-    """Writes the figure (SVG) of the motions of the zigzag, one for each planner."""
+    """Writes the figure as SVG. `motions`: the motion along the zigzag by name of the planner."""
     with styled():
         figure, (corner, speed, jerk) = pyplot.subplots(
             1, 3, figsize=(12.0, 4.0), layout="constrained"
@@ -51,13 +54,13 @@ def draw(motions: Mapping[str, Motion], tolerance_mm: float, jerk_mm_s3: float, 
 
 
 def _over_time(values: Real) -> tuple[Real, Real]:
-    """The beginning of a motion: times and values."""
+    """Times (s) and values in the first SHOWN_S of a motion."""
     shown = values[: int(SHOWN_S * RATE_HZ)]
     return np.arange(shown.size) / RATE_HZ, shown
 
 
 def _draw_corner(axes: Axes, motions: Mapping[str, Motion], tolerance_mm: float) -> None:
-    """The corner in um, with the programmed path and the tolerance around it."""
+    """Draws the setpoints near the corner (um), the programmed path, and a circle with the tolerance as radius."""
     corner = np.array(CORNER_MM)
     legs = 1000.0 * REACH_MM * np.array([[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0]])
     axes.plot(*legs.T, color=INK, linestyle=":", linewidth=1.0)
@@ -65,6 +68,7 @@ def _draw_corner(axes: Axes, motions: Mapping[str, Motion], tolerance_mm: float)
     axes.add_patch(circle)
     for name, motion in motions.items():
         away_um = 1000.0 * (motion.position_mm[:, :2] - corner)
+        # More setpoints than the axes show, so that the lines go on to their edges.
         near = np.flatnonzero(np.abs(away_um).max(axis=1) < 4000.0 * REACH_MM)
         axes.plot(*away_um[near[0] : near[-1] + 1].T, ".-", color=COLOURS[name], markersize=4)
     reach_um = 1000.0 * REACH_MM

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""`make butterfly`: a second published case, the butterfly NURBS, planned with the limits of three published times.
+"""Plans the butterfly NURBS with the limits of three papers, and prints the cycle times next to the published ones.
 
     butterfly.py [--json OUT] [--only ROW ...]
 
-Run by `make butterfly`. Prints to stdout; writes OUT and a temporary drawing.
+Run by `make butterfly`. Prints a row for each paper to stdout; writes OUT (JSON) and a temporary drawing.
 
 Data of the curve: Y. Hu, X. Jiang, G. Huo and others, Int. J. Adv. Manuf. Technol. 129 (2023) 2843-2860. Limits and
 times: K. Erwinski, A. Wawrzak, M. Paprocki, IEEE Trans. Ind. Informatics 18 (2022) 7560-7571, table III and figures 13
-to 15. docs/validation/butterfly.md says what is printed and what is inferred.
+to 15. docs/validation/butterfly.md lists what is printed there, and what is inferred.
 """
 
 from __future__ import annotations
@@ -41,15 +41,20 @@ INNER_KNOTS = """\
 0.9850 0.9917
 """
 WEIGHTS = {3: 1.2, 11: 2.0, 14: 5.0, 15: 3.0, 17: 1.1, 33: 1.1, 35: 3.0, 36: 5.0, 39: 2.0, 47: 1.2}
-"""By number of the control point; all others are 1."""
+"""Weights by index of the control point, from 0; all others are 1."""
 DEGREE = 3
 TOLERANCE_MM = 0.001
-"""The chord error that figures 13 to 15 allow."""
+"""The chord error of figures 13 to 15."""
 
 
 @dataclass(frozen=True)
 class Printed:
-    """A row of table III: limits of both axes, and cycle times of the paper's method and of the method cited."""
+    """A row of table III: the limits that another paper uses, and two cycle times. Both axes have these limits.
+
+    name      first author of the other paper
+    theirs_s  cycle time of the method of Erwinski and others (2022)
+    cited_s   cycle time of the method of the other paper
+    """
 
     name: str
     feed_mm_s: float
@@ -67,26 +72,26 @@ PRINTED = (
 
 
 def control_points_mm() -> NDArray[np.float64]:
-    """As printed, (51, 2)."""
+    """The control points (51, 2), as printed."""
     return np.array([pair.split(",") for pair in CONTROL_POINTS_MM.split()], dtype=np.float64)
 
 
 def weights() -> NDArray[np.float64]:
-    """One for each control point."""
+    """The weight of each control point."""
     found = np.ones(len(control_points_mm()))
     found[list(WEIGHTS)] = list(WEIGHTS.values())
     return found
 
 
 def knots() -> NDArray[np.float64]:
-    """With the ends, (55,)."""
+    """All knots (55,): the inner ones, and DEGREE + 1 equal ones at each end."""
     inner = np.array(INNER_KNOTS.split(), dtype=np.float64)
     ends = np.zeros(DEGREE + 1)
     return np.concatenate((ends, inner, ends + 1.0))
 
 
 def drawing() -> str:
-    """The curve as DXF, in mm; moved so that it begins at the origin, where the machine stands."""
+    """The curve as DXF, in mm. It is moved to begin at the origin, because the machine stands there."""
     points = control_points_mm()
     points = points - points[0]
     numbers = [(70, 4), (71, DEGREE), (72, len(knots())), (73, len(points)), (74, 0)]
@@ -102,7 +107,7 @@ def drawing() -> str:
 
 
 def machine(printed: Printed) -> hg.Machine:
-    """Two axes with the printed limits; those along the path are never reached."""
+    """A machine whose two axes have the printed limits. Its limits along the path are so large that none is reached."""
     axis = {
         "travel_mm": (-200, 200),
         "velocity_mm_s": printed.feed_mm_s,
@@ -120,7 +125,11 @@ def machine(printed: Printed) -> hg.Machine:
 
 
 def measured(printed: Printed, file: Path) -> dict[str, Any]:
-    """Computed and printed numbers."""
+    """Numbers of our plan and the printed ones.
+
+    least_s   length of the curve over feed: the least cycle time without other limits
+    possible  whether the printed cycle time is at least least_s
+    """
     job = hg.load_job(
         file, machine(printed), tolerance_mm=TOLERANCE_MM, feed_mm_s=printed.feed_mm_s
     )
@@ -144,7 +153,7 @@ def measured(printed: Printed, file: Path) -> dict[str, Any]:
 
 
 def main() -> int:
-    """Exit status."""
+    """Plans and prints the rows; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", type=Path)
     parser.add_argument("--only", nargs="*", default=[], help="these rows")

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_boot.h (see there): finds the drives, configures them by SDO (drive_configuration) and
- * starts them (NMT), one after the other, and begins again from the first when one does not answer or refuses. Called
- * by app/controller.c. Frames in, frames out; main loop. */
+/* Implements app/drives/drive_boot.h (see there): configures the I/O module and the drives by SDO
+ * (drive_configuration), one after the other. Then it starts them by NMT. If one does not answer or refuses, a new
+ * attempt begins from the first. Called by app/controller.c. Takes received frames, gives back frames to send, and
+ * changes its struct only. Main loop. */
 #include "app/drives/drive_boot.h"
 
 #include <string.h>
@@ -12,7 +13,7 @@
 #define AXIS_NODE   0x2005u /* object: node number of the drive of each axis */
 #define MODULE_NODE 0x2035u /* object: node number of the I/O module */
 
-/* The next attempt begins after a pause. */
+/* Ends the present attempt, if there is one; the next one begins after the pause. */
 static void pause_for(struct drive_boot *boot, uint32_t pause_us)
 {
     boot->phase = DRIVE_BOOT_PAUSE;
@@ -20,13 +21,13 @@ static void pause_for(struct drive_boot *boot, uint32_t pause_us)
     sdo_client_init(&boot->client, DRIVE_BOOT_SDO_TIMEOUT_US);
 }
 
-/* Node of the axis that is being configured. */
+/* Node number of the drive or I/O module that is being configured or started. */
 static uint8_t present_node(const struct drive_boot *boot)
 {
     return drive_configuration_node(&boot->config, boot->axis);
 }
 
-/* This attempt has failed at the present object: noted as trouble. */
+/* Ends an attempt that has failed at the present object, which `trouble` then reports. */
 static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
 {
     boot->trouble = (struct drive_trouble){
@@ -38,7 +39,7 @@ static void give_up(struct drive_boot *boot, uint32_t abort_code, uint32_t value
     pause_for(boot, DRIVE_BOOT_RETRY_US);
 }
 
-/* To the next object of the drive. */
+/* Proceeds to the next operation on the drive. */
 static void advance(struct drive_boot *boot)
 {
     boot->client.status = SDO_CLIENT_IDLE;
@@ -62,6 +63,8 @@ void drive_boot_begin(struct drive_boot *boot, const struct config *config)
 
 /* ---- SDO response handling: next object, read back, read again, or fail ---- */
 
+/* The drive does not accept the present operation: proceeds if the operation is not necessary, else gives up. `value`:
+ * the wrong value that was read, else 0. */
 static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value)
 {
     boot->client.status = SDO_CLIENT_IDLE;
@@ -71,12 +74,14 @@ static void refused(struct drive_boot *boot, uint32_t abort_code, uint32_t value
     }
 }
 
+/* Whether the compared bits have the expected value. */
 static bool as_wanted(const struct drive_op *op, uint32_t value)
 {
     return ((value ^ op->value) & op->mask) == 0u;
 }
 
-/* A value that a write should have set, or a property of the drive. */
+/* Checks a value that was read: a property of the drive, or an object whose write was refused. A wrong property is read
+ * again, DRIVE_BOOT_READS times in all. */
 static void judge_read(struct drive_boot *boot)
 {
     const uint32_t value = (uint32_t)sdo_client_unsigned(&boot->client);
@@ -93,6 +98,8 @@ static void judge_read(struct drive_boot *boot)
     }
 }
 
+/* Decides what a refused transfer means. It is no error for DRIVE_OP_PREPARE, or if an optional object is missing. Any
+ * other object that refuses a write is read, because it may have the value already, unless it is missing. */
 static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
 {
     const bool missing = abort_code == SDO_ABORT_NO_OBJECT || abort_code == SDO_ABORT_NO_SUB;
@@ -107,7 +114,7 @@ static void judge_refusal(struct drive_boot *boot, uint32_t abort_code)
     }
 }
 
-/* The SDO transfer of the present object is over: decides what follows. */
+/* The SDO transfer of the present operation has ended: decides what follows. */
 static void take_response(struct drive_boot *boot)
 {
     if (boot->client.status == SDO_CLIENT_FAILED) {
@@ -131,13 +138,14 @@ static void begin_drive(struct drive_boot *boot)
     boot->reads = 0;
 }
 
-/* The I/O module comes first: its configuration switches its outputs off, and a drive may be missing for a long time. */
+/* Index (not node number) of the node that is configured first: the I/O module, if there is one. Its configuration
+ * switches its outputs off, which must not wait for a drive that does not answer. */
 static uint8_t first_node(const struct config *config)
 {
     return config->outputs.node != 0u ? config->axis_count : 0u;
 }
 
-/* The drive, or the module, is configured: to the next drive, or on to starting them all. */
+/* The drive or the I/O module is configured: begins the next drive. After the last one, all nodes are to be started. */
 static void finish_drive(struct drive_boot *boot)
 {
     const bool module = boot->axis >= boot->config.axis_count;
@@ -152,6 +160,7 @@ static void finish_drive(struct drive_boot *boot)
     }
 }
 
+/* Begins the present operation. True: *out is to be sent. */
 static bool begin_op(struct drive_boot *boot, struct can_msg *out)
 {
     const struct drive_op *op = &boot->op;
@@ -168,12 +177,14 @@ static bool begin_op(struct drive_boot *boot, struct can_msg *out)
     return begun == 0;
 }
 
+/* Lets time pass; whether the pause goes on. */
 static bool waits(struct drive_boot *boot, uint32_t elapsed_us)
 {
     boot->pause_us -= elapsed_us < boot->pause_us ? elapsed_us : boot->pause_us;
     return boot->pause_us > 0u;
 }
 
+/* Proceeds with the SDO transfer, or begins the next operation. True: *out is to be sent. */
 static bool configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_msg *out)
 {
     if (boot->client.status == SDO_CLIENT_BUSY) {
@@ -194,6 +205,7 @@ static bool configure(struct drive_boot *boot, uint32_t elapsed_us, struct can_m
     return begin_op(boot, out);
 }
 
+/* Starts one node by NMT. After the last one the attempt has succeeded. */
 static bool start_next(struct drive_boot *boot, struct can_msg *out)
 {
     nmt_master_command(NMT_START, present_node(boot), out);
@@ -205,7 +217,7 @@ static bool start_next(struct drive_boot *boot, struct can_msg *out)
     return true;
 }
 
-/* Two axes, or an axis and the I/O module, at one node, or one at the controller's own: nothing may be sent there. */
+/* Whether the node number of a drive or the I/O module is that of the controller or of a drive before it. */
 static bool node_is_taken(const struct config *config, uint8_t axis)
 {
     const uint8_t node = drive_configuration_node(config, axis);
@@ -216,6 +228,7 @@ static bool node_is_taken(const struct config *config, uint8_t axis)
     return taken;
 }
 
+/* Gives up, before any frame is sent, if two nodes have the same number. `trouble` then has the object that sets it. */
 static bool nodes_clash(struct drive_boot *boot)
 {
     for (uint8_t i = 0; i < drive_configuration_nodes(&boot->config); ++i) {

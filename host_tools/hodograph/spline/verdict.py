@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The acceptance test of a spline: a converged solution must have no loop and no cusp that its guide curve lacks.
 
-Used by spline/solve.py for each solution that it finds, and by spatial/quality.py. Pure functions.
-docs/theory/numerics.md 3.5.
-
-No I/O.
+docs/theory/numerics.md 3.5. Used by spline/solve.py for each solution that it finds, and by spatial/quality.py. No
+I/O; pure functions, except that `compared` changes an argument.
 """
 
 from __future__ import annotations
@@ -18,16 +16,16 @@ from .bernstein import Complex, Real, square_modulus
 from .quality import Shape
 
 EXTRA_TURNING_RAD = 1.25 * np.pi
-"""Turning of a span beyond that of the guide curve above which the spline has a loop too many."""
+"""A window of three spans has a loop that the guide curve lacks if its total turning exceeds the guide's by more."""
 _TIGHT = 1e3
-"""Bending energy times length of a span that is refused if the guide curve has much less."""
+"""A span with more bending energy times length (no unit) is refused if it also exceeds _TIGHTER_THAN_GUIDE."""
 _TIGHTER_THAN_GUIDE = 1e2
-"""The ratio of both that counts as much."""
+"""Ratio of the spline's bending energy to the guide's in a span."""
 _CUSP = 1e6
-"""Bending energy times length that is refused whatever the guide curve has."""
+"""A span with more bending energy times length is refused, whatever the guide has."""
 _STRAIGHT = 1e-6
-"""Bending energy times length of an arc of 1e-3 rad. A guide that reverses on a straight line has less: its bends lie
-between the samples.
+"""Bending energy times length of an arc of 1e-3 rad. A guide with less counts as straight. A guide that reverses on a
+straight line has less too, because no sample is at the place where it reverses.
 """
 
 
@@ -35,11 +33,11 @@ between the samples.
 class Verdict:
     """Figures of a solution compared with its guide.
 
-    extra_turning_rad   greatest excess of total turning over the guide's, in windows of three spans
-                        that bend more than the guide does
-    bending_ratio       bending energy of the whole over that of the guide; 1 if the guide bends by less than 1e-3 rad
-    loops, cusps        middle spans of windows with a loop of their own, spans that turn on the
-                        spot; the worst first
+    extra_turning_rad   greatest excess of total turning over the guide's in a window of three spans; only windows with
+                        at least as much bending energy as the guide count
+    bending_ratio       bending energy of the whole spline over that of its guide; 1 for a straight guide (_STRAIGHT)
+    loops               middle spans of windows with a loop that the guide lacks; the worst first
+    cusps               spans that turn on the spot; the worst first
     """
 
     extra_turning_rad: float
@@ -58,7 +56,7 @@ class Verdict:
 
 
 def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
-    """Compare the spline with w (M, 3) with its guide."""
+    """Compares a spline, given by its preimages w (M, 3), with its guide."""
     shape = Shape(w, 2)
     extra = _extra_turning(shape, guide_shape, closed)
     length = square_modulus(w).mean(axis=-1)
@@ -66,7 +64,9 @@ def judge(w: Complex, guide_shape: Shape, closed: bool) -> Verdict:
 
 
 def compared(own: Real, guide: Real, extra: Real, length: Real, closed: bool) -> Verdict:
-    """From bending energies (M,) of spline and guide, extra turning in windows and lengths of spans."""
+    """The verdict from figures (M,): bending energies of spline (`own`) and guide, turning of each window beyond the
+    guide's, and length of each span. Sets `extra` to 0 in windows that bend less than the guide.
+    """
     total = float(guide.sum())
     bent = total * float(length.sum()) > _STRAIGHT
     ratio = float(own.sum()) / total if bent else 1.0
@@ -80,12 +80,13 @@ def compared(own: Real, guide: Real, extra: Real, length: Real, closed: bool) ->
 
 
 def _worst_first(size: Real, chosen: NDArray[np.bool_]) -> tuple[int, ...]:
+    """Chosen spans in the order of falling size."""
     found = np.flatnonzero(chosen)
     return tuple(int(k) for k in found[np.argsort(-size[found], kind="stable")])
 
 
 def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
-    """Total turning (M,) beyond the guide's in windows; 0 where a bound rules loops out."""
+    """Total turning (M,) of each window beyond the guide's; all 0 if a quick bound shows that no window has a loop."""
     bound = windows(shape.most_turning, closed)
     if float(bound.max()) <= EXTRA_TURNING_RAD:
         return np.zeros(bound.size)
@@ -93,7 +94,7 @@ def _extra_turning(shape: Shape, guide_shape: Shape, closed: bool) -> Real:
 
 
 def windows(figure: Real, closed: bool) -> Real:
-    """Sums over each span and the spans next to it."""
+    """Sums (M,) of a figure over windows: each span and the spans next to it."""
     if figure.size < 3:
         return np.full(figure.size, figure.sum())
     before, after = np.roll(figure, 1), np.roll(figure, -1)
@@ -103,7 +104,7 @@ def windows(figure: Real, closed: bool) -> Real:
 
 
 def _turns_on_the_spot(own: Real, guide: Real) -> NDArray[np.bool_]:
-    """From bending energies times length (no unit) of spline and guide."""
+    """Whether each span has a cusp, from bending energy times length (no unit) of spline and guide."""
     return np.asarray(
         (own > _CUSP) | ((own > _TIGHT) & (own > _TIGHTER_THAN_GUIDE * guide)) | ~np.isfinite(own)
     )

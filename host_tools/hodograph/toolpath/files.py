@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Reads toolpath files of every kind, distinguished by the endings of their names. Used by many modules of host_tools:
-jobs, streaming, the Python API, the command import. Reads the file that it is given, or stdin.
+"""Reads toolpath files of every kind: G-code, drawings (DXF, SVG) and points. The ending of the name gives the kind.
+The name "-" is G-code from stdin. Used by many modules of host_tools: jobs, streaming, the Python API, the command
+import. Reads the file that it is given, or stdin.
 
 for command in read_toolpath(Path("part.dxf"), ReadOptions(feed_mm_s=20.0)):
     ...
@@ -30,17 +31,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """Options for reading a file, where the file itself leaves something open. None and empty: not given.
+    """Options for what a file itself does not define. None and empty: not given.
 
-    feed_mm_s  feed: drawings need it, and points without a column of feeds; in G-code it replaces F
+    feed_mm_s  feed: required for drawings, and for points without a column of feeds; in G-code it replaces F
     layers     drawings: only these layers, in this order
     ids        drawings: only elements with these identities (SVG: id, DXF: handle)
-    gap_mm     drawings: ends of contours that are this near are joined
+    gap_mm     drawings: ends of contours at this distance or less are joined
     lift_mm    drawings: height of rapid moves above the drawing
     scale      drawings and points: factor on lengths
-    unit_mm    drawings and points: length of a unit
+    unit_mm    drawings and points: length of a unit of the file
     closed     points: the path returns to the first point
-    block_delete, skip_optional_stops  G-code: lines that begin with "/" are left out, M1 is left out
+    block_delete         G-code: lines that begin with "/" are left out
+    skip_optional_stops  G-code: M1 is left out
     """
 
     feed_mm_s: float | None = None
@@ -66,19 +68,22 @@ _OPTIONS_OF = {
     "--block-delete": ("block_delete", GCODE_SUFFIXES),
     "--skip-optional-stops": ("skip_optional_stops", GCODE_SUFFIXES),
 }
-"""Options of the command line: their field of ReadOptions, and the kinds of files that accept them."""
+"""Options of the command line, each with its field of ReadOptions and the endings of the files that accept it."""
 
 
 def is_gcode(file: Path) -> bool:
-    """Whether a toolpath is G-code. Its messages are for the operator; those of other files list what was left out."""
+    """Whether a toolpath is G-code.
+
+    A Message of G-code is for the operator. A Message of another file reports what the reader left out.
+    """
     return file.suffix.lower() in GCODE_SUFFIXES or str(file) == STANDARD_INPUT
 
 
 def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
-    """The commands of a file; the last one is ProgramEnd.
+    """The commands of a file; the last one is ProgramEnd. A file with an unknown ending is read as points.
 
-    Raises InputError: the file cannot be read, has no feed, or its kind does not accept an option. Raises ToolpathError
-    where the iterator reaches text without meaning.
+    The iterator raises all errors, the call raises none. InputError: the file cannot be read, a drawing has no feed, or
+    files of this kind do not accept an option. ToolpathError: the reader cannot read the file further.
     """
     _check_options(file, options)
     suffix = file.suffix.lower()
@@ -122,7 +127,7 @@ def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
 
 
 def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
-    """The commands of G-code or points, which are read as streams."""
+    """The commands of G-code or points, read line by line from a file or from stdin."""
     from_input = str(file) == STANDARD_INPUT
     place: Path | int = 0 if from_input else file
     try:

@@ -2,12 +2,12 @@
 """The limited quantities at points of a grid, as functions of the unknown feed; docs/theory/feed.md 5.6. Used by
 optimal/rows and optimal/window. No I/O.
 
-With the position r of an axis in mm as a function of the grid's parameter x (grid.py), its derivatives R1, R2, R3, and
-p = (dx/dt)^2:
+The unknown is p = (dx/dt)^2 as a function of x, the parameter of the grid (grid.py). p' and p'' are its derivatives by
+x. R1, R2 and R3 are the derivatives by x of the position of an axis, mm. Then the axis has:
 
     velocity R1 sqrt(p)     acceleration R2 p + R1 p'/2     jerk sqrt(p) (R3 p + 3/2 R2 p' + R1 p''/2)
 
-and the same along the path with sigma in the place of r.
+The same formulas hold along the path. There the arc length sigma(x) of grid.py takes the place of the position.
 """
 
 from __future__ import annotations
@@ -31,7 +31,11 @@ Index = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Constraint:
-    """One limited quantity: c1, c2, c3 (m,) are the derivatives by x of the position that it depends on."""
+    """One limited quantity at points (m,).
+
+    c1, c2, c3  derivatives by x of the position of the axis, or of the arc length
+    lag_s       the limited quantity is velocity + lag_s * acceleration (limits of voltage only)
+    """
 
     limit: Limit
     c1: Real
@@ -52,7 +56,15 @@ class Constraint:
 
 @dataclass(frozen=True, eq=False)
 class GridKinematics:
-    """Points (m,) on a grid with all values that do not depend on the feed. `zones` (m,): feed limits of zones."""
+    """Points (m,) on a grid, with all values that do not depend on the feed.
+
+    interval  interval of the grid that has the point
+    s         arc length, mm
+    basis     p, p', p'' at the point as rows (m, 4) on the four unknowns of the interval
+    sigma     derivatives 1 to 3 of the arc length by x
+    frame     derivatives of the curve by arc length
+    zones     least feed limit of the feed zones, mm/s; inf: none
+    """
 
     interval: Index
     s: Real
@@ -64,7 +76,7 @@ class GridKinematics:
 
     @cached_property
     def _axes(self) -> tuple[tuple[Real, Real, Real], ...]:
-        """Derivatives by x of each axis."""
+        """Derivatives 1 to 3 by x of the position of each axis."""
         return tuple(zip(*axis_motion(self.frame, *self.sigma), strict=True))
 
     @cached_property
@@ -79,7 +91,7 @@ class GridKinematics:
 
     @cached_property
     def volts(self) -> tuple[Constraint, ...]:
-        """Limited velocity + lag * acceleration, in mm/s."""
+        """Limited voltages of the motors, as velocity + time constant * acceleration in mm/s."""
         plants, limits = self.limits.plants, self.limits.volts
         if plants is None or limits is None:
             return ()
@@ -105,7 +117,9 @@ class GridKinematics:
 
     @cached_property
     def most_p(self) -> Real:
-        """Bound (m,) of p from all limits of the feed and of velocities; inf at rest."""
+        """Upper bound (m,) of p from the limits that depend on p alone: feed, feed zones, axis velocities, centripetal
+        acceleration. It is inf at rest, where sigma' = 0.
+        """
         s1 = self.sigma[0]
         with np.errstate(divide="ignore"):
             most = (self.zones / s1) ** 2
@@ -117,13 +131,13 @@ class GridKinematics:
         return np.asarray(np.where(s1 > 0.0, most, inf))
 
     def cubic(self, grid: Grid, q: Real, slope: Real) -> tuple[Real, Real, Real]:
-        """p, p', p'' (m,) of a solution."""
+        """p, p', p'' (m,) of a solution: `q` and `slope` are the unknowns at the knots."""
         values = corners(grid, self.interval, q, slope)
         p, d, dd = (np.sum(b * values, axis=-1) for b in self.basis)
         return p, d, dd
 
     def values(self, p: Real, d: Real, dd: Real) -> dict[str, tuple[Real, float | Real]]:
-        """Every limited quantity by name: its magnitude (m,) and its limit."""
+        """Magnitude (m,) and limit of each limited quantity by name. `d` and `dd` are p' and p''."""
         root = np.sqrt(np.maximum(p, 0.0))
         out: dict[str, tuple[Real, float | Real]] = {}
         for one in self.speeds:
@@ -146,19 +160,22 @@ class GridKinematics:
 
 
 def acceleration(limited: Constraint, p: Real, d: Real) -> Real:
-    """c2 p + c1 p'/2."""
+    """c2 p + c1 p'/2, with p' = `d`."""
     return limited.c2 * p + 0.5 * limited.c1 * d
 
 
 def jerk_by_root(limited: Constraint, p: Real, d: Real, dd: Real) -> Real:
-    """The jerk over sqrt(p)."""
+    """The jerk divided by sqrt(p)."""
     return limited.c3 * p + 1.5 * limited.c2 * d + 0.5 * limited.c1 * dd
 
 
 def make_points(
     spline: Curve, limits: PlanLimits, grid: Grid, interval: Index, u: Real, zones: Real
 ) -> GridKinematics:
-    """Points at u in [0, 1] of intervals; at 0 and 1 the one-sided values from inside. `zones` (n,) by interval."""
+    """Points at the shares u (m,) of intervals, 0 to 1. At the ends, values that jump are those inside the interval.
+
+    zones  feed limit (n,) of the feed zones in each interval
+    """
     s, s1, s2, s3 = grid.sigma(interval, u)
     s = np.where(u == 0.0, grid.s[interval], np.where(u == 1.0, grid.s[interval + 1], s))
     side = np.where(u == 0.0, RIGHT, np.where(u == 1.0, LEFT, 0)).astype(np.int8)

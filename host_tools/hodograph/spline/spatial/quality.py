@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Quality of a solution in space: turning and bending compared with the guide; docs/theory/spatial-splines.md 5. Used
-by spatial/build. No I/O.
+"""Quality of a spline in space: turning and bending energy of its spans, compared with its guide curve;
+docs/theory/spatial-splines.md section 5. Used by spatial/build. No I/O.
 """
 
 from __future__ import annotations
@@ -16,14 +16,16 @@ from ..verdict import Verdict, compared, windows
 from .curve import curvature_numerator, speed_of
 
 Rates = Callable[[Real, Real], tuple[Real, Real, Real]]
-"""From coefficients of spans and places xi: speed, curvature * speed and curvature^2 * speed."""
+"""A function of Bernstein coefficients of spans (N, …) and curve parameters xi (n,). Returns (N, n) each: parametric
+speed, curvature * speed and curvature^2 * speed, the rates of turning and bending by xi.
+"""
 
 _UNEVEN = 2.0
 """Ratio of greatest to least parametric speed above which a span is sampled finely."""
 _SHARP_RAD = 0.8
-"""Turning of the tangent above which a span is sampled finely."""
+"""Turning of a span above which it is sampled finely."""
 _SAMPLES = 8
-"""Parts of a span for the turning of its tangent."""
+"""Equal parts of a span of the guide, between whose tangents `_sampled_turning` adds the angles."""
 
 
 def _rule(points: int, panels: int) -> tuple[Real, Real]:
@@ -34,6 +36,7 @@ def _rule(points: int, panels: int) -> tuple[Real, Real]:
 
 
 _SMOOTH, _SHARP = _rule(6, 1), _rule(12, 8)
+"""Quadratures of usual spans, and of those that are sampled finely."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ class SpaceShape:
 
 
 def judge(preimage: Real, guide_hodograph: Real, closed: bool) -> Verdict:
-    """Compare the spline with preimages (M, 4, 3) with its guide, hodograph (M, 3, 3)."""
+    """Compares a spline, given by its preimages (M, 4, 3), with its guide, given by its hodographs (M, 3, 3)."""
     own, guide = spline_shape(preimage), guide_shape(guide_hodograph)
     extra = windows(own.turning - guide.turning, closed)
     length = speed_of(preimage).mean(axis=-1)
@@ -62,9 +65,10 @@ def spline_shape(preimage: Real) -> SpaceShape:
 
 
 def guide_shape(hodograph: Real) -> SpaceShape:
-    """Figures of spans with quadratic hodographs (N, 3, 3), vectors with their Bernstein coefficients last.
+    """Figures of spans with quadratic hodographs (N, 3, 3): axes, then Bernstein coefficients.
 
-    Where the guide stops and reverses, which quadrature cannot find, the turning is that from sample to sample.
+    Quadrature misses the turning at a place where the guide stops and reverses. So the turning of a span with uneven
+    speed is at least the sum of the angles between sampled tangents.
     """
     shape, uneven = _shape(hodograph, _guide_rates)
     shape.turning[uneven] = np.maximum(shape.turning[uneven], _sampled_turning(hodograph[uneven]))
@@ -72,12 +76,12 @@ def guide_shape(hodograph: Real) -> SpaceShape:
 
 
 def _shape(spans: Real, rates: Rates) -> tuple[SpaceShape, NDArray[np.bool_]]:
-    """Figures, and which spans (N,) have an uneven speed.
+    """Figures of spans, and which spans (N,) have an uneven parametric speed (_UNEVEN).
 
-    By Gauss quadrature on 6 points, or 96 where a span turns by more than 0.8 rad or its speed is uneven.
+    Gauss quadrature with 6 points, or with 96 if the span turns by more than _SHARP_RAD or its speed is uneven.
 
-    Except next to a cusp, bending has two correct digits or more. Turning is within 3 %: its integrand almost has a
-    kink where the curvature nearly vanishes.
+    Bending has two correct digits or more, except next to a cusp. The error of turning is at most 3 %. It is the larger
+    one because the integrand almost has a kink where the curvature nearly vanishes.
     """
     speed, turning, bending = rates(spans, _SMOOTH[0])
     turned, bent = turning @ _SMOOTH[1], bending @ _SMOOTH[1]
@@ -118,7 +122,7 @@ def _cross(a: Real, b: Real) -> Real:
 
 
 def _sampled_turning(hodograph: Real) -> Real:
-    """Sum (N,) of the angles between tangents at even places of a span."""
+    """Sum (N,) of the angles between successive tangents at equal steps of xi."""
     tangents = hodograph @ basis(2, np.linspace(0.0, 1.0, _SAMPLES + 1)).T
     before, after = tangents[..., :-1], tangents[..., 1:]
     dot = np.sum(before * after, axis=1)
