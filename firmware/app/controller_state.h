@@ -60,11 +60,11 @@ struct controller {
     struct nmt_slave nmt;
     struct heartbeat_producer heartbeat;
     struct emcy_producer emcy;
-    uint32_t polled_us;                      /* port_time_us() of the last poll */
-    uint32_t quiet_us;                       /* so long no heartbeat is sent, unless it is configured */
-    bool quiet_due;                          /* such a pause follows the next heartbeat */
-    uint32_t reported_serial;                /* machine.fault_serial of the last EMCY */
-    enum machine_state noted_state;          /* last logged state of the machine, */
+    uint32_t polled_us;             /* port_time_us() of the last poll */
+    uint32_t quiet_us;              /* so long no heartbeat is sent, unless it is configured */
+    bool quiet_due;                 /* such a pause follows the next heartbeat */
+    uint32_t reported_serial;       /* machine.fault_serial of the last EMCY */
+    enum machine_state noted_state; /* last logged state of the machine, */
     enum cia402_state noted_drive[AXES_MAX]; /* of the drives, */
     struct drive_trouble noted_trouble;      /* and last logged trouble of a drive */
     enum machine_refusal refusal;            /* why the last command was refused */

@@ -64,7 +64,7 @@ enum machine_refusal {
     MACHINE_AXES_MISSING = 18,    /* the program has more path axes than are configured */
     MACHINE_NOT_HOMED = 13,       /* an axis with a homing method has no zero */
     MACHINE_ENDING = 17,          /* the controller is being shut down */
-    MACHINE_NOT_IN_TIME = 16, /* drives are real, and the port does not guarantee ticks in time */
+    MACHINE_NOT_IN_TIME = 16,   /* drives are real, and the port does not guarantee ticks in time */
     MACHINE_JOB_STARTED = 19,   /* a job starts once, at its beginning */
     MACHINE_OTHER_PROGRAM = 20, /* not the program or job that the start names */
 };
