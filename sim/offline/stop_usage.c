@@ -212,7 +212,7 @@ int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse
     const int keeps = stop_extent_keeps(lookup, inverse, extent);
     if (!keeps) {
         sharp[0] = extent->path.bending;
-        sharp[1] = extent->path.bent;
+        sharp[1] = extent->path.bent == sharp[0] ? 0u : extent->path.bent;
     }
     return keeps;
 }
