@@ -57,8 +57,8 @@ struct stop_path {
 /* What look-ups found last. The next ones begin with it, because they are near: only their time depends on it. */
 struct stop_last {
     uint32_t row; /* after the stretch */
-    uint32_t sharp
-        [2]; /* rows of the last stretch whose bounds exceeded a limit: greatest slope and curvature */
+    /* of a stretch whose bounds exceeded a limit: rows of greatest slope and curvature; 0: none */
+    uint32_t sharp[2];
 };
 
 /* The same with what look-ups need; borrows the path. */
