@@ -10,7 +10,7 @@
 #define LEAST_MM_S    1e-4 /* slower is standstill */
 #define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
 /* ticks of a brake between two tests by bounds: whether these ticks, or all remaining ones, keep the limits */
-#define SURE_EACH   12
+#define SURE_EACH   16
 #define SPARE_TIME  1.25 /* bounds of a whole brake cover this multiple of stop_brake_time, */
 #define SPARE_TICKS 10.0 /* and this number of ticks more */
 /* share by which a feed, or an axis' velocity, may exceed its limit at overrides other than 1: the sampled states there
@@ -197,9 +197,10 @@ int stop_brake_keeps(const struct stop_setting *setting, const struct stop_inver
 }
 
 void stop_setting_open(struct stop_setting *setting, const struct program *p,
-                       const struct stop_limits *limits, const struct stop_path *path)
+                       const struct stop_limits *limits, const struct stop_path *path,
+                       struct stop_last *last)
 {
-    stop_lookup_open(&setting->lookup, p, path);
+    stop_lookup_open(&setting->lookup, p, path, last);
     setting->period_us = p->header.period_us;
     setting->period_s = 1e-6 * p->header.period_us;
     setting->length_mm = ldexp((double)p->header.length_q40_mm, -40);

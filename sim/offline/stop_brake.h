@@ -32,7 +32,8 @@ struct stop_setting {
 
 /* Fills the setting for a program whose path stop_rows() has filled with these limits. */
 void stop_setting_open(struct stop_setting *setting, const struct program *p,
-                       const struct stop_limits *limits, const struct stop_path *path);
+                       const struct stop_limits *limits, const struct stop_path *path,
+                       struct stop_last *last);
 
 /* The number of a code: jerk, deceleration, jerk for k = 0 ... 2; mm, s. */
 double stop_number_of(int k, int code);

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#define GROUP_BITS 3u /* 8 rows, or groups of the level below, make a group */
+#define GROUP_BITS 2u /* 4 rows, or groups of the level below, make a group */
 
 /* Preimage of a segment: Bernstein coefficients by component; u and q, or all four. */
 struct preimage {
@@ -219,6 +219,8 @@ static void stretch_add_row(struct stop_stretch *stretch, const struct stop_row 
 {
     const struct stop_row *row = &rows[at];
     stretch->feed_mm_s = stop_lesser(stretch->feed_mm_s, row->feed_mm_s);
+    stretch->bent = fabs(row->curvature) > stretch->curvature ? at : stretch->bent;
+    stretch->bending = fabs(row->slope) > stretch->slope ? at : stretch->bending;
     stretch->curvature = stop_greater(stretch->curvature, fabs(row->curvature));
     stretch->slope = stop_greater(stretch->slope, fabs(row->slope));
     if (axes != PROGRAM_PLANE) {
@@ -234,6 +236,8 @@ static void stretch_add(struct stop_stretch *stretch, const struct stop_stretch 
                         uint32_t axes)
 {
     stretch->feed_mm_s = stop_lesser(stretch->feed_mm_s, other->feed_mm_s);
+    stretch->bent = other->curvature > stretch->curvature ? other->bent : stretch->bent;
+    stretch->bending = other->slope > stretch->slope ? other->bending : stretch->bending;
     stretch->curvature = stop_greater(stretch->curvature, other->curvature);
     stretch->slope = stop_greater(stretch->slope, other->slope);
     if (axes != PROGRAM_PLANE) {
@@ -325,24 +329,41 @@ void stop_pass_rows(const struct stop_lookup *lookup, double s, uint32_t *row)
     }
 }
 
-/* The first row after both a row and an arc length; the last one if there is none. */
+/* The first row after both a row and an arc length; the last one if there is none. It is sought from the row that was
+ * found last. */
 static uint32_t row_after(const struct stop_lookup *lookup, uint32_t row, double to_mm)
 {
+    const struct stop_row *rows = lookup->rows;
     const uint32_t last = lookup->row_count - 1u;
     uint32_t low = row;
     uint32_t high = row < last ? row + 1u : last;
-    for (uint32_t step = 1u; high < last && lookup->rows[high].s_mm <= to_mm; step *= 2u) {
+    const uint32_t near = lookup->last->row;
+    uint32_t step = 1u;
+    if (near > high && rows[near].s_mm <= to_mm) {
+        low = near;
+        high = near < last ? near + 1u : last;
+    } else if (near > high) {
+        high = near;
+        while (high - low > step && rows[high - step].s_mm > to_mm) {
+            high -= step;
+            step *= 2u;
+        }
+        low = high - low > step ? high - step : low;
+        step = 0u;
+    }
+    for (; step != 0u && high < last && rows[high].s_mm <= to_mm; step *= 2u) {
         low = high;
         high = last - high > step ? high + step : last;
     }
     while (high - low > 1u) {
         const uint32_t middle = low + (high - low) / 2u;
-        if (lookup->rows[middle].s_mm <= to_mm) {
+        if (rows[middle].s_mm <= to_mm) {
             low = middle;
         } else {
             high = middle;
         }
     }
+    lookup->last->row = high;
     return high;
 }
 
@@ -376,8 +397,10 @@ void stop_stretch_of_row(const struct stop_lookup *lookup, uint32_t row,
 }
 
 void stop_lookup_open(struct stop_lookup *lookup, const struct program *p,
-                      const struct stop_path *path)
+                      const struct stop_path *path, struct stop_last *last)
 {
+    memset(last, 0, sizeof *last);
+    lookup->last = last;
     lookup->axis_count = p->header.axis_count;
     lookup->rows = path->rows;
     lookup->bends = path->bends;

@@ -5,11 +5,11 @@
  * search and host tools.
  *
  * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first
- * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 8, 64, 512, ...
+ * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 4, 16, 64, ...
  * rows have the greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
  *
- * stop_rows() fills the table once; stop_lookup_open() makes the struct that the look-ups use. mm, s. No heap: the
- * caller lends all arrays. Any thread of a host; the functions change their arguments only.
+ * stop_rows() fills the table once; stop_lookup_open() makes the struct that the look-ups use; each thread needs its own.
+ * mm, s. No heap: the caller lends all arrays. Any thread of a host; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_PATH_H
 #define HODOGRAPH_OFFLINE_STOP_PATH_H
@@ -20,7 +20,7 @@
 #include "offline/stop_limits.h"
 
 #define STOP_ROWS        33u /* of the path, for each segment */
-#define STOP_MOST_LEVELS 11
+#define STOP_MOST_LEVELS 16
 
 /* The path at an arc length, ascending; two rows with one arc length where segments meet. */
 struct stop_row {
@@ -42,6 +42,7 @@ struct stop_stretch {
     double slope;
     double tangent[2];
     double feed_mm_s;
+    uint32_t bent, bending; /* rows with this curvature, and with this slope */
     struct stop_bend bend;
 };
 
@@ -49,8 +50,15 @@ struct stop_stretch {
 struct stop_path {
     struct stop_row *rows;
     struct stop_bend *bends; /* of a spatial program; not used for a planar one */
-    /* stop_groups() of 8, 64, 512, ... rows: bounds of a long stretch are quick */
+    /* stop_groups() of 4, 16, 64, ... rows: bounds of a long stretch are quick */
     struct stop_stretch *groups;
+};
+
+/* What look-ups found last. The next ones begin with it, because they are near: only their time depends on it. */
+struct stop_last {
+    uint32_t row; /* after the stretch */
+    /* of a stretch whose bounds exceeded a limit: rows of greatest slope and curvature; 0: none */
+    uint32_t sharp[2];
 };
 
 /* The same with what look-ups need; borrows the path. */
@@ -59,8 +67,9 @@ struct stop_lookup {
     uint32_t row_count;
     const struct stop_row *rows;
     const struct stop_bend *bends;                      /* of a spatial program */
-    const struct stop_stretch *group[STOP_MOST_LEVELS]; /* of 8, 64, ... rows, at each level */
+    const struct stop_stretch *group[STOP_MOST_LEVELS]; /* of 4, 16, ... rows, at each level */
     int levels;
+    struct stop_last *last; /* changed by look-ups */
 };
 
 /* Number of groups of rows of a program: the length of stop_path.groups. */
@@ -72,7 +81,7 @@ void stop_rows(const struct program *p, const struct stop_limits *limits,
 
 /* Fills *lookup for a path that stop_rows() has filled. */
 void stop_lookup_open(struct stop_lookup *lookup, const struct program *p,
-                      const struct stop_path *path);
+                      const struct stop_path *path, struct stop_last *last);
 
 /* The last row at or before an arc length. */
 uint32_t stop_row_at(const struct stop_lookup *lookup, double s);

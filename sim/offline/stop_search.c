@@ -280,11 +280,12 @@ void stop_search(const struct program *p, const struct stop_limits *limits,
                  const struct stop_path *path, struct stop_found *found)
 {
     struct stop_setting setting;
+    struct stop_last last;
     struct stop_piece piece;
     struct stop_piece close;
     double after_s = 0.0;
     double left_s = 0.0;
-    stop_setting_open(&setting, p, limits, path);
+    stop_setting_open(&setting, p, limits, path, &last);
     int warm[3] = {setting.most[0], setting.most[1], setting.most[2]};
     struct stop_overridden suspects[2] = {{0, 0, -1}, {0, 0, 0}};
     for (uint32_t i = p->header.piece_count; i > 0; i--) {
@@ -323,7 +324,8 @@ void stop_used(const struct program *p, const struct stop_limits *limits,
                const struct stop_path *path, struct stop_limits *used)
 {
     struct stop_setting setting;
-    stop_setting_open(&setting, p, limits, path);
+    struct stop_last last;
+    stop_setting_open(&setting, p, limits, path, &last);
     memset(used, 0, sizeof *used);
     for (uint32_t i = 0; i < p->header.piece_count; i++) {
         struct program_piece from;

@@ -186,14 +186,33 @@ int stop_extent_keeps(const struct stop_lookup *lookup, const struct stop_invers
     return stop_greater(along, axes) * (1.0 + SPARE_SHARE) <= 1.0;
 }
 
+/* The same for a path of this row alone: 0 for a row means 0 for each stretch that has it. */
+static int row_keeps(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
+                     struct stop_extent *extent, uint32_t row)
+{
+    stop_stretch_of_row(lookup, row, &extent->path);
+    return stop_extent_keeps(lookup, inverse, extent);
+}
+
 int stop_keeps_up_to(const struct stop_lookup *lookup, const struct stop_inverse *inverse,
                      struct stop_extent *extent, uint32_t row, double to_mm)
 {
-    /* If a limit is exceeded, the first row alone usually shows it. */
-    stop_stretch_of_row(lookup, row, &extent->path);
-    if (!stop_extent_keeps(lookup, inverse, extent)) {
+    /* If a limit is exceeded, the first row alone usually shows it, or one that did so before. */
+    if (!row_keeps(lookup, inverse, extent, row)) {
         return 0;
     }
+    uint32_t *sharp = lookup->last->sharp;
+    for (int k = 0; k < 2; k++) {
+        if (sharp[k] > row && lookup->rows[sharp[k]].s_mm <= to_mm &&
+            !row_keeps(lookup, inverse, extent, sharp[k])) {
+            return 0;
+        }
+    }
     stop_stretch_from(lookup, row, to_mm, &extent->path);
-    return stop_extent_keeps(lookup, inverse, extent);
+    const int keeps = stop_extent_keeps(lookup, inverse, extent);
+    if (!keeps) {
+        sharp[0] = extent->path.bending;
+        sharp[1] = extent->path.bent == sharp[0] ? 0u : extent->path.bent;
+    }
+    return keeps;
 }

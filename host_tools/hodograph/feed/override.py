@@ -17,11 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..native.override_headroom import OverrideSamples, Volts
 from .kinematics import (
     PathBounds,
     PathKinematics,
@@ -227,44 +228,6 @@ class Axes:
 
 
 @dataclass(frozen=True, eq=False)
-class _Volts:
-    """The parts of |lambda v + lambda^2 T a| that do not depend on the override, at all samples (A, C, K).
-
-    pull     T a, signed; size: its magnitude
-    against  whether v and T a have opposite signs; between: the greatest value then, v^2 / (4 T |a|)
-    slope    T v
-    """
-
-    reach: Real
-    signed_v: Real
-    pull: Real
-    size: Real
-    against: NDArray[np.bool_]
-    between: Real
-    slope: Real
-
-    @classmethod
-    def of(cls, axes: Axes, reach: Real, time_constant: Real) -> _Volts:
-        pull = time_constant * axes.signed_a
-        size = np.abs(pull)
-        return cls(
-            reach,
-            axes.signed_v,
-            pull,
-            size,
-            axes.signed_v * pull < 0.0,
-            axes.v**2 / (4.0 * np.maximum(size, _TINY)),
-            time_constant * axes.v,
-        )
-
-    def left(self, f: Real) -> Real:
-        """The reach less the greatest value over 0 <= lambda <= f, which is that at f, or `between`."""
-        at_f = raised(f * self.signed_v + f**2 * self.pull)
-        apart = self.against & (np.abs(self.signed_v) < 2.0 * f * self.size)
-        return np.asarray(self.reach - np.maximum(at_f, np.where(apart, self.between, 0.0)))
-
-
-@dataclass(frozen=True, eq=False)
 class Headroom:
     """The headroom of the limits along a path for the override, in each of M feed pieces."""
 
@@ -337,36 +300,33 @@ class Headroom:
         """R (M,) for factors (M,): as accelerations and volts allow, and as the whole headroom of the jerks allows;
         below 0: a limit leaves no headroom.
         """
-        axes, f = self.axes, factor[self._samples.piece, None]
-        rest = (axes.acceleration - f**2 * axes.a) / axes.v
-        jerk = (axes.jerk - f**3 * axes.j) / (3.0 * f * axes.a)
-        if self._volts is not None:
-            rest = np.minimum(rest, self._volts.left(f) / self._volts.slope)
-        return self._least(rest.min(axis=0)), self._least(jerk.min(axis=0))
+        return self._override_samples.rates(factor)
 
     def seconds(self, factor: Real) -> Callable[[Real], Real]:
         """Q (M,) for factors (M,), as a function of R (M,)."""
-        axes, piece = self.axes, self._samples.piece
-        f = factor[piece, None]
-        still = (axes.jerk - f**3 * axes.j) / axes.v
-        falls = 3.0 * f * axes.a / axes.v
-
-        def second(rate: Real) -> Real:
-            return self._least((still - rate[piece, None] * falls).min(axis=0))
-
-        return second
+        return partial(self._override_samples.seconds, factor)
 
     @cached_property
-    def _volts(self) -> _Volts | None:
-        """None: no drive is known."""
-        axes = self.axes
-        if axes.reach is None or axes.time_constant is None:
-            return None
-        return _Volts.of(axes, axes.reach, axes.time_constant)
+    def _override_samples(self) -> OverrideSamples:
+        axes, volts = self.axes, None
+        if axes.reach is not None and axes.time_constant is not None:
+            volts = Volts(axes.signed_v, axes.signed_a, axes.reach, axes.time_constant)
+        return OverrideSamples(
+            self._piece_count,
+            self._samples.piece,
+            *(axes.v, axes.a, axes.j),
+            axes.acceleration,
+            axes.jerk,
+            volts,
+        )
 
     def _least(self, values: Real) -> Real:
         """The least of the samples (C, K) of each piece."""
-        return least_of_pieces(self._samples, values, int(self.pieces.duration_q32_s.size))
+        return least_of_pieces(self._samples, values, self._piece_count)
+
+    @property
+    def _piece_count(self) -> int:
+        return int(self.pieces.duration_q32_s.size)
 
 
 def _by_axis(values: Iterable[float]) -> Real:

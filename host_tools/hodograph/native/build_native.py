@@ -32,6 +32,7 @@ HEADERS = (
     "core/feed_override.h",
     "numerics/ph_chain.h",
     "numerics/quadratic_program.h",
+    "numerics/override_headroom.h",
     "plant/drive.h",
     "offline/contour.h",
     "offline/offline.h",

@@ -334,6 +334,21 @@ void ph_locate(const struct ph_chain *chain, uint32_t count, const double *arc_m
 void ph_frames(const struct ph_chain *chain, uint32_t count, const int64_t *segment,
                const double *xi, double *r1, double *r2, double *r3, double *curvature);
 
+/* numerics/override_headroom.h */
+struct override_samples {
+    uint32_t axes, cells, samples, by_sample;
+    const int64_t *piece;
+    const double *velocity, *acceleration, *jerk, *most_acceleration, *most_jerk;
+    const double *signed_velocity, *signed_acceleration, *reach, *time_constant;
+};
+struct override_powers {
+    const double *first, *second, *third;
+};
+void override_rates(const struct override_samples *samples, const struct override_powers *at,
+                    double *rest, double *jerk);
+void override_seconds(const struct override_samples *samples, const struct override_powers *at,
+                      const double *rate, double *second);
+
 /* offline/axis_run.h */
 struct axis_run {
     double rated_torque_nm, friction_volts;
