@@ -322,11 +322,13 @@ class SectionChunks:
         self._kept = repeated.with_new(last.tail, last.tail_codes)
         assert self._kept.pieces is not None
         stretch = Stretch(self._kept.pieces, last.end_q40)
-        program = self._program_with_events(stretch, self._kept.codes)
+        program, fault = self._without_long_stops(
+            self._program_with_events(stretch, self._kept.codes)
+        )
         header = self._header(True, program)
         header = self._shared(header, repeated, piece_shift, time_shift_q32_s)
         self._require_room(program, header.line)
-        _require_accepted(self._fault(program), header.line)
+        _require_accepted(fault, header.line)
         self._last = self._made(header, program)
         new_s = self._rested_s + last.tail.total_q32_s * 2.0**-32
         line = self._feed.path.line_at(last.end_q40)
@@ -541,10 +543,7 @@ class SectionChunks:
             program, fault = self._program_with_events(whole, np.concatenate((codes, own))), None
             if program.image_size + HEADER_SIZE > self._most:
                 continue
-            fault = self._fault(program)
-            if fault is not None and fault.code == ProgramError.STOP_LONG:
-                program = without_long_stops(program)
-                fault = self._fault(program)
+            program, fault = self._without_long_stops(program)
             if fault is None:
                 break
             if fault.code in _REFUSED_TAILS:
@@ -591,6 +590,16 @@ class SectionChunks:
             first_axis=machine.first_axis,
         )
         return with_bounds(program)
+
+    def _without_long_stops(self, program: Program) -> tuple[Program, NativeFault | None]:
+        """The program, without stop parameters that make stops late if there are such; and why the controller would
+        refuse it.
+        """
+        fault = self._fault(program)
+        if fault is None or fault.code != ProgramError.STOP_LONG:
+            return program, fault
+        program = without_long_stops(program)
+        return program, self._fault(program)
 
     def _fault(self, program: Program) -> NativeFault | None:
         return NativeProgram(encode(program)).check(self._limits)
