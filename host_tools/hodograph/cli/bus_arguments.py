@@ -68,6 +68,20 @@ def _stream(command: Command) -> None:
         action="store_true",
         help="continue the job of the journal from where the axes stand",
     )
+    begin = stream.add_mutually_exclusive_group()
+    begin.add_argument(
+        "--from-line",
+        type=int,
+        metavar="N",
+        help="begin at source line N, where the axes must stand",
+    )
+    begin.add_argument(
+        "--from",
+        dest="from_mm",
+        type=float,
+        metavar="MM",
+        help="begin at this arc length of the job, where the axes must stand",
+    )
     stream.add_argument(
         "--journal",
         type=Path,

@@ -7,6 +7,7 @@ and prints to stdout and stderr.
 from __future__ import annotations
 
 import gc
+import math
 import os
 import random
 import time
@@ -53,7 +54,7 @@ from ..stream.journal import (
 )
 from ..stream.output_check import require_outputs
 from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place, PlanRests
-from ..stream.resuming import Nearest, nearest_place
+from ..stream.resuming import Nearest, nearest_place, place_of_arc, place_of_line
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
 from ..toolpath.files import ReadOptions
@@ -89,6 +90,7 @@ def stream(options: Namespace) -> None:
     require_places(options.record)
     for file in options.files:
         _require_job_file(options, file)
+    _require_one_file(options)
     gc.freeze()  # modules stay: the garbage collector need not search them again
     if options.simulate:
         if options.record is not None:
@@ -103,10 +105,37 @@ def stream_on(options: Namespace, address: BusAddress) -> None:
     """Streams the files of `stream`, or of `run` if they do not fit the memory of the controller."""
     job = _job(options)
     require_fit(job.machine)
+    begin = _begin(job, options)
     number = random.SystemRandom().randrange(1, 2**31)
     entry = _entry(job, number)
+    if entry is not None and begin is not None:
+        entry = _continued(entry, number, begin.place)
     with nullcontext() if entry is None else journal_lock(journal_file(options)):
-        _run(job, options, address, number, Place(), entry)
+        _run(job, options, address, number, begin or Place(), entry)
+
+
+def _require_one_file(options: Namespace) -> None:
+    """Raises InputError: the place of --from-line or --from is not that of one file that can be read twice."""
+    name = "--from-line" if options.from_line is not None else "--from"
+    if options.from_line is None and options.from_mm is None:
+        return
+    if len(options.files) > 1 or str(options.files[0]) == STANDARD_INPUT:
+        raise InputError(f"{name}: takes one FILE, and not standard input")
+    if options.from_line is not None and not is_toolpath(options.files[0]):
+        raise InputError(f"--from-line: {options.files[0]} has no source lines: use --from MM")
+    if options.from_line is not None and options.from_line < 1:
+        raise InputError("--from-line: lines count from 1")
+    if options.from_mm is not None and not 0.0 <= options.from_mm < math.inf:
+        raise InputError("--from: an arc length of 0 mm or more is needed")
+
+
+def _begin(job: JobFiles, options: Namespace) -> Nearest | None:
+    """The place of --from-line or --from; None: the job begins at its start. Raises InputError, PlanError."""
+    if getattr(options, "from_line", None) is not None:
+        return place_of_line(job, options.from_line)
+    if getattr(options, "from_mm", None) is not None:
+        return place_of_arc(job, options.from_mm)
+    return None
 
 
 def _require_job_file(options: Namespace, file: Path) -> None:
@@ -183,6 +212,10 @@ def _continue(options: Namespace) -> None:
     """Continues the job of the journal."""
     if options.files:
         raise InputError("stream --continue: goes on with the files of the last job: give none")
+    if options.from_line is not None or options.from_mm is not None:
+        raise InputError(
+            "stream --continue: goes on where the axes stand: leave --from-line and --from out"
+        )
     reading = reading_of(options)
     if options.machine is not None or options.tolerance is not None or reading != ReadOptions():
         raise InputError(
@@ -212,11 +245,14 @@ def _run(
     options: Namespace,
     address: BusAddress,
     job_number: int,
-    begin: Place | None,
+    start: Place | Nearest | None,
     entry: Entry | None,
 ) -> None:
-    """Streams a job from a place; None: from the place where the job of `entry`, its journal, is at rest."""
+    """Streams a job from a place, at which the axes must stand if it is a Nearest; None: from the place where the job
+    of `entry`, its journal, is at rest.
+    """
     kernel = options.kernel or job.machine.kernel
+    begin = start.place if isinstance(start, Nearest) else start
     continued = begin is None
     if begin is None:
         assert entry is not None
@@ -231,6 +267,8 @@ def _run(
         recording = stack.enter_context(recorded(options.record, job.machine, address))
         at = stack.enter_context(session(job.machine, address, options))
         bring_up(at, job.machine, kernel)
+        if isinstance(start, Nearest):
+            _require_at(at, job.machine, start, unhomed=options.unhomed)
         if begin is None:
             assert entry is not None
             begin = _nearest(at, job, entry, unhomed=options.unhomed)
@@ -316,11 +354,7 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     """The place of the job nearest to the axes. Raises RefusedError: they are not homed, or not on the path."""
     machine = job.machine
     note("the controller no longer knows the job: it goes on where the axes stand on its path")
-    lost = [
-        axis.name
-        for i, axis in enumerate(machine.axes, 1)
-        if at.controller.read(HOMING_METHOD, i) and not at.controller.read(HOMED, i)
-    ]
+    lost = _not_homed(at, machine)
     if lost and not unhomed:
         raise RefusedError(
             f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home, hodograph goto "
@@ -346,6 +380,47 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     return found.place
 
 
+def _not_homed(at: RunSession, machine: Machine) -> list[str]:
+    """The axes with a homing method that are not homed."""
+    return [
+        axis.name
+        for i, axis in enumerate(machine.axes, 1)
+        if at.controller.read(HOMING_METHOD, i) and not at.controller.read(HOMED, i)
+    ]
+
+
+def _require_at(at: RunSession, machine: Machine, place: Nearest, *, unhomed: bool) -> None:
+    """Raises RefusedError: the axes are not homed, or not at this place. A straight move there could pass the part."""
+    lost = _not_homed(at, machine)
+    if lost and not unhomed:
+        raise RefusedError(
+            f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home"
+        )
+    counts = at.controller.targets(machine.path_count)
+    scales = machine.path_counts
+    off = [
+        one / per - point for one, per, point in zip(counts, scales, place.point_mm, strict=False)
+    ]
+    distance_mm = math.hypot(*off)
+    if distance_mm > machine.start_tolerance_mm:
+        raise RefusedError(
+            f"the axes stand {number(distance_mm)} mm from the path at line {place.line}, and "
+            f"{machine.start_tolerance_mm:g} mm are allowed: {_goto(machine, place)}, then the same command again"
+        )
+
+
+def _goto(machine: Machine, place: Nearest) -> str:
+    """What the operator does to move the axes to a place."""
+    point = [_coordinate(one) for one in place.point_mm]
+    more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
+    turned = [
+        f"{axis.name} {at}"
+        for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
+    ]
+    along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
+    return f"lift the tool, hodograph goto {machine.file} --to {point[0]} {point[1]}{more}{along}"
+
+
 def _coordinate(value: float) -> str:
     """A coordinate to 1 nm: with six digits far from zero it would be another place than that of the path."""
     return f"{round(value, 6) + 0.0:.6f}".rstrip("0").rstrip(".")
@@ -356,18 +431,10 @@ def _off_the_path(machine: Machine, found: Nearest) -> str:
     sent back there, so that nothing is left out.
     """
     back = found.passed or found
-    point = [_coordinate(one) for one in back.point_mm]
-    more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
-    turned = [
-        f"{axis.name} {at}"
-        for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
-    ]
-    along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
     return (
         f"the axes stand {number(found.distance_mm)} mm from the path of the job, at line {found.line}, and "
-        f"{machine.start_tolerance_mm:g} mm are allowed: lift the tool, hodograph goto {machine.file} "
-        f"--to {point[0]} {point[1]}{more}{along}, then hodograph stream --continue: back to line {back.line}, which "
-        "they have passed"
+        f"{machine.start_tolerance_mm:g} mm are allowed: {_goto(machine, back)}, then hodograph stream --continue: "
+        f"back to line {back.line}, which they have passed"
     )
 
 
@@ -474,11 +541,13 @@ def _simulated(job: JobFiles, options: Namespace) -> _SimulatedJob:
     """Plans and simulates a job; prints the notes of its plan."""
     machine = job.machine
     kernel = options.kernel or machine.kernel
+    begin = _begin(job, options)
+    place = Place() if begin is None else begin.place
     motions: list[StreamedMotion] = []
     begin_s = time.perf_counter()
     most = largest_chunk(RING_BYTES - BLOCK_HEAD)
     with (
-        JobPlan(job, most, 1, Place(), processes=_processes(options)) as plan,
+        JobPlan(job, most, 1, place, processes=_processes(options)) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():

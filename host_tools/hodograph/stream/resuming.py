@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Where `stream --continue` resumes a job that the controller has lost: the place of its path nearest to the axes. Used
-by cli/stream_command. Reads the files of the job.
+"""Places of a job: where `stream --continue` resumes a job that the controller has lost, the place of its path nearest
+to the axes; and the place of a source line or an arc length. Used by cli/stream_command. Reads the files of the job.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ leaving it out.
 _START_MM = 1e-5
 
 Real = NDArray[np.float64]
+Point = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,68 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
     nearest = next(one for one in found if one.distance_mm <= least)
     assert passed is not None
     return replace(_moved(nearest, offset_mm), passed=_moved(passed, offset_mm))
+
+
+def place_of_line(job: JobFiles, line: int) -> Nearest:
+    """The start of the path that a source line of the first file describes. If none begins there, since a fitted curve
+    passes several lines or the line has no motion, the place before it in its section, else the next one.
+
+    Raises InputError: no path is at this line or after it; InputError and PlanError as reading the job does.
+    """
+    for number, blocks, standing_mm in _sections(job):
+        begin_mm, before = 0.0, None
+        for block in blocks:
+            later = np.flatnonzero(block.line >= line)
+            if later.size and (block.line[later[0]] == line or (later[0] == 0 and before is None)):
+                return _at_segment(job, block, int(later[0]), number, begin_mm, standing_mm)
+            if later.size and later[0] > 0:
+                return _at_segment(job, block, int(later[0]) - 1, number, begin_mm, standing_mm)
+            if later.size:
+                assert before is not None
+                return before
+            before = _at_segment(job, block, len(block.line) - 1, number, begin_mm, standing_mm)
+            begin_mm += block.curve.length_mm
+    raise InputError(f"{job.files[0]}: there is no motion at line {line} or after it")
+
+
+def place_of_arc(job: JobFiles, arc_mm: float) -> Nearest:
+    """The place at an arc length of the path of the job: that of all its sections, one after the other.
+
+    Raises InputError: the path is shorter; InputError and PlanError as reading the job does.
+    """
+    passed_mm = 0.0
+    for number, blocks, standing_mm in _sections(job):
+        begin_mm = 0.0
+        for block in blocks:
+            length_mm, own_mm = block.curve.length_mm, arc_mm - passed_mm
+            if own_mm < length_mm - _START_MM:
+                own_mm = max(own_mm, 0.0)
+                place = _place(number, begin_mm + own_mm)
+                return _programmed(job, block, own_mm, place, standing_mm)
+            begin_mm += length_mm
+            passed_mm += length_mm
+    raise InputError(
+        f"the path of the job has {passed_mm:.6g} mm, so there is no place at {arc_mm:g} mm"
+    )
+
+
+def _at_segment(
+    job: JobFiles, block: Block, segment: int, number: int, begin_mm: float, standing_mm: Point
+) -> Nearest:
+    """The start of a segment of a block; `begin_mm`: arc length of the section where the block begins."""
+    arc_mm = float(block.curve.segment_starts_mm[segment])
+    return _programmed(job, block, arc_mm, _place(number, begin_mm + arc_mm), standing_mm)
+
+
+def _programmed(
+    job: JobFiles, block: Block, arc_mm: float, place: Place, standing_mm: Point
+) -> Nearest:
+    """A place of the job; its distance from the axes is not known yet, and 0 here."""
+    point = np.concatenate((standing_mm, block.curve.axes_point(arc_mm)))
+    segment, _ = block.curve.locate(arc_mm)
+    offset_mm = np.array(job.machine.offset_mm[: len(point)])
+    found = Nearest(place, int(block.line[int(segment)]), tuple(point.tolist()), 0.0)
+    return _moved(found, offset_mm)
 
 
 def _place(section: int, arc_mm: float) -> Place:

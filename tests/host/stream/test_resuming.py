@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The place at which a job goes on that the controller has lost: on its path, nearest to the axes."""
+"""The place at which a job goes on that the controller has lost: on its path, nearest to the axes. Places of lines and
+arc lengths.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ import pytest
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
 from hodograph.stream.journal import Entry
-from hodograph.stream.plan import JobFiles
-from hodograph.stream.resuming import nearest_place
+from hodograph.stream.plan import JobFiles, Place
+from hodograph.stream.resuming import nearest_place, place_of_arc, place_of_line
 from hodograph.toolpath.files import ReadOptions
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -121,3 +123,53 @@ def test_a_path_file(machine: Machine) -> None:
 def test_a_journal_of_another_job(job: JobFiles) -> None:
     with pytest.raises(InputError, match="does not have"):
         nearest_place(job, _entry(0, 80.0, 90.0), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("line", "section", "at"),
+    [
+        (1, 0, (0.0, 0.0, 0.0)),
+        (3, 0, (0.0, 0.0, 0.0)),
+        (4, 1, (10.0, 0.0, 0.0)),
+        (7, 4, (0.0, 0.0, 0.0)),
+    ],
+)
+def test_a_line_begins_where_its_motion_does(
+    job: JobFiles, line: int, section: int, at: tuple[float, ...]
+) -> None:
+    found = place_of_line(job, line)
+    assert (found.place.section, found.place.arc_q40, found.line) == (section, 0, max(line, 3))
+    assert found.point_mm == pytest.approx(at, abs=1e-9)
+
+
+def test_a_line_has_the_work_offset(job: JobFiles, machine: Machine) -> None:
+    moved = replace(job, machine=replace(machine, offset_mm=(5.0, -3.0, 1.0)))
+    assert place_of_line(moved, 4).point_mm == pytest.approx((15.0, -3.0, 1.0), abs=1e-9)
+
+
+def test_a_line_within_a_fitted_curve_is_not_passed(tmp_path: Path, machine: Machine) -> None:
+    """And no place is far before it."""
+    file, angle = tmp_path / "part.ngc", np.linspace(0.0, 3.0, 301)
+    points = [(20.0 * np.sin(a), 20.0 - 20.0 * np.cos(a)) for a in angle[1:]]
+    file.write_text("F6000\n" + "".join(f"G1 X{x:.4f} Y{y:.4f}\n" for x, y in points))
+    job = JobFiles((file,), machine, 0.01, ReadOptions())
+    for line in (3, 50, 51, 52, 200, 301):
+        found = place_of_line(job, line)
+        begins_mm = 20.0 * angle[line - 2]  # line 2 begins at the start
+        assert begins_mm - 8.0 < found.place.arc_q40 / Q40 < begins_mm + 0.01
+        assert found.line <= line
+
+
+def test_no_motion_at_a_line_or_after_it(job: JobFiles) -> None:
+    with pytest.raises(InputError, match=r"part\.ngc: there is no motion at line 8 or after it"):
+        place_of_line(job, 8)
+
+
+def test_arc_lengths_count_over_all_sections(job: JobFiles) -> None:
+    found = place_of_arc(job, 25.0)
+    assert found.place.section == 2
+    assert found.place.arc_q40 / Q40 == pytest.approx(5.0, abs=1e-9)
+    assert found.point_mm == pytest.approx((5.0, 10.0, 0.0), abs=1e-9)
+    assert place_of_arc(job, 20.0).place == Place(2, 0)
+    with pytest.raises(InputError, match=r"50 mm, so there is no place at 50\.5 mm"):
+        place_of_arc(job, 50.5)
