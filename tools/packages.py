@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""packages.py SET...: makes sure that what the machine must have is there. Run by the Makefile. Used by vcan/main.
-Starts apt-get.
+"""packages.py SET...: installs the Debian packages of the sets that this computer lacks. Run by the Makefile. Used by
+vcan/main. Starts apt-get.
 
 A set is `build` (compile, .venv, bus), `bus`, `test`, `lint`, `fuzz`, `firmware`, `flash`, `aarch64`, `deb`,
 `clean-root`, `container` or `compare`. Missing Debian packages are installed when this runs as root or with

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""repeat_tests.py [--runs N] [--modes "idle busy one-core"] [--out DIR] [COMMAND...]: `make test` over and over, to see
-whether its verdict is always the same.
+"""repeat_tests.py [--runs N] [--modes "idle busy one-core"] [--out DIR] [COMMAND...]: repeats `make test`.
 
-Run by `make test-repeat`. Starts and ends processes.
+Shows whether tests pass in each run, however busy the computer is. Run by `make test-repeat`. Starts and ends
+processes; writes a log of each run to DIR. Default: 20 runs of `make test` in all modes, logs in build/repeat.
 
 The runs take the modes in turn:
 
@@ -11,7 +11,7 @@ The runs take the modes in turn:
     busy      four processes that compute: `stress-ng --cpu 4` where it is installed, else of Python
     one-core  pinned to one core
 
-Each run has a log in DIR. After each run its line is printed: mode, time, count of the tests. The exit status is 0 only
+After each run its line is printed: mode, time, count of the tests. The exit status is 0 only
 when nothing has failed and all counts are the same; tests that failed are named. Ctrl-C ends what is running, and the
 runs before it are judged.
 """

@@ -3,7 +3,8 @@
 
     butterfly.py [--json OUT] [--only ROW ...]
 
-Run by `make butterfly`. Prints a row for each paper to stdout; writes OUT (JSON) and a temporary drawing.
+Run by `make butterfly`. Prints a row for each paper to stdout; writes OUT (JSON) and a temporary drawing. ROW is the
+first author of the paper that used the limits: Jia, Liu or Erwinski.
 
 Data of the curve: Y. Hu, X. Jiang, G. Huo and others, Int. J. Adv. Manuf. Technol. 129 (2023) 2843-2860. Limits and
 times: K. Erwinski, A. Wawrzak, M. Paprocki, IEEE Trans. Ind. Informatics 18 (2022) 7560-7571, table III and figures 13

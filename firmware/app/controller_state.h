@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * controller_state: struct controller, the whole state of the controller, and the functions on it that commands,
- * objects and report share. controller.c initialises the struct, runs the main loop on it and shuts it down. Used by
- * firmware/app, except its folders.
+ * controller_state: struct controller, the whole state of the controller, and what commands, objects and report share:
+ * sending a frame, the heartbeat, what long work does meanwhile, and whether axes move. controller.c initialises the
+ * struct, runs the main loop on it and shuts it down. Used by firmware/app, except its folders.
  *
- * All functions: main loop. The timer and receive interrupts use the first part of the struct, under the port's lock.
+ * All functions: main loop; those that send may wait 20 ms. The timer and receive interrupts use the first part of the
+ * struct, under the port's lock.
  */
 #ifndef APP_CONTROLLER_STATE_H
 #define APP_CONTROLLER_STATE_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/drives/drive_monitor.h: supervises heartbeats and emergency messages. Called by app/controller.c.
- * Main loop; takes the port's lock where it changes the machine. */
+/* Implements app/drives/drive_monitor.h: supervises heartbeats and emergency messages. Called by app/controller.c,
+ * and by app/objects when 0x1016 is written. Main loop; takes the port's lock where it changes the machine. */
 #include "app/drives/drive_monitor.h"
 
 #include <stddef.h>

@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * drive_monitor: supervises heartbeats and emergency messages of the drives and of the I/O module, and heartbeats of
- * the host, if 0x1016 names its node. It raises faults, or leads the machine back to BOOT.
+ * the host, if 0x1016 names its node. In BOOT and OFF a drive or I/O module that is lost or restarts leads the machine
+ * back to BOOT, and the host changes nothing. In all other states each is a fault.
  *
  * An I/O module that is not OPERATIONAL for its consumer time, as after a lost start command, counts as lost.
  *
- * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS may have been switched off and on while its boot-up message was
- * lost. Its axis then counts as not homed, in every state.
+ * A drive without heartbeats for DRIVE_MONITOR_ZERO_MS (its consumer time, if that is shorter) may have been switched
+ * off and on while its boot-up message was lost. Its axis then counts as not homed, in every state.
  *
- * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine.
+ * Called by app/controller.c, and by app/objects when 0x1016 is written. Main loop; takes the port's lock where it
+ * changes the machine.
  */
 #ifndef APP_DRIVES_DRIVE_MONITOR_H
 #define APP_DRIVES_DRIVE_MONITOR_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* options: reads the command line of hodograph-controller. Used by port_linux.c. Main thread, once, at the start;
- * prints help to stdout and errors to stderr. */
+/* options: reads the command line of hodograph-controller, the controller as a Linux program. Used by port_linux.c.
+ * Main thread, once, at the start; prints help to stdout and errors to stderr. */
 #ifndef PORT_LINUX_OPTIONS_H
 #define PORT_LINUX_OPTIONS_H
 
@@ -13,7 +13,7 @@ enum options_pace {
 };
 
 struct options {
-    const char *bus;   /* CAN interface, points into argv */
+    const char *bus;   /* CAN interface, or path of a local bus; points into argv */
     const char *store; /* file of the program store, points into argv; NULL: memory only */
     uint32_t ring_kib; /* RAM for streamed jobs: 1 ... 16384 */
     uint8_t node;      /* 1 ... 127 */

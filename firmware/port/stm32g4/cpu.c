@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/cpu.h (see there): what the core itself does for the port (ARMv7-M Architecture Reference
- * Manual B1, B3). Used by port/stm32g4 only. Any context. */
+/* Implements port/stm32g4/cpu.h (see there): interrupts, sleep and reset of the core, by BASEPRI, NVIC and AIRCR
+ * (ARMv7-M Architecture Reference Manual B1, B3). Used by port/stm32g4 only. Any context, but cpu_sleep: main loop. */
 #include "port/stm32g4/cpu.h"
 
 #include "port/cortex_m/core.h"

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs a program without a bus: the controller's kernel and the simulated axes in this process, without waiting. Used
-by all modules that simulate a run. No I/O.
+"""Offline simulation of one program: the controller's kernel and the simulated axes in this process, without a bus and
+without waiting. Used by the host tools, except for streamed jobs and runs on a bus. No I/O.
 """
 
 from __future__ import annotations
