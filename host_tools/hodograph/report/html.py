@@ -29,7 +29,7 @@ Case = tuple[Pipeline, Motion, BusRun | None]
 def write_report(cases: Sequence[Case], directory: Path) -> Path:
     """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
     with styled():
-        shown_cases = _once([_case(*case) for case in cases])
+        shown_cases = _distinct(_once([_case(*case) for case in cases]))
     text = _render(cases, shown_cases)
     figures = (
         (f"{case['anchor']}_{figure.name}", figure)
@@ -48,6 +48,18 @@ def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
             if owner != case["name"]:
                 case["figures"].remove(figure)
                 case["notes"] = (*case["notes"], f"figure of the {figure.name}: as for {owner}")
+    return shown_cases
+
+
+def _distinct(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Numbers the anchors of later cases whose file has the same name as an earlier one in another folder."""
+    taken: set[str] = set()
+    for case in shown_cases:
+        anchor, count = case["anchor"], 1
+        while case["anchor"] in taken:
+            count += 1
+            case["anchor"] = f"{anchor}-{count}"
+        taken.add(case["anchor"])
     return shown_cases
 
 

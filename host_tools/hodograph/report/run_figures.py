@@ -119,7 +119,7 @@ def drive_figure(pipeline: Pipeline, motion: Motion) -> bytes:
             volts.axhline(sign * limit, color=RED, linewidth=0.9, linestyle=(0, (5, 3)))
     turning = any(axis.turns for axis in path_axes)
     following.set_ylabel(f"setpoint - position, µm{', mdeg' if turning else ''}")
-    volts.set_ylabel("drive voltage, V")
+    volts.set_ylabel("drive voltage, V" if motion.max_volts is not None else "voltage not reported")
     volts.set_xlabel("time, s")
     following.set_title(f"{pipeline.file.name}: following error and voltage of the axes")
     following.legend(loc="upper right", ncols=len(path_axes))

@@ -191,8 +191,9 @@ class Motion:
 
     @property
     def volts(self) -> NDArray[np.float64]:
-        """Drive voltage by axis, V, (n, A)."""
-        return self._by_axis("volts_mv") / 1000.0
+        """Drive voltage by axis, V, (n, A); NaN: the drives do not report it."""
+        volts = self._by_axis("volts_mv") / 1000.0
+        return volts if self.max_volts is not None else np.full_like(volts, np.nan)
 
 
 class MotionTotals:

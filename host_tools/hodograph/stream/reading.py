@@ -32,8 +32,8 @@ from ..job import (
 from ..job_outputs import EventMaker, without_effect
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
-from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, SHORTEST_MM, Divider, Section
-from ..toolpath.fit.stations import turns
+from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
+from ..toolpath.fit.stations import SHORTEST_MM, turns
 from ..toolpath.moves import ORIGIN, Command, Move
 from .geometry import Block, sliced, with_joints
 

@@ -103,6 +103,16 @@ def test_a_lost_frame_is_found(identifier: int, at: float) -> None:
         decode_ticks(packed(frames), NODES)
 
 
+@pytest.mark.parametrize("count", [3, 100, 200])
+@pytest.mark.parametrize(("identifier", "what"), [(0x183, "positions"), (0x203, "setpoints")])
+def test_a_silent_node_is_found_in_a_short_recording(
+    count: int, identifier: int, what: str
+) -> None:
+    frames = [frame for frame in recording(count) if frame[0] != identifier]
+    with pytest.raises(RunError, match=f"{what} of node 3: no frame for SYNC 0: "):
+        decode_ticks(packed(frames), NODES)
+
+
 @pytest.mark.parametrize("identifier", [0x80, 0x182, 0x203, 0x283])
 def test_a_doubled_frame_is_found(identifier: int) -> None:
     frames = recording(1000)

@@ -157,3 +157,15 @@ def test_runs_and_complete_ticks() -> None:
     frames = np.concatenate([frame(name, b"\1") for name in names])
     sync_at = np.flatnonzero(frames["id"] == 0x080)
     assert complete_ticks(frames, sync_at, 0x202).tolist() == [True, False, False, True]
+
+
+def test_volts_that_no_drive_reports_are_not_shown_as_zero(
+    frames: Frames, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, trace = tmp_path / "alpha.log", tmp_path / "trace.csv"
+    write_recording(file, frames[~np.isin(frames["id"], [0x280 + node for node in NODES])])
+    assert main(["replay", str(file), str(ALPHA), "--json", "--trace", str(trace)]) == 0
+    assert json.loads(capsys.readouterr().out)["max_volts"] is None
+    header, *rows = trace.read_text().splitlines()
+    assert header.endswith(",x_volts,y_volts")
+    assert all(row.endswith(",nan,nan") for row in rows)

@@ -231,6 +231,19 @@ def test_paper(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["alpha"]["vector_jerk_mm_s3_over_limit"]["ours"] < 0.5
 
 
+def test_report_of_files_with_the_same_name(tmp_path: Path) -> None:
+    files = [tmp_path / name / "alpha.toml" for name in ("a", "b")]
+    for file in files:
+        file.parent.mkdir()
+        text = (EXAMPLES / "alpha.toml").read_text()
+        file.write_text(text.replace('"machines/', f'"{EXAMPLES.resolve()}/machines/'))
+    folder = tmp_path / "report"
+    assert main(["report", *map(str, files), "-o", str(folder)]) == 0
+    assert (folder / "alpha_contour.png").exists()
+    assert (folder / "alpha-2_contour.png").exists()
+    assert '<h2 id="alpha-2">' in (folder / "report.html").read_text()
+
+
 def test_report(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     folder = tmp_path / "report"
     assert main(["report", str(EXAMPLES / "alpha.toml"), "-o", str(folder)]) == 0

@@ -225,6 +225,28 @@ def test_import_shows_what_became_of_a_file(
     assert "names no machine" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "moves",
+    [
+        "G1 X10.004\nG1 X10",
+        "G1 X10.001 Y0.001\nG1 X10.002 Y0\nG1 X10.001 Y-0.001\nG1 X10 Y0",
+        "G1 X10.002 Y0.001\nG1 X10.0003 Y0",
+        "G1 Z-0.002\nG1 Z0",
+        "\n".join(["G1 X10.005\nG1 X10"] * 10),
+    ],
+    ids=["back", "loop", "nearly closed", "plunge", "back and forth"],
+)
+@pytest.mark.filterwarnings("error")
+def test_a_section_that_returns_to_its_start_within_the_tolerance(
+    tmp_path: Path, mill: Machine, moves: str
+) -> None:
+    job = load_job(program(tmp_path, f"F600\nG1 X10\nM3 S100\n{moves}\nM5\nG1 X20"), mill)
+    for section in job.sections:
+        assert section.pipeline.compilation.program.duration_q32_s > 0
+    assert job.sections[-1].fitted.reference.point[-1].tolist() == [20.0, 0.0, 0.0]
+    assert job.deviation_um <= 10.0
+
+
 def test_hooks_shorter_than_a_section_stay_in_one(tmp_path: Path, mill: Machine) -> None:
     """Points that go back and forth by two micrometres: a part between two of them would have no length."""
     xs = [0.3, 0.28, 0.295, 0.2928, 0.295, 0.2932, 0.2956, 0.2875, 0.35]

@@ -155,7 +155,7 @@ def _by_sync(
         raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
     on_time = np.flatnonzero(lag == 0)  # after a lost frame no answer is in time
     sure = int(on_time[-1]) + 1 if on_time.size else 0
-    if sure < sync_at.size - _LEAD_IN:
+    if sure == 0 or sure < sync_at.size - _LEAD_IN:
         raise RunError(f"{what}: no frame for SYNC {sure}: the recording is incomplete")
     return np.asarray(frames["data"][at[:sure]])
 

@@ -130,7 +130,7 @@ def fit(
         place = np.append(own.low, own.high[-1])
         found = certify(curve, place, reference, how.tolerance_mm - ROUNDING_MM)
         limit = how.tolerance_mm - ROUNDING_MM
-        wide, missed = found.curve > limit, found.reference > limit
+        wide, missed = ~(found.curve <= limit), ~(found.reference <= limit)  # also NaN
         if not (wide.any() or missed.any()):
             return FittedPath(reference, curve, place, found)
         low = np.concatenate((own.low[wide], reference.place_mm[:-1][missed]))

@@ -41,7 +41,7 @@ from ..moves import (
 )
 from .corners import SHARPEST_RAD
 from .reference import Reference, ReferenceBuilder
-from .stations import outline
+from .stations import SHORTEST_MM, outline
 
 Real = NDArray[np.float64]
 
@@ -55,9 +55,6 @@ _STRAIGHT_RAD = 1e-6
 """Greatest change of direction between moves of G61 that is no corner."""
 
 _STOPS = (Dwell, Spindle, Coolant, ToolChange, ProgramStop)
-SHORTEST_MM = 2.0**-9
-"""Shorter moves are no section of their own."""
-
 
 _LONG_TOLERANCES = 10.0
 """Length of a path that is always a section, wherever it ends."""

@@ -19,6 +19,9 @@ Real = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Index = NDArray[np.intp]
 
+SHORTEST_MM = 2.0**-9
+"""Shorter moves are no section of their own."""
+
 _THIN_SHARE = 0.04
 """Share of the tolerance: greatest distance of a dropped point from its leg."""
 
@@ -102,9 +105,10 @@ class Outline:
 
 
 def turns(point: Real) -> Real:
-    """Change of direction (n,) at points (n, 3), 0 at the ends; rad."""
+    """Change of direction (n,) at points (n, 3), 0 at the ends; rad. NaN beside a leg of length 0."""
     leg = np.diff(point, axis=0)
-    leg = leg / np.linalg.norm(leg, axis=1)[:, None]
+    with np.errstate(invalid="ignore"):
+        leg = leg / np.linalg.norm(leg, axis=1)[:, None]
     out = np.zeros(point.shape[0])
     before, after = leg[:-1], leg[1:]
     cross = np.linalg.norm(np.cross(before, after), axis=1)
@@ -125,6 +129,8 @@ def outline(
     coarse = _thinned(
         reference, coarse, _ROUGH_SHARE * tolerance_mm, tied, _ROUGH_LEG * tolerance_mm
     )
+    coarse = _with_farthest(reference, coarse)
+    fine = np.union1d(fine, coarse)
     coarse_reach = _reach(reference.point[coarse], tolerance_mm)
     long = _is_long(reference.point[coarse], coarse_reach)
     kept = _between(reference, fine, coarse, long, _NEAREST * tolerance_mm)
@@ -137,6 +143,16 @@ def outline(
     return Outline(
         point, reference.place_mm[kept], off, turns(point), reach, widest, own, reference
     )
+
+
+def _with_farthest(reference: Reference, kept: Index) -> Index:
+    """The kept points (n,). A path that returns to its start within the tolerance also keeps its farthest point: the
+    line from its start to its end is shorter than any section.
+    """
+    away_mm = np.linalg.norm(reference.point - reference.point[0], axis=1)
+    if kept.size > 2 or away_mm[-1] >= SHORTEST_MM:
+        return kept
+    return np.union1d(kept, np.argmax(away_mm))
 
 
 def _between(
@@ -212,7 +228,8 @@ def _is_rough(point: Real, longest_mm: float) -> Flags:
     around = np.convolve(wavers, np.ones(_WINDOW))[_WINDOW // 2 :][: wavers.size]
     wavers &= around > _WINDOW // 2
     near = np.minimum(length[:-1], length[1:]) <= longest_mm
-    return np.asarray(near & (wavers | (turns(point)[1:-1] > SHARPEST_RAD)))
+    straight = turns(point)[1:-1] <= SHARPEST_RAD  # not beside a leg of length 0
+    return np.asarray(near & (wavers | ~straight))
 
 
 def _off(reference: Reference, kept: Index) -> Real:
