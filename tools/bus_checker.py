@@ -37,8 +37,8 @@ _MAY_REFUSE = {
     (0x100D, 0x06020000),
 }
 """Objects that the controller reads from each drive at its configuration, and that a simulated drive lacks."""
-_NOT_YET = (0x2001, 0x08000022)
-"""`start` while the axes settle; a refusal that the host does not expect ends its run."""
+_NOT_YET = {(0x2001, 0x08000022), (0x2056, 0x08000022)}
+"""A start, also one by name, while the axes settle; a refusal that the host does not expect ends its run."""
 _NO_OBJECT = 0x06020000
 """Abort code: the object does not exist."""
 _KEPT_FINDINGS = 50
@@ -234,7 +234,7 @@ class BusChecker:
                 self.kinds["SDO refused by a drive while it was configured"] += 1
                 continue
             if frame["id"] == _SDO_ANSWER + self.machine.node:
-                if (index, code) == _NOT_YET:
+                if (index, code) in _NOT_YET:
                     self.kinds["command refused for now: the host asks again"] += 1
                     continue
                 if index & 0xF000 == NOWHERE and code == _NO_OBJECT:
