@@ -134,6 +134,26 @@ def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
     assert not outcome(pipeline.image, 1_000_000, drives, None, NOMINAL).saturated
 
 
+def test_each_axis_has_its_own_voltage_limit(drives: tuple[Drive, Drive]) -> None:
+    """y takes 2.5 V, which x with a limit of 2 V does not: it takes 1.3 V."""
+    x, y = drives
+    image = load_pipeline(EXAMPLES / "alpha.toml").image
+    weaker = (replace(x, volts_limit=2.0), y)
+    assert not outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
+    weaker = (replace(x, volts_limit=1.0), y)
+    assert outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
+
+
+def test_unstable_gains_of_a_drive_file_are_named(machine: Machine) -> None:
+    """The bandwidth is not the reason."""
+    x, y = machine.axes
+    assert x.drive is not None
+    drive = replace(x.drive, k_pv_nm_s_rad=500 * x.drive.k_pv_nm_s_rad)
+    given = replace(machine, axes=(replace(x, drive=drive), y))
+    with pytest.raises(PlanError, match=r"axis x: .* the gains of the drive file"):
+        tune(given, [], Asked(bandwidth_hz=60.0))
+
+
 def test_bandwidth_damping_and_stiffness_asked_for(machine: Machine) -> None:
     found = tune(machine, [], Asked(bandwidth_hz=80.0, damping=0.8, stiffness_n_um=190.0))
     assert min(axis.tuned.stiffness_n_um for axis in found.axes) == pytest.approx(190, rel=1e-3)
