@@ -246,3 +246,10 @@ def test_properties_of_a_node_that_is_no_drive() -> None:
     properties = read_properties(Fake({(0x1000, 0): 0x191, (0x1018, 1): 9}))  # type: ignore[arg-type]
     assert not properties.is_drive
     assert (properties.vendor, properties.modes, properties.name) == (9, (), None)
+
+
+@pytest.mark.parametrize("status", [0x0218, 0x021F])
+def test_a_fault_is_noted_also_during_its_reaction(status: int) -> None:
+    found = check(complete() | {(0x6041, 0): status})
+    last = [one for one in found if one.index == 0x6041][-1]
+    assert (last.verdict, last.text[:21]) == (NOTE, "the drive is in fault")

@@ -14,6 +14,7 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.config import Drive, Machine, load_machine
+from hodograph.config.rewrite import rewritten
 from hodograph.errors import PlanError
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
@@ -231,6 +232,22 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     written[2].write_text("other")
     assert run(capsys, *arguments, "--force")[0] == 0
     assert "other" not in written[2].read_text()
+
+
+def test_names_that_differ_by_signs_have_files_of_their_own(tmp_path: Path) -> None:
+    """The second axis would get the gains of the first, or the first those of the second."""
+    text = (MACHINES / "paper_alpha.toml").read_text()
+    text = text.replace('name = "x"', 'name = "x+"').replace('name = "y"', 'name = "x*"')
+    text = text.replace('path = ["x", "y"]', 'path = ["x+", "x*"]')
+    text = text.replace('drive = "', f'drive = "{MACHINES}/')
+    file = tmp_path / "given.toml"
+    file.write_text(text)
+    machine = load_machine(file)
+    drives = {i: replace(a.drive, k_vf=0.5 + i) for i, a in enumerate(machine.axes) if a.drive}
+    for path, words in rewritten(machine, drives, {}, tmp_path / "out.toml", "tune").items():
+        path.write_text(words)
+    found = [a.drive.k_vf for a in load_machine(tmp_path / "out.toml").axes if a.drive]
+    assert found == [0.5, 1.5]
 
 
 def test_nothing_is_written_when_one_file_is_there(
