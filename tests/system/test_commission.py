@@ -184,6 +184,18 @@ def test_simulated_drives_are_found_and_able(
         assert "add --force" in capsys.readouterr().err
 
 
+def test_a_file_that_is_there_is_refused_before_numbers_are_given(
+    hub: LocalHub, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "machine.toml"
+    file.touch()
+    heard = LocalBus(hub.address.channel)
+    assert main(["scan", "-o", str(file), "--assign", "5"]) == 2
+    assert "add --force" in capsys.readouterr().err
+    assert heard.recv(0) is None
+    heard.shutdown()
+
+
 def test_text_for_people(hub: LocalHub, capsys: pytest.CaptureFixture[str]) -> None:
     with simulated_drives(hub):
         assert main(["scan"]) == 0

@@ -34,7 +34,7 @@ from ..commission.drive_properties import MODES
 from ..config import load_machine
 from ..config.axis_table import MAX_AXES
 from ..errors import BusError, InputError
-from .output import note, print_json, require_places, write_files
+from .output import complain, note, print_json, require_new, require_places, write_files
 
 
 def scan(options: Namespace) -> None:
@@ -44,6 +44,7 @@ def scan(options: Namespace) -> None:
     if options.store and not options.assign:
         raise InputError("--store: stores what --assign gives: add --assign")
     require_places(options.output)
+    require_new(options.output, force=options.force)
     address = bus_address(options.bus)
     scanned = _scanned(options, address)
     if scanned.unconfigured.hidden is not None:
@@ -53,9 +54,7 @@ def scan(options: Namespace) -> None:
             f"{address}: no node answers in {options.wait:g} s: is the power on, and the bit rate right?"
         )
     if options.output is not None:
-        _write(
-            options, address, [properties for properties in scanned.nodes if properties.is_drive]
-        )
+        _write(options, address, scanned.nodes)
     if options.json:
         written = None if options.output is None else str(options.output)
         print_json({"bus": str(address), **scanned.document(), "file": written})
@@ -103,13 +102,18 @@ def _scanned(options: Namespace, address: BusAddress) -> _Scanned:
             unconfigured = find_unconfigured(network)
         found = [read_properties(NodeReader(network, node)) for node in nodes]
         taken = {properties.node: _identity(properties) for properties in found}
-        for identity, node in matched(wanted, unconfigured.identities, taken):
-            assign(network, identity, node, store=options.store)
-            assigned[identity] = node
-        if assigned:
-            new = found_nodes(network, options.wait, assigned.values())
-            found += [read_properties(NodeReader(network, node)) for node in new]
-            found.sort(key=lambda properties: properties.node)
+        try:
+            for identity, node in matched(wanted, unconfigured.identities, taken):
+                assign(network, identity, node, store=options.store)
+                assigned[identity] = node
+            if assigned:
+                new = found_nodes(network, options.wait, assigned.values())
+                found += [read_properties(NodeReader(network, node)) for node in new]
+                found.sort(key=lambda properties: properties.node)
+        except BaseException:
+            for identity, node in assigned.items():
+                complain(f"{identity}: is node {node} now")
+            raise
     return _Scanned(found, unconfigured, assigned)
 
 
@@ -119,14 +123,16 @@ def _identity(properties: DriveProperties) -> Identity:
     return Identity(*(number or 0 for number in numbers))
 
 
-def _write(options: Namespace, address: BusAddress, drives: list[DriveProperties]) -> None:
+def _write(options: Namespace, address: BusAddress, nodes: list[DriveProperties]) -> None:
+    drives = [properties for properties in nodes if properties.is_drive]
     if not drives:
         raise BusError(
             f"{address}: no drive by CiA 402 among the nodes: no machine file is written"
         )
     if len(drives) > MAX_AXES:
         note(f"{len(drives)} drives: the file has the first {MAX_AXES}, as a machine has no more")
-    text = machine_text(drives, options.bitrate, str(address))
+    others = [properties.node for properties in nodes if not properties.is_drive]
+    text = machine_text(drives, options.bitrate, str(address), others)
     write_files({options.output: text}, force=options.force)
 
 

@@ -12,7 +12,7 @@ from ..bus.capture.recordings import read_recording
 from ..config import load_machine
 from ..config.rewrite import rewritten
 from ..errors import RunError
-from .output import note, print_json, require_places, write_files
+from .output import note, print_json, require_new, require_places, write_files
 
 
 def identify(options: Namespace) -> None:
@@ -20,6 +20,7 @@ def identify(options: Namespace) -> None:
     from ..identify import Plant, identify_axis, plant_json, plant_text, stretches
 
     require_places(options.output)
+    require_new(options.output, force=options.force)
     machine = load_machine(options.machine)
     drives = machine.models(machine.axes)
     frames = read_recording(options.recording, options.channel)

@@ -196,12 +196,17 @@ def _replace(file: Path, data: bytes) -> None:
         raise
 
 
-def write_files(files: Mapping[Path, str], *, force: bool) -> None:
-    """Writes texts by path. Raises InputError, before writing any: a file exists and may not be replaced."""
-    there = [str(file) for file in files if file.exists()]
+def require_new(*files: Path | None, force: bool) -> None:
+    """Raises InputError: a file exists and may not be replaced (None is ignored)."""
+    there = [str(file) for file in files if file is not None and file.exists()]
     if there and not force:
         raise InputError(
             f"{', '.join(there)}: there already: name another --output, or add --force"
         )
+
+
+def write_files(files: Mapping[Path, str], *, force: bool) -> None:
+    """Writes texts by path. Raises InputError, before writing any: a file exists and may not be replaced."""
+    require_new(*files, force=force)
     for file, text in files.items():
         write_file(file, text.encode())

@@ -15,7 +15,7 @@ from ..config.axis_table import Feedforward
 from ..config.rewrite import rewritten
 from ..errors import InputError
 from ..pipeline import load_pipeline
-from .output import note, print_json, progress, require_places, write_files
+from .output import note, print_json, progress, require_new, require_places, write_files
 
 
 def tune(options: Namespace) -> None:
@@ -25,6 +25,7 @@ def tune(options: Namespace) -> None:
 
     _check(options)
     require_places(options.output, folders=[options.report])
+    require_new(options.output, force=options.force)
     machine = load_machine(options.file)
     pipelines = [load_pipeline(file, options.file) for file in options.path or ()]
     asked = Asked(

@@ -285,7 +285,7 @@ def _homing(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
 
 def _present(reader: NodeReader) -> Iterator[Finding]:
     status = reader.number(0x6041)
-    if status is not None and status & 0x4F == 0x08:
+    if status is not None and status & 0x4F in (0x08, 0x0F):  # fault, fault reaction active
         code = reader.number(0x603F)
         reported = "" if code is None else f" (error code 0x{code:04X})"
         yield Finding(0x6041, 0, NOTE, f"the drive is in fault{reported}: see its manual", status)

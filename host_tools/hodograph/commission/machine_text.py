@@ -5,7 +5,7 @@ to be set. Used by cli/commission_commands. No I/O.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from ..config.axis_table import MAX_AXES
 from .drive_properties import CSP, HOMING, DriveProperties
@@ -17,9 +17,14 @@ _FEED, _ACCELERATION, _JERK = 20, 200, 5000
 """Low initial limits."""
 
 
-def machine_text(drives: Sequence[DriveProperties], bitrate: int, where: str) -> str:
-    """The text of a machine file for 1 … 6 drives, in the order of their node numbers; `where` names the bus."""
-    nodes = {drive.node for drive in drives}
+def machine_text(
+    drives: Sequence[DriveProperties], bitrate: int, where: str, others: Collection[int] = ()
+) -> str:
+    """The text of a machine file for 1 … 6 drives, in the order of their node numbers; `where` names the bus.
+
+    others  numbers of the nodes that are no drives: the controller gets none of them
+    """
+    nodes = {drive.node for drive in drives}.union(others)
     controller = next(node for node in range(1, 128) if node not in nodes)
     parts = [
         f"# Drives found on {where} by `hodograph scan`.\n"

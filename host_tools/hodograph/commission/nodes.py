@@ -20,6 +20,8 @@ NODES = range(1, 128)
 LISTEN_S = 0.1
 """Longer than the slowest period of SYNC."""
 _SYNC = 0x080
+_ANSWERS = 0x580
+"""COB-ID of SDO answers, less the node number."""
 _ANSWER_S = 1.0
 _NOT_THERE = (0x06020000, 0x06090011)
 """Abort codes: no such object, no such sub-index."""
@@ -44,13 +46,25 @@ def require_no_controller(network: Network, address: BusAddress) -> None:
 
 
 def found_nodes(network: Network, wait_s: float, nodes: Collection[int] = NODES) -> list[int]:
-    """Numbers of the nodes that answer a request for their device type within `wait_s`."""
-    network.scanner.nodes.clear()
+    """Numbers of the nodes that answer a request for their device type within `wait_s`.
+
+    Other frames of a node do not count: a node that sends only heartbeats cannot be read.
+    """
+    heard: set[int] = set()
+
+    def answered(cob: int, data: bytearray, time_s: float) -> None:
+        del data, time_s
+        heard.add(cob - _ANSWERS)
+
+    for node in nodes:
+        network.subscribe(_ANSWERS + node, answered)
     for node in nodes:
         request = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
         network.send_message(0x600 + node, request)
     pass_time(network, wait_s)
-    return sorted(set(network.scanner.nodes) & set(nodes))
+    for node in nodes:
+        network.unsubscribe(_ANSWERS + node, answered)
+    return sorted(heard)
 
 
 def pass_time(network: Network, seconds: float) -> None:

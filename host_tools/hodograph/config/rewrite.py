@@ -40,6 +40,7 @@ def rewritten(
     document = _parsed(machine.file)
     tables: Any = {int(table["node"]): table for table in document["axis"]}
     texts: dict[Path, str] = {}
+    taken: set[str] = set()
     for index, axis in enumerate(machine.axes):
         table = tables[axis.node]
         if index in feedforward:
@@ -51,6 +52,9 @@ def rewritten(
             table["drive"] = os.path.relpath(source, output.parent)
             continue
         name = f"{output.stem}_{re.sub(r'[^A-Za-z0-9_-]+', '-', axis.name)}.toml"
+        if name.lower() in taken:
+            name = f"{output.stem}_node{axis.node}.toml"
+        taken.add(name.lower())
         head = f"# Changed by `hodograph {by}`; it was {source.name}.\n"
         texts[output.with_name(name)] = head + drive_text(source, axis.drive, drives[index])
         table["drive"] = name

@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..config.axis_table import Feedforward
 from ..config.drive_file import Drive
 from ..native import FOR_EVER, OfflineFault
@@ -101,6 +103,8 @@ def outcome(
     image: bytes, counts_per_mm: int, drives: Drives, forward: Forward, case: Case
 ) -> Outcome:
     """A run of a program with this plant."""
+    limits = [drive.volts_limit for drive in drives]
+    alike = len(set(limits)) == 1
     motion = simulate(
         image,
         case.drives(drives),
@@ -108,11 +112,14 @@ def outcome(
         counts_per_mm=counts_per_mm,
         feedforward=forward,
         faults=case.faults(drives),
-        keep_rows=False,
+        keep_rows=not alike,
     )
-    limit = min(drive.volts_limit for drive in drives)
     volts = motion.max_volts or 0.0  # a simulation reports them
-    return Outcome(motion.max_contour_error_um, volts, volts > limit - _MV)
+    if alike:
+        saturated = volts > limits[0] - _MV
+    else:
+        saturated = bool(np.any(np.abs(motion.volts).max(axis=0) > np.array(limits) - _MV))
+    return Outcome(motion.max_contour_error_um, volts, saturated)
 
 
 def outcomes(

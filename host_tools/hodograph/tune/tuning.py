@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..config import Machine
-from ..config.axis_table import Feedforward
+from ..config.axis_table import Axis, Feedforward
 from ..config.drive_file import Drive
 from ..errors import PlanError
 from ..pipeline import Pipeline
@@ -51,6 +51,7 @@ def tune(
     """
     x, y = machine.models(machine.require_plane("tune"))
     given: Drives = (x, y)
+    before = [_given(axis) for axis in machine.require_plane("tune")]
     drives = (_interpolated(x, asked), _interpolated(y, asked))
     programs = [(pipeline.image, machine.counts_per_mm) for pipeline in pipelines]
     tried = 0
@@ -62,9 +63,6 @@ def tune(
         real = pole_for_stiffness(drives, natural, asked.damping, asked.stiffness_n_um)
         poles = Poles(natural, asked.damping, real)
     sides = [_side(*_tuned(drive, poles, asked.velocity)) for drive in drives]
-    before = [
-        _side(axis.drive, axis.feedforward) for axis in machine.require_plane("tune") if axis.drive
-    ]
     axes = [
         AxisResult(axis.name, old, new)
         for axis, old, new in zip(machine.require_plane("tune"), before, sides, strict=True)
@@ -95,6 +93,17 @@ def _tuned(drive: Drive, poles: Poles, velocity: str) -> tuple[Drive, Feedforwar
 
 def _rounded(value: float) -> float:
     return float(f"{value:.{DIGITS}g}")
+
+
+def _given(axis: Axis) -> Side:
+    """The axis as in the files."""
+    assert axis.drive is not None
+    if not loop_of(axis.drive).stable:
+        raise PlanError(
+            f"axis {axis.name}: the loop is not stable with the gains of the drive file: lower them there, or set "
+            "k_pp, k_pv and k_iv to those of a stable loop, to begin with"
+        )
+    return _side(axis.drive, axis.feedforward)
 
 
 def _side(drive: Drive, forward: Feedforward) -> Side:

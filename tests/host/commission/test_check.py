@@ -9,12 +9,16 @@ import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import canopen
 import pytest
 
 from hodograph.commission import DriveProperties, Finding, check_axis, machine_text
 from hodograph.commission.check import FAULT, NOTE, OK
 from hodograph.commission.drive_properties import read_properties, supported_modes
+from hodograph.commission.nodes import found_nodes
 from hodograph.config import load_machine
 from hodograph.config.machine_file import Machine
 
@@ -204,6 +208,32 @@ def test_files_can_be_read(
     assert machine.axes[0].identity.vendor == (drives[0].vendor or 0)
 
 
+def test_the_controller_gets_no_number_of_another_node() -> None:
+    """Also not that of an I/O module, which is no axis."""
+    text = machine_text([replace(SERVO, node=2)], 500_000, "a bus", [1, 3])
+    assert tomllib.loads(text)["controller"]["node"] == 4
+
+
+class Bus(canopen.Network):
+    """Node 2 answers; node 9 sends only heartbeats and an emergency."""
+
+    clock = SimpleNamespace(is_virtual=False, sleep=lambda seconds: None)
+
+    def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
+        if can_id == 0x602:
+            answer = bytearray((0x43, 0, 0x10, 0, 0x92, 1, 2, 0))
+            self.notify(0x582, answer, 0.0)
+        if can_id == 0x609:
+            self.notify(0x709, bytearray((5,)), 0.0)
+            self.notify(0x089, bytearray(8), 0.0)
+
+
+def test_nodes_that_only_send_are_not_found() -> None:
+    """A scan of all nodes failed when it read one of them."""
+    bus: Any = Bus()
+    assert found_nodes(bus, 0.1) == [2]
+
+
 def test_files_say_what_is_missing() -> None:
     text = machine_text([replace(SERVO, modes=(1,))], 1_000_000, "a bus")
     assert "cannot use this drive" in text
@@ -216,3 +246,10 @@ def test_properties_of_a_node_that_is_no_drive() -> None:
     properties = read_properties(Fake({(0x1000, 0): 0x191, (0x1018, 1): 9}))  # type: ignore[arg-type]
     assert not properties.is_drive
     assert (properties.vendor, properties.modes, properties.name) == (9, (), None)
+
+
+@pytest.mark.parametrize("status", [0x0218, 0x021F])
+def test_a_fault_is_noted_also_during_its_reaction(status: int) -> None:
+    found = check(complete() | {(0x6041, 0): status})
+    last = [one for one in found if one.index == 0x6041][-1]
+    assert (last.verdict, last.text[:21]) == (NOTE, "the drive is in fault")

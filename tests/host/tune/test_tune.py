@@ -14,6 +14,7 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.config import Drive, Machine, load_machine
+from hodograph.config.rewrite import rewritten
 from hodograph.errors import PlanError
 from hodograph.pipeline import load_pipeline
 from hodograph.simulate import simulate
@@ -134,6 +135,26 @@ def test_saturation_is_seen(drives: tuple[Drive, Drive]) -> None:
     assert not outcome(pipeline.image, 1_000_000, drives, None, NOMINAL).saturated
 
 
+def test_each_axis_has_its_own_voltage_limit(drives: tuple[Drive, Drive]) -> None:
+    """y takes 2.5 V, which x with a limit of 2 V does not: it takes 1.3 V."""
+    x, y = drives
+    image = load_pipeline(EXAMPLES / "alpha.toml").image
+    weaker = (replace(x, volts_limit=2.0), y)
+    assert not outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
+    weaker = (replace(x, volts_limit=1.0), y)
+    assert outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
+
+
+def test_unstable_gains_of_a_drive_file_are_named(machine: Machine) -> None:
+    """The bandwidth is not the reason."""
+    x, y = machine.axes
+    assert x.drive is not None
+    drive = replace(x.drive, k_pv_nm_s_rad=500 * x.drive.k_pv_nm_s_rad)
+    given = replace(machine, axes=(replace(x, drive=drive), y))
+    with pytest.raises(PlanError, match=r"axis x: .* the gains of the drive file"):
+        tune(given, [], Asked(bandwidth_hz=60.0))
+
+
 def test_bandwidth_damping_and_stiffness_asked_for(machine: Machine) -> None:
     found = tune(machine, [], Asked(bandwidth_hz=80.0, damping=0.8, stiffness_n_um=190.0))
     assert min(axis.tuned.stiffness_n_um for axis in found.axes) == pytest.approx(190, rel=1e-3)
@@ -211,6 +232,22 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     written[2].write_text("other")
     assert run(capsys, *arguments, "--force")[0] == 0
     assert "other" not in written[2].read_text()
+
+
+def test_names_that_differ_by_signs_have_files_of_their_own(tmp_path: Path) -> None:
+    """The second axis would get the gains of the first, or the first those of the second."""
+    text = (MACHINES / "paper_alpha.toml").read_text()
+    text = text.replace('name = "x"', 'name = "x+"').replace('name = "y"', 'name = "x*"')
+    text = text.replace('path = ["x", "y"]', 'path = ["x+", "x*"]')
+    text = text.replace('drive = "', f'drive = "{MACHINES}/')
+    file = tmp_path / "given.toml"
+    file.write_text(text)
+    machine = load_machine(file)
+    drives = {i: replace(a.drive, k_vf=0.5 + i) for i, a in enumerate(machine.axes) if a.drive}
+    for path, words in rewritten(machine, drives, {}, tmp_path / "out.toml", "tune").items():
+        path.write_text(words)
+    found = [a.drive.k_vf for a in load_machine(tmp_path / "out.toml").axes if a.drive]
+    assert found == [0.5, 1.5]
 
 
 def test_nothing_is_written_when_one_file_is_there(
