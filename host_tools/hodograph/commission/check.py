@@ -233,11 +233,12 @@ def _at_least(
     if value is None or value == 0:
         return
     if value < needed:
+        unit = f"{axis.unit}/s" if what == "velocity" else f"{axis.unit}/s^2"
         yield Finding(
             index,
             0,
             FAULT,
-            f"the drive limits {what} to {value / axis.counts_per_unit:g} {axis.unit}, less than the machine "
+            f"the drive limits {what} to {value / axis.counts_per_unit:g} {unit}, less than the machine "
             f"file's {needed / axis.counts_per_unit:g}: raise it with the drive's own tool, or lower that of the "
             "axis",
             value,

@@ -135,7 +135,7 @@ def test_an_object_that_exists_but_is_not_listed_exists() -> None:
         ({(0x6502, 0): 0x20}, (0x6502, 0), FAULT, "cyclic synchronous position"),
         ({(0x6502, 0): 0x80}, (0x6502, 0), FAULT, "no mode homing"),
         ({(0x1018, 2): 5}, (0x1018, 2), FAULT, "0x00000005"),
-        ({(0x607F, 0): 1000}, (0x607F, 0), FAULT, "0.001 mm, less than the machine file's 500"),
+        ({(0x607F, 0): 1000}, (0x607F, 0), FAULT, "0.001 mm/s, less than the machine file's 500"),
         ({(0x607F, 0): 2_000_000_000}, (0x607F, 0), OK, "limit of velocity"),
         ({(0x60C5, 0): 1000}, (0x60C5, 0), FAULT, "acceleration"),
         ({(0x60E3, 0): 2, (0x60E3, 1): 35, (0x60E3, 2): 37}, (0x60E3, 0), FAULT, "35, 37, not 17"),
@@ -253,3 +253,10 @@ def test_a_fault_is_noted_also_during_its_reaction(status: int) -> None:
     found = check(complete() | {(0x6041, 0): status})
     last = [one for one in found if one.index == 0x6041][-1]
     assert (last.verdict, last.text[:21]) == (NOTE, "the drive is in fault")
+
+
+@pytest.mark.parametrize(("index", "unit"), [(0x607F, "mm/s,"), (0x60C5, "mm/s^2,")])
+def test_limits_have_their_units(index: int, unit: str) -> None:
+    found = check(complete() | {(index, 0): 1000})
+    text = next(one.text for one in found if one.index == index)
+    assert f" to {1000 / X.counts_per_unit:g} {unit}" in text
