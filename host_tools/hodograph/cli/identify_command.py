@@ -28,7 +28,7 @@ def identify(options: Namespace) -> None:
     for index, (axis, drive) in enumerate(zip(machine.axes, drives, strict=True)):
         try:
             motions = stretches(frames, axis.node)
-            found[index] = identify_axis(motions, drive, machine.counts_per_mm, machine.period_us)
+            found[index] = identify_axis(motions, drive, axis.counts_per_unit, machine.period_us)
         except RunError as error:
             note(f"{options.recording}: axis {axis.name}: {error}")
     if not found:

@@ -162,3 +162,19 @@ def test_a_recording_without_a_run(capsys: pytest.CaptureFixture[str], tmp_path:
     err = capsys.readouterr().err
     assert "axis x: node 2 follows no motion" in err
     assert "no axis can be identified" in err
+
+
+def test_each_axis_has_its_own_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of rotary axes, counts of a degree."""
+    file, scales = tmp_path / "any.log", list[int]()
+    write_recording(file, recording(chain_of("alpha"), drives_of("paper_alpha"), 3))
+
+    def scale(_motions: object, _drive: Drive, counts_per_unit: int, _period_us: int) -> Plant:
+        scales.append(counts_per_unit)
+        raise RunError("not needed here")
+
+    monkeypatch.setattr("hodograph.identify.stretches", lambda *_: [])
+    monkeypatch.setattr("hodograph.identify.identify_axis", scale)
+    machine = str(EXAMPLES / "machines" / "mill_five_axes.toml")
+    assert main(["identify", str(file), "--machine", machine]) == 6
+    assert scales == [1_000_000] * 3 + [100_000] * 2
