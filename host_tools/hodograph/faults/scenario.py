@@ -54,6 +54,13 @@ _EXPECT = (
     *("unseen", "recover_ms", "on_path"),
 )
 
+_NEEDED = {
+    "kill-one-drive": ("node",),
+    "kill-upload": ("frames",),
+    "cut-upload": ("permille", "manner"),
+}
+"""Names that an action takes from [random]."""
+
 _OF_SCENARIOS = {"rules", "random", "host", "expect"}
 """Keys that path and machine files beside the scenarios do not have."""
 
@@ -175,6 +182,11 @@ def _ranges(root: Table, raw: Mapping[str, Any]) -> dict[str, tuple[Drawn, ...]]
 
 
 def _try(scenario: Scenario, root: Table) -> None:
+    for name in _NEEDED.get(scenario.action, ()):
+        if name not in scenario.ranges:
+            raise root.error(
+                "random", f'must have {name}, which the action "{scenario.action}" needs'
+            )
     for rule in scenario.rules:
         _require_names(rule, root)
     try:

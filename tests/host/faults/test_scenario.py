@@ -134,3 +134,20 @@ def test_the_injector_names_file_and_line(tmp_path: Path) -> None:
 def test_a_name_that_no_file_can_have(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no scenario"):
         find_scenarios(tmp_path, ["s" * 500])
+
+
+@pytest.mark.parametrize("name", ["kill-one-drive", "kill-upload", "cut-upload"])
+def test_an_action_without_its_names_is_refused(tmp_path: Path, name: str) -> None:
+    """When the file is read, not in the middle of the runs."""
+    text = (ROOT / "examples" / "faults" / f"{name}.toml").read_text()
+    file = tmp_path / f"{name}.toml"
+    file.write_text(_without_random(text))
+    with pytest.raises(InputError, match=f'"{name}" needs'):
+        load_scenario(file)
+
+
+def _without_random(text: str) -> str:
+    """The table [random] with a tick only."""
+    head, rest = text.split("[random]", 1)
+    _, *later = rest.split("\n[")
+    return head + "[random]\nat = [5, 9]\n" + "".join(f"\n[{one}" for one in later)
