@@ -25,7 +25,7 @@ enum command {
     COMMAND_HOME = 10,
 };
 
-/* What a start names (object 0x2056): another client may have replaced it since the host looked. */
+/* What a start names (object 0x2056): another client may have replaced it since the host last read it. */
 enum start_name {
     START_ANY,     /* nothing: the open job, else the active program */
     START_PROGRAM, /* the active program by its CRC-32 */
