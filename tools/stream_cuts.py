@@ -28,7 +28,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
@@ -287,6 +287,20 @@ class Rig:
             )
 
 
+@contextmanager
+def _variable(name: str, value: str) -> Iterator[None]:
+    """A variable of the environment, for this process and those that it starts; restored at the end."""
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
 class Host:
     """One command on the bus of the host."""
 
@@ -463,10 +477,9 @@ class Run:
         """The whole case."""
         rules = self.folder / "rules"
         rules.write_text(self.case.rules)
-        os.environ["HODOGRAPH_CONTROLLER"] = (
-            f"{find_program(CONTROLLER)} --ring {self.case.ring_kib}"
-        )
+        controller = f"{find_program(CONTROLLER)} --ring {self.case.ring_kib}"
         with ExitStack() as stack:
+            stack.enter_context(_variable("HODOGRAPH_CONTROLLER", controller))
             hub = stack.enter_context(LocalHub(buses=2))
             clock = virtual_clock(hub.address)
             assert clock is not None

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -18,8 +19,10 @@ from stream_cuts import KINDS, away_um, draw, run_case  # noqa: E402
 
 @pytest.mark.parametrize(("seed", "kind"), [(131, "kill"), *(long(7, kind) for kind in KINDS)])
 def test_a_job_that_is_cut_comes_to_its_end_on_its_path(seed: int, kind: str) -> None:
+    before = dict(os.environ)
     found = run_case(draw(seed, (kind,)))
     assert not found.troubles, "\n".join([*found.troubles, *found.said])
+    assert os.environ == before  # other tests of this process start controllers, too
 
 
 @pytest.mark.long
