@@ -54,7 +54,7 @@ _EXPECT = (
     *("unseen", "recover_ms", "on_path"),
 )
 
-_NEEDED = {
+NEEDED = {
     "kill-one-drive": ("node",),
     "kill-upload": ("frames",),
     "cut-upload": ("permille", "manner"),
@@ -182,7 +182,7 @@ def _ranges(root: Table, raw: Mapping[str, Any]) -> dict[str, tuple[Drawn, ...]]
 
 
 def _try(scenario: Scenario, root: Table) -> None:
-    for name in _NEEDED.get(scenario.action, ()):
+    for name in NEEDED.get(scenario.action, ()):
         if name not in scenario.ranges:
             raise root.error(
                 "random", f'must have {name}, which the action "{scenario.action}" needs'

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from ..campaign.definition import GREATEST_SAMPLES
 from ..campaign.variation import FIGURES, GRIDS, KINDS
-from ..faults.scenario import ACTIONS, NO_LIMIT
+from ..faults.scenario import ACTIONS, NEEDED, NO_LIMIT
 from ..feed.request import (
     GREATEST_FEED_MM_S,
     LEAST_FEED_MM_S,
@@ -159,5 +159,15 @@ def scenario_file() -> Schema:
             "expect": expect,
         },
         ("text", "path"),
-        {"title": "Fault scenario"},
+        {"title": "Fault scenario", "allOf": [_with_names(*one) for one in NEEDED.items()]},
     )
+
+
+def _with_names(action: str, names: tuple[str, ...]) -> Schema:
+    """The condition that an action has the names that it takes from [random]."""
+    host = {"properties": {"action": {"const": action}}, "required": ["action"]}
+    random_ = {"required": list(names)}
+    return {
+        "if": {"properties": {"host": host}, "required": ["host"]},
+        "then": {"properties": {"random": random_}, "required": ["random"]},
+    }
