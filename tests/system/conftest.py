@@ -20,13 +20,15 @@ from hodograph.bus.address import BUS_VARIABLE
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import SimulatedMachine, virtual_clock
-from hodograph.bus.sdo.controller import OFF, connect
+from hodograph.bus.sdo.controller import OFF, Controller, connect
 from hodograph.config import load_machine
 from shared_programs import share_programs, stops_planned_once
 
 __all__ = ["stops_planned_once"]
 
 ROOT = Path(__file__).resolve().parents[2]
+OFF_WAIT_S = 60.0
+"""Longest wait until the drives are configured."""
 
 
 @pytest.fixture
@@ -124,3 +126,17 @@ def _bus_is_there(request: pytest.FixtureRequest) -> None:
         socket.if_nametoindex("vcan0")
     except OSError:
         pytest.fail("no vcan0: run it as `tools/with-vcan .venv/bin/pytest ...`", pytrace=False)
+
+
+@pytest.fixture
+def controller(make_bench: MakeBench) -> Controller:
+    """A configured controller with its drives, off."""
+    found: Controller = make_bench().controller
+    assert found.wait_for((OFF,), OFF_WAIT_S) == OFF
+    return found
+
+
+@pytest.fixture
+def slow_file(alpha_at: MakeAlpha) -> Path:
+    """The alpha at 2 mm/s: nearly a minute of motion."""
+    return alpha_at(2)

@@ -17,7 +17,7 @@ import pytest
 from canopen.sdo.exceptions import SdoCommunicationError
 from canopen_bench import program
 
-from bench import EXAMPLES, MakeAlpha, MakeBench
+from bench import EXAMPLES, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.goto import line_image
@@ -34,20 +34,6 @@ from hodograph.program.image import LARGEST_BANK, RECORD_BYTES
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0
 Start = Callable[[], Command]
-
-
-@pytest.fixture
-def controller(make_bench: MakeBench) -> Controller:
-    """A configured controller with its drives, off."""
-    found: Controller = make_bench().controller
-    assert found.wait_for((OFF,), LIMIT_S) == OFF
-    return found
-
-
-@pytest.fixture
-def slow_file(alpha_at: MakeAlpha) -> Path:
-    """The alpha at 2 mm/s: nearly a minute of motion."""
-    return alpha_at(2)
 
 
 def status_line(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str]:

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
-from bench import EXAMPLES, MakeAlpha, MakeBench
+from bench import EXAMPLES
 from hodograph.bus.goto import line_image
-from hodograph.bus.sdo.controller import HELD, OFF, READY, RUNNING, Controller
+from hodograph.bus.sdo.controller import HELD, READY, RUNNING, Controller
 from hodograph.bus.sdo.node import Node, _Answers
 from hodograph.bus.sdo.objects import COMMAND, ENABLE, NAMED_START, OVERRIDE
 from hodograph.cli.main import main
@@ -24,20 +24,6 @@ from hodograph.pipeline import load_pipeline
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0
 OTHER = line_image((0.0, 0.0), (1.0, 0.0), load_machine(EXAMPLES / "machines" / "paper_alpha.toml"))
-
-
-@pytest.fixture
-def controller(make_bench: MakeBench) -> Controller:
-    """A configured controller with its drives, off."""
-    found: Controller = make_bench().controller
-    assert found.wait_for((OFF,), LIMIT_S) == OFF
-    return found
-
-
-@pytest.fixture
-def slow_file(alpha_at: MakeAlpha) -> Path:
-    """The alpha at 2 mm/s: nearly a minute of motion."""
-    return alpha_at(2)
 
 
 class Losing:

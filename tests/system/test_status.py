@@ -17,13 +17,13 @@ from typing import Any
 
 import pytest
 
-from bench import PAPER_ALPHA, MakeBench
+from bench import PAPER_ALPHA
 from commands import running
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.processes import Process, controller_command
-from hodograph.bus.sdo.controller import OFF, Controller, connect
+from hodograph.bus.sdo.controller import Controller, connect
 from hodograph.bus.sdo.status import snapshot
 from hodograph.bustime import machine_bus_time
 from hodograph.bustime.frame_bits import exact_bits
@@ -65,14 +65,6 @@ AXIS_KEYS = {
     "error",
     "remedy",
 }
-
-
-@pytest.fixture
-def controller(make_bench: MakeBench) -> Controller:
-    """A configured controller with its drives, off."""
-    found: Controller = make_bench().controller
-    assert found.wait_for((OFF,), LIMIT_S) == OFF
-    return found
 
 
 def status(capsys: pytest.CaptureFixture[str], *more: str) -> dict[str, Any]:
