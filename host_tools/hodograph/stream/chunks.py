@@ -318,21 +318,18 @@ class SectionChunks:
         """
         last, before = self._last, self._kept
         assert last is not None
-        repeated, piece_shift, time_shift_q32_s = before.repeated(LEAST_SHARED_PIECES)
+        repeated, piece_shift, time_shift = before.repeated(LEAST_SHARED_PIECES)
         self._kept = repeated.with_new(last.tail, last.tail_codes)
         assert self._kept.pieces is not None
         stretch = Stretch(self._kept.pieces, last.end_q40)
         program, fault = self._without_long_stops(
             self._program_with_events(stretch, self._kept.codes)
         )
-        header = self._header(True, program)
-        header = self._shared(header, repeated, piece_shift, time_shift_q32_s)
-        self._require_room(program, header.line)
-        _require_accepted(fault, header.line)
-        self._last = self._made(header, program)
-        new_s = self._rested_s + last.tail.total_q32_s * 2.0**-32
-        line = self._feed.path.line_at(last.end_q40)
-        return PlannedChunk(Chunk(self._in_job(header), encode(program)), new_s, line, last.end_q40)
+        size = program.image_size + HEADER_SIZE  # there is no tail
+        tried = _Tried(
+            program, fault, 1, repeated, piece_shift, time_shift, size, last.tail.total_q32_s
+        )
+        return self._finished(tried, last.end_q40, is_last=True)
 
     def _rest(self) -> bool:
         """Lets the axes come to rest at the end of the newest chunk, whose tail is then kept, because no chunk
@@ -353,20 +350,23 @@ class SectionChunks:
         number of joints that it uses. Raises SectionPlanError.
         """
         tried = self._largest(window, first, joints)
-        program, joint = tried.program, joints[tried.used - 1]
+        joint = joints[tried.used - 1]
         is_last = window.rests and joint == window.count and self._feed.at_end(window)
-        header = self._header(is_last, program)
-        header = self._shared(header, tried.repeated, tried.piece_shift, tried.time_shift_q32_s)
+        return self._finished(tried, window.joint_q40(joint), is_last=is_last), tried.used
+
+    def _finished(self, tried: _Tried, arc_q40: int, *, is_last: bool) -> PlannedChunk:
+        """The chunk that was tried, whose joint is at this arc length. Raises SectionPlanError: it does not fit, or the
+        controller would refuse it.
+        """
+        program = tried.program
+        header = self._shared(self._header(is_last, program), tried)
         self._require_room(program, header.line)
         _require_accepted(tried.fault, header.line)
         self._last = self._made(header, program)
         self._tail_bytes = program.image_size + HEADER_SIZE - tried.kept_bytes
-        joint_q40 = window.joint_q40(joint)
-        line = self._feed.path.line_at(joint_q40)
         new_s, self._rested_s = self._rested_s + tried.new_q32_s * 2.0**-32, 0.0
-        return PlannedChunk(
-            Chunk(self._in_job(header), encode(program)), new_s, line, joint_q40
-        ), tried.used
+        line = self._feed.path.line_at(arc_q40)
+        return PlannedChunk(Chunk(self._in_job(header), encode(program)), new_s, line, arc_q40)
 
     def _largest(self, window: Window, first: int, joints: list[int]) -> _Tried:
         """The chunk with the most of these joints that fits and that the controller accepts; if there is none, the last
@@ -470,9 +470,7 @@ class SectionChunks:
                 f"{self._most}: raise --tolerance, lower the feed there, or give the controller more memory",
             )
 
-    def _shared(
-        self, header: ChunkHeader, repeated: _Kept, piece_shift: int, time_shift_q32_s: int
-    ) -> ChunkHeader:
+    def _shared(self, header: ChunkHeader, tried: _Tried) -> ChunkHeader:
         """The header with its fields of shared pieces. At least one piece of the predecessor is after the joint
         (docs/reference/protocol.md 1.7).
         """
@@ -480,9 +478,9 @@ class SectionChunks:
             return header
         return replace(
             header,
-            piece_shift=piece_shift,
-            time_shift_q32_s=time_shift_q32_s,
-            shared_pieces=min(len(repeated.codes), self._last.pieces - piece_shift - 1),
+            piece_shift=tried.piece_shift,
+            time_shift_q32_s=tried.time_shift_q32_s,
+            shared_pieces=min(len(tried.repeated.codes), self._last.pieces - tried.piece_shift - 1),
         )
 
     def _header(self, is_last: bool, program: Program) -> ChunkHeader:

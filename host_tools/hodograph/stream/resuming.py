@@ -114,14 +114,18 @@ def place_of_line(job: JobFiles, line: int) -> Nearest:
         begin_mm, before = 0.0, None
         for block in blocks:
             later = np.flatnonzero(block.line >= line)
-            if later.size and (block.line[later[0]] == line or (later[0] == 0 and before is None)):
-                return _at_segment(job, block, int(later[0]), number, begin_mm, standing_mm)
-            if later.size and later[0] > 0:
-                return _at_segment(job, block, int(later[0]) - 1, number, begin_mm, standing_mm)
             if later.size:
-                assert before is not None
-                return before
-            before = _at_segment(job, block, len(block.line) - 1, number, begin_mm, standing_mm)
+                segment = int(later[0])
+                begins_here = block.line[segment] == line
+                if not begins_here and segment > 0:
+                    segment -= 1
+                elif not begins_here and before is not None:
+                    block, begin_mm = before
+                    segment = len(block.line) - 1
+                arc_mm = float(block.curve.segment_starts_mm[segment])
+                place = _place(number, begin_mm + arc_mm)
+                return _programmed(job, block, arc_mm, place, standing_mm)
+            before = block, begin_mm
             begin_mm += block.curve.length_mm
     raise InputError(f"{job.files[0]}: there is no motion at line {line} or after it")
 
@@ -147,23 +151,12 @@ def place_of_arc(job: JobFiles, arc_mm: float) -> Nearest:
     )
 
 
-def _at_segment(
-    job: JobFiles, block: Block, segment: int, number: int, begin_mm: float, standing_mm: Point
-) -> Nearest:
-    """The start of a segment of a block; `begin_mm`: arc length of the section where the block begins."""
-    arc_mm = float(block.curve.segment_starts_mm[segment])
-    return _programmed(job, block, arc_mm, _place(number, begin_mm + arc_mm), standing_mm)
-
-
 def _programmed(
     job: JobFiles, block: Block, arc_mm: float, place: Place, standing_mm: Point
 ) -> Nearest:
-    """A place of the job; its distance from the axes is not known yet, and 0 here."""
-    point = np.concatenate((standing_mm, block.curve.axes_point(arc_mm)))
-    segment, _ = block.curve.locate(arc_mm)
-    offset_mm = np.array(job.machine.offset_mm[: len(point)])
-    found = Nearest(place, int(block.line[int(segment)]), tuple(point.tolist()), 0.0)
-    return _moved(found, offset_mm)
+    """A place of the job, in machine coordinates. Its distance is 0: where the axes are is not known."""
+    found = _found(block, arc_mm, place, None, standing_mm)
+    return _moved(found, np.array(job.machine.offset_mm[: len(found.point_mm)]))
 
 
 def _place(section: int, arc_mm: float) -> Place:
@@ -200,13 +193,14 @@ def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float
 
 
 def _found(
-    block: Block, arc_mm: float, place: Place, at: Real, standing_mm: tuple[float, ...]
+    block: Block, arc_mm: float, place: Place, at: Real | None, standing_mm: Point
 ) -> Nearest:
-    """A place of a block, without the work offset."""
+    """A place of a block, without the work offset. `at`: where the axes are; None: not known, the distance is 0."""
     point = np.concatenate((standing_mm, block.curve.axes_point(arc_mm)))
     segment, _ = block.curve.locate(arc_mm)
     line = int(block.line[int(segment)])
-    return Nearest(place, line, tuple(point.tolist()), float(np.linalg.norm(point - at)))
+    distance_mm = 0.0 if at is None else float(np.linalg.norm(point - at))
+    return Nearest(place, line, tuple(point.tolist()), distance_mm)
 
 
 def _nearest_arcs(curve: Curve, target: Real, low: float, high: float) -> list[float]:
