@@ -323,21 +323,21 @@ class Host:
         self.child = clock.spawn("host", start)
 
     @property
-    def said(self) -> str:
+    def printed(self) -> str:
         """All that it has printed."""
         self._out.seek(0)
         return self._out.read().decode(errors="replace")
 
-    def lives(self) -> bool:
+    def is_running(self) -> bool:
         """Whether it still runs."""
         return self.child.poll() is None
 
-    def live(self, seconds: float) -> bool:
-        """Lets it run for so long. Returns whether it is still there."""
+    def run_for(self, seconds: float) -> bool:
+        """Lets it run for this time. Returns whether it still runs."""
         end_s = self._clock.now_s() + seconds
-        while self._clock.now_s() < end_s and self.lives():
+        while self._clock.now_s() < end_s and self.is_running():
             self._clock.sleep(min(0.01, max(end_s - self._clock.now_s(), 1e-6)))
-        return self.lives()
+        return self.is_running()
 
     def wait(self) -> int:
         """Its exit status."""
@@ -365,7 +365,7 @@ class Host:
 
     def close(self) -> None:
         """Ends it if it still runs."""
-        if self.lives():
+        if self.is_running():
             self.child.kill()
             self.child.wait()
         self._out.close()
@@ -453,7 +453,7 @@ class Found:
 
     case: Case
     troubles: list[str] = field(default_factory=list)
-    said: list[str] = field(default_factory=list)
+    outputs: list[str] = field(default_factory=list)
     statuses: list[int] = field(default_factory=list)
     away_um: float = 0.0
     left_out_um: float = 0.0
@@ -526,7 +526,7 @@ class Run:
         self.ended = False
         self.clock.sleep(_CABLE_S)
         if self._once(("--continue",), None, None, _INPUT_STATUS) != _INPUT_STATUS:
-            self.found.troubles.append(f"--continue of standard input: {self.found.said[-1]}")
+            self.found.troubles.append(f"--continue of standard input: {self.found.outputs[-1]}")
 
     def _once(
         self, words: Sequence[str], cut: Cut | None, read: Path | None = None, status: int = 0
@@ -535,21 +535,21 @@ class Run:
         host = Host(self.clock, self.rig.host_bus, words, read)
         try:
             expected: tuple[int, ...] = (status,)
-            if cut is not None and host.live(cut.after_s):
+            if cut is not None and host.run_for(cut.after_s):
                 expected = self._act(host, cut)
             status = host.wait()
-            self._note(f"{cut.kind if cut else 'undisturbed'}: status {status}", host.said)
+            self._note(f"{cut.kind if cut else 'undisturbed'}: status {status}", host.printed)
         except subprocess.TimeoutExpired:
-            self._note("hangs", host.said)
-            raise _Failed(f"hodograph stream hangs: {host.said}") from None
+            self._note("hangs", host.printed)
+            raise _Failed(f"hodograph stream hangs: {host.printed}") from None
         finally:
             host.close()
         self.found.statuses.append(status)
         ruled = {4, 5, 6} if self.case.rules.strip() else set()
         if status not in {*expected, *ruled, _REFUSED_STATUS}:
-            self.found.troubles.append(f"status {status}: {self.found.said[-1]}")
-        if status == 1 or "Traceback" in host_text(self.found.said[-1]):
-            self.found.troubles.append(f"internal error: {self.found.said[-1]}")
+            self.found.troubles.append(f"status {status}: {self.found.outputs[-1]}")
+        if status == 1 or "Traceback" in host_text(self.found.outputs[-1]):
+            self.found.troubles.append(f"internal error: {self.found.outputs[-1]}")
         return status
 
     def _act(self, host: Host, cut: Cut) -> tuple[int, ...]:
@@ -570,12 +570,12 @@ class Run:
         host.signal(number)
         # By the signal itself: the end of Python catches none. 0: the job had ended, which its journal shows.
         statuses = (0, status, -number)
-        if cut.kind == "interrupt-twice" and host.live(min(0.02 * cut.length_s, 0.3)):
+        if cut.kind == "interrupt-twice" and host.run_for(min(0.02 * cut.length_s, 0.3)):
             host.signal_again(number)
         return statuses
 
-    def _note(self, head: str, said: str) -> None:
-        self.found.said.append(f"{head}: {' | '.join(said.strip().splitlines())}")
+    def _note(self, head: str, printed: str) -> None:
+        self.found.outputs.append(f"{head}: {' | '.join(printed.strip().splitlines())}")
 
     def _pause(self, attempt: int, status: int) -> None:
         """Waits, and looks at the journal once the machine rests."""
@@ -609,8 +609,8 @@ class Run:
 
     def _back_to_path(self) -> None:
         """Does what a refusal says: reset, goto."""
-        said = self.found.said[-1]
-        way = re.search(r"hodograph (goto \S+ --to [-0-9.]+ [-0-9.]+(?: --z [-0-9.]+)?)", said)
+        printed = self.found.outputs[-1]
+        way = re.search(r"hodograph (goto \S+ --to [-0-9.]+ [-0-9.]+(?: --z [-0-9.]+)?)", printed)
         if way is None:
             return
         begin = len(self.recorder.so_far())
@@ -622,7 +622,7 @@ class Run:
         host = Host(self.clock, self.rig.host_bus, words)
         try:
             status = host.wait()
-            self._note(f"{words[0]}: status {status}", host.said)
+            self._note(f"{words[0]}: status {status}", host.printed)
         finally:
             host.close()
 
@@ -662,7 +662,7 @@ class Run:
 
 
 def host_text(line: str) -> str:
-    """What the command said, without the head."""
+    """What the command printed, without the head."""
     return line.split(": ", 2)[-1]
 
 
@@ -736,10 +736,15 @@ def main(arguments: list[str]) -> int:
             for trouble in found.troubles:
                 print(f"    {trouble}", flush=True)
             if found.troubles or options.verbose:
-                for line in found.said:
+                for line in found.outputs:
                     print(f"    > {line}", flush=True)
             results.append(
-                {"seed": seed, "kinds": case.kinds, "troubles": found.troubles, "said": found.said}
+                {
+                    "seed": seed,
+                    "kinds": case.kinds,
+                    "troubles": found.troubles,
+                    "outputs": found.outputs,
+                }
             )
     for kind in KINDS:
         print(f"{kind}: {counts[kind]} seeds, {bad[kind]} failed")

@@ -69,9 +69,9 @@ struct sdo_server {
     uint8_t sequence;    /* last segment received in order, or sent */
     uint8_t held;        /* block download: bytes in `last` */
     uint8_t received;    /* newest segment of a block that continues or was aborted; else 0 */
-    uint8_t
-        closing; /* frame that ended the last block or transfer, its first byte; upload: segments it
-                            acknowledged; 0: none */
+    /* First byte of the frame that ended the last block or transfer; of an upload, the number of segments that it
+     * acknowledged; 0: none. */
+    uint8_t closing;
     bool use_crc;
     bool acknowledged_early; /* the frame sent last is the response after half of the timeout */
     uint8_t last[7]; /* block download: the newest segment: its padding is known only at the end */
