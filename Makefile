@@ -182,8 +182,10 @@ soak: build ## programs over and over for SOAK_S seconds of bus time (an hour, a
 CUTS ?= 1-100
 cuts-stream: build ## streamed jobs cut at random instants and continued (CUTS="1-100"): all setpoints on the path, journal, statuses
 	@$(PY) tools/stream_cuts.py --seeds $(CUTS) --json $(BUILD)/stream_cuts.json
+# CHORD_MM: the job is made of G1 chords of this length; 0: of arcs
+CHORD_MM ?= 0
 soak-stream: build firmware ## a streamed job of SOAK_S seconds of motion on the emulated M4F in virtual time: setpoints against the offline simulation, memory of both sides
-	@$(PY) tools/stream_soak.py --seconds $(SOAK_S) --json $(BUILD)/stream_soak.json
+	@$(PY) tools/stream_soak.py --seconds $(SOAK_S) --chord $(CHORD_MM) --json $(BUILD)/stream_soak.json
 
 # TARGET: one of an385 an386 an500 an505 microbit; TIL=--local: a bus of its own instead of vcan0; TIL="--local --link slcan": real time
 TARGET ?= an386

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """A streamed job of hours on an emulated board: setpoints and memory.
 
-    .venv/bin/python tools/stream_soak.py [--seconds 3600] [--period 1000] [--target an386] [--json FILE]
+    .venv/bin/python tools/stream_soak.py [--seconds 3600] [--chord MM] [--period 1000] [--target an386] [--json FILE]
 
 Run by `make soak-stream`. Starts the machine, sends to its controller and receives all frames of its bus; writes FILE.
 
@@ -24,7 +24,7 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
-from math import pi
+from math import ceil, cos, pi, sin
 from pathlib import Path
 from typing import Any
 
@@ -64,21 +64,37 @@ _PAGE_MB = 4096 / 2**20
 """Size of a page of memory."""
 
 
-def write_job(file: Path, seconds: float) -> int:
-    """Writes half circles of changing radius with about this much motion; returns the number of lines."""
+def write_job(file: Path, seconds: float, chord_mm: float = 0.0) -> int:
+    """Writes half circles of changing radius with about this much motion; returns the number of lines.
+
+    Each half circle is one line (G3), or G1 chords of at most `chord_mm` if that is not 0.
+    """
     x_mm, radius_mm, growth_mm, side, length_mm, lines = 0.0, LEAST_MM, GROWTH_MM, 1, 0.0, 0
     with file.open("w", encoding="ascii") as out:
         out.write(f"G21 G90 G64 P0.02\nF{60.0 * FEED_MM_S:g}\n")
         while length_mm < seconds * FEED_MM_S or not lines:
+            arc = _half_circle(x_mm, side * radius_mm, chord_mm)
+            out.write("".join(arc))
             x_mm += 2.0 * side * radius_mm
-            out.write(f"G3 X{x_mm:.4f} Y0 I{side * radius_mm:.4f} J0\n")
-            length_mm, lines, side = length_mm + pi * radius_mm, lines + 1, -side
+            length_mm, lines, side = length_mm + pi * radius_mm, lines + len(arc), -side
             radius_mm += growth_mm
             if not LEAST_MM <= radius_mm <= MOST_MM:
                 growth_mm = -growth_mm
                 radius_mm += 2.0 * growth_mm
         out.write("M2\n")
     return lines
+
+
+def _half_circle(x_mm: float, to_centre_mm: float, chord_mm: float) -> list[str]:
+    """Lines from (x_mm, 0), counter-clockwise about (x_mm + to_centre_mm, 0)."""
+    if not chord_mm:
+        return [f"G3 X{x_mm + 2.0 * to_centre_mm:.4f} Y0 I{to_centre_mm:.4f} J0\n"]
+    chords = ceil(pi * abs(to_centre_mm) / chord_mm)
+    angles = [pi * (index + 1) / chords for index in range(chords)]
+    return [
+        f"G1 X{x_mm + to_centre_mm * (1.0 - cos(angle)):.4f} Y{-to_centre_mm * sin(angle):.4f}\n"
+        for angle in angles
+    ]
 
 
 def plane_machine(period_us: int) -> Machine:
@@ -325,6 +341,9 @@ def main(arguments: list[str]) -> int:
     """Exit status."""
     parser = argparse.ArgumentParser(prog="stream_soak.py", description=__doc__.splitlines()[0])
     parser.add_argument("--seconds", type=float, default=3600.0, help="of motion (default 3600)")
+    parser.add_argument(
+        "--chord", type=float, default=0.0, metavar="MM", help="of G1 (default: arcs)"
+    )
     parser.add_argument("--period", type=int, default=1000, help="us (default 1000)")
     parser.add_argument("--target", choices=TARGETS, default="an386")
     parser.add_argument("--json", type=Path)
@@ -332,7 +351,7 @@ def main(arguments: list[str]) -> int:
     machine = plane_machine(options.period)
     with tempfile.TemporaryDirectory(prefix="hodograph-") as folder:
         file = Path(folder) / "job.ngc"
-        lines = write_job(file, options.seconds)
+        lines = write_job(file, options.seconds, options.chord)
         soak = Soak(machine, file)
         begun_s, used_s = time.monotonic(), time.process_time()
         try:

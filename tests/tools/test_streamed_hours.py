@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from stream_soak import MovingHash, main
+from stream_soak import MovingHash, main, write_job
 
 
 @pytest.mark.long
@@ -34,3 +34,21 @@ def test_the_hash_leaves_out_the_standstill_at_both_ends() -> None:
     assert (whole.ticks, whole.sha256) == (parted.ticks, parted.sha256)
     assert whole.ticks == 5
     assert whole.sha256 != other.sha256
+
+
+def test_chords_are_on_the_half_circles_of_the_job(tmp_path: Path) -> None:
+    arcs, chords = tmp_path / "arcs.ngc", tmp_path / "chords.ngc"
+    assert write_job(arcs, 10.0) == 8
+    assert write_job(chords, 10.0, 0.72) > 500.0 / 0.72
+    points = np.array(
+        [
+            [float(word[1:]) for word in line.split()[1:]]
+            for line in chords.read_text().splitlines()
+            if line.startswith("G1")
+        ]
+    )
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert steps.max() <= 0.72
+    assert np.linalg.norm(points[:60] - [20.0, 0.0], axis=1) == pytest.approx(20.0, abs=1e-4)
+    ends = [line.split()[1] for line in arcs.read_text().splitlines() if line.startswith("G3")]
+    assert points[abs(points[:, 1]) < 1e-4, 0] == pytest.approx([float(x[1:]) for x in ends])
