@@ -52,7 +52,7 @@ struct drive_boot {
     enum drive_boot_phase phase;
     uint32_t pause_us;
     uint32_t refused_code; /* abort code of the refused write that is now read back */
-    uint8_t axis;
+    uint8_t axis; /* drive that is configured or started: index of its axis; axis_count: the I/O module */
     uint8_t reads; /* of the present object, without the right answer */
     bool reading_back;
     bool simulated; /* all drives up to this one are simulated (0x1018) */
