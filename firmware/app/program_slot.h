@@ -25,9 +25,9 @@
 
 /* Values of object 0x2000 sub 2. */
 enum program_slot_state {
-    PROGRAM_SLOT_NONE = 0,
-    PROGRAM_SLOT_RECEIVING = 1,
-    PROGRAM_SLOT_READY = 2,
+    PROGRAM_SLOT_NONE = 0,      /* no program */
+    PROGRAM_SLOT_RECEIVING = 1, /* an upload is under way; a program may be active as well */
+    PROGRAM_SLOT_READY = 2,     /* a program is active */
 };
 
 struct program_slot {
