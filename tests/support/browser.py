@@ -34,7 +34,7 @@ class Browser:
 
     def __init__(self, folder: Path) -> None:
         program = shutil.which("chromium") or shutil.which("chromium-browser")
-        assert program is not None, "chromium is not installed: tools/packages.py browser"
+        assert program is not None, "chromium is not installed: tools/packages.py test installs it"
         self._folder = folder / "chromium"
         command = [
             program,
