@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools" / "misra"))
 
-import check_misra
+import check_misra  # noqa: E402
 
 OUTPUT = """\
 firmware/core/a.c:7: misra-c2012-15.5
