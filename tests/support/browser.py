@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Headless Chromium, driven by the Chrome DevTools Protocol over a WebSocket."""
+"""Headless Chromium, driven by the Chrome DevTools Protocol over a WebSocket. Used by tests/system. Starts a
+process and sends to it.
+"""
 
 from __future__ import annotations
 
