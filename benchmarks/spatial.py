@@ -50,7 +50,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 """Quadrature of a span for `energies`, on -1 … 1."""
 
 
-def campaign(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[str, Any]:
+def seeds_figures(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[str, Any]:
     """Convergence and bending of the splines that `attempt` makes of seeds 0 … count - 1."""
     found, refused = [], 0
     for seed in range(count):
@@ -70,8 +70,8 @@ def campaign(attempt: Callable[[int], SpatialSplineResult], count: int) -> dict[
     }
 
 
-def campaigns(count: int) -> dict[str, Any]:
-    """Figures of `campaign` for walks that turn by up to 90, 120 and 180 degrees at each point.
+def walk_figures(count: int) -> dict[str, Any]:
+    """`seeds_figures` of walks that turn by up to 90, 120 and 180 degrees at each point.
 
     The legs of a walk have uniformly distributed lengths of 3 to 15 mm ("even"), or log-normal ones ("sigma_…"). Those
     of control polygons are "even".
@@ -87,7 +87,7 @@ def campaigns(count: int) -> dict[str, Any]:
                 ) -> SpatialSplineResult:
                     return spatial_through_points(walk(seed, turn, s), False, knots=name)
 
-                out[f"turns_{degrees}_{legs}_{knots}"] = campaign(attempt, count)
+                out[f"turns_{degrees}_{legs}_{knots}"] = seeds_figures(attempt, count)
         for closed in (False, True):
 
             def polygon(
@@ -96,7 +96,7 @@ def campaigns(count: int) -> dict[str, Any]:
                 return spatial_from_control_polygon(walk(seed, turn), around)
 
             name = f"turns_{degrees}_control_polygon_{'closed' if closed else 'open'}"
-            out[name] = campaign(polygon, count)
+            out[name] = seeds_figures(polygon, count)
     return out
 
 
@@ -127,7 +127,7 @@ def distance_from(spline: SpatialPHSpline, exact: Real) -> float:
     return float(np.linalg.norm(np.cross(p - exact[at], along[at]), axis=1).max())
 
 
-def knot_errors() -> dict[str, float]:
+def trefoil_errors() -> dict[str, float]:
     """Distance (mm) from the trefoil of splines through 24 to 384 of its points."""
     exact = torus_knot(400_000)
     exact = np.vstack((exact[-9:], exact, exact[:9]))
@@ -303,9 +303,9 @@ def main() -> None:
     figures = {
         "speed": speed(),
         "helix": helix_errors(),
-        "trefoil_mm": knot_errors(),
+        "trefoil_mm": trefoil_errors(),
         "published": published_errors(),
-        "walks": campaigns(options.paths),
+        "walks": walk_figures(options.paths),
         "criteria": criteria(max(options.paths // 10, 1)),
     }
     for group, values in figures.items():

@@ -5,8 +5,8 @@
 
 Run by `make bench`. Starts processes.
 
-Campaigns: N (10^4) smooth and N uniformly random polygons, seeds 0 … N - 1 of
-tests/host/spline/polygons.py. Prints the figures and writes them as one JSON object.
+The polygons are N (10^4) smooth and N uniformly random ones, seeds 0 … N - 1 of tests/host/spline/polygons.py. Prints
+the figures and writes them as one JSON object.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def part(polygon: Callable[[int], Polygon], seeds: range) -> tuple[list[Row], li
     return rows, refused
 
 
-def campaign(polygon: Callable[[int], Polygon], count: int) -> dict[str, Any]:
+def seeds_figures(polygon: Callable[[int], Polygon], count: int) -> dict[str, Any]:
     """Convergence and quality over seeds 0 … count - 1, on two processes."""
     seeds = [range(first, min(first + 250, count)) for first in range(0, count, 250)]
     with ProcessPoolExecutor(2) as pool:
@@ -128,7 +128,7 @@ def speed() -> dict[str, Any]:
 
 
 def uniform_long(count: int) -> Polygon:
-    """Uniformly random points, far beyond the 200 of the campaign."""
+    """Uniformly random points, far beyond the 200 of `uniform`."""
     rng = np.random.default_rng([count, 3])
     return rng.uniform(0, 100, count) + 1j * rng.uniform(0, 100, count), False
 
@@ -162,8 +162,8 @@ def main() -> None:
     figures = {
         "speed": speed(),
         "evaluation": evaluation(),
-        "smooth": campaign(smooth, options.polygons),
-        "uniform": campaign(uniform, options.polygons),
+        "smooth": seeds_figures(smooth, options.polygons),
+        "uniform": seeds_figures(uniform, options.polygons),
     }
     for group, values in figures.items():
         for name, value in values.items():

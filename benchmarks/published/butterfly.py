@@ -153,12 +153,13 @@ def measured(printed: Printed, file: Path) -> dict[str, Any]:
     }
 
 
-def main() -> int:
-    """Plans and prints the rows; returns the exit status."""
+def main(words: list[str] | None = None) -> int:
+    """Plans and prints the rows; returns the exit status. Without `words` it reads the command line."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--json", type=Path)
-    parser.add_argument("--only", nargs="*", default=[], help="these rows")
-    options = parser.parse_args()
+    names = [printed.name for printed in PRINTED]
+    parser.add_argument("--only", nargs="+", choices=names, default=names, help="these rows")
+    options = parser.parse_args(words)
     rows = []
     print(
         f"{'limits of':<10}{'printed s':>10}{'cited s':>9}{'ours s':>8}{'length/feed s':>15}{'axis usage %':>18}"
@@ -167,7 +168,7 @@ def main() -> int:
         file = Path(folder, "butterfly.dxf")
         file.write_text(drawing(), encoding="ascii")
         for printed in PRINTED:
-            if options.only and printed.name not in options.only:
+            if printed.name not in options.only:
                 continue
             row = measured(printed, file)
             rows.append(row)

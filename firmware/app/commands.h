@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * commands: executes the commands of the operator, which are written to objects 0x2001 and 0x2056. Called by app/objects and
- * app/controller. Changes the controller's state.
+ * commands: executes the commands of the operator, which are written to objects 0x2001 and 0x2056. Called by
+ * app/objects and app/controller. Changes the controller's state.
  *
  * Main loop: objects.c calls commands_execute for each write of 0x2001 and commands_start for each of 0x2056,
  * controller.c calls commands_execute at shut-down. While a chunk (a part of a streamed job) is checked, controller.c
@@ -12,17 +12,18 @@
 
 #include "app/controller_state.h"
 
+/* Values of object 0x2001. */
 enum command {
-    COMMAND_ENABLE = 1,
-    COMMAND_START = 2,
-    COMMAND_STOP = 3,
-    COMMAND_DISABLE = 4,
-    COMMAND_RESET = 5,
-    COMMAND_HOLD = 6,
-    COMMAND_RESUME = 7,
-    COMMAND_START_FROM = 8, /* at the arc length of object 0x2011 */
-    COMMAND_QUICK_STOP = 9,
-    COMMAND_HOME = 10,
+    COMMAND_ENABLE = 1,     /* drives on; nothing moves */
+    COMMAND_START = 2,      /* the open job, else the active program, from its start */
+    COMMAND_STOP = 3,       /* controlled stop on the path: final */
+    COMMAND_DISABLE = 4,    /* drives off */
+    COMMAND_RESET = 5,      /* out of a fault; in state off: configures the drives again */
+    COMMAND_HOLD = 6,       /* feed hold, which a resume ends */
+    COMMAND_RESUME = 7,     /* goes on after a hold or a program stop */
+    COMMAND_START_FROM = 8, /* the active program at the arc length of object 0x2011 */
+    COMMAND_QUICK_STOP = 9, /* each drive brakes by its own ramp, then off */
+    COMMAND_HOME = 10,      /* homes the axes that have a homing method */
 };
 
 /* What a start names (object 0x2056): another client may have replaced it since the host last read it. */

@@ -81,10 +81,10 @@ bool controller_configured(const struct controller *controller);
 /* Whether axes move (machine_moving). Takes the port's lock. */
 bool controller_moving(const struct controller *controller);
 
-/* After a power-on, or a reset, without a stored configuration the controller does not know its I/O module. So its first
- * heartbeat, at once after the boot-up message, is followed by a pause, in which a module that it has configured before
- * misses the heartbeats and switches its outputs off. (A consumer that has received the boot-up message waits for a
- * first heartbeat. A drive that is configured in the pause does so, too.) */
+/* After a power-on, or a reset, without a stored configuration the controller does not know its I/O module. So a pause
+ * follows its first heartbeat, which it sends at once after the boot-up message. In the pause a module that it has
+ * configured before misses the heartbeats and switches its outputs off. (A consumer that has received the boot-up
+ * message waits for a first heartbeat. A drive that is configured in the pause does so, too.) */
 #define CONTROLLER_QUIET_US ((DRIVE_CONTROLLER_TIMEOUT_MS + 500u) * 1000u)
 
 /* Sends the heartbeat if it is due. elapsed_us: since the last call. */

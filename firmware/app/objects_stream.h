@@ -20,9 +20,11 @@ uint32_t object_chunk_write(struct controller *controller, uint32_t offset, cons
 uint32_t object_chunk_end(struct controller *controller, uint32_t size);
 void object_chunk_abort(struct controller *controller);
 
-/* Sub 15 closes the job; SDO_ABORT_STATE while it is on the path. */
+/* Sub 16: whether optional program stops take effect. */
 uint32_t object_write_optional_stop(struct controller *controller, const struct od_entry *entry,
                                     uint64_t number);
+
+/* Sub 15 closes the job; SDO_ABORT_STATE while it is on the path. */
 uint32_t object_write_stream_close(struct controller *controller, const struct od_entry *entry,
                                    uint64_t number);
 

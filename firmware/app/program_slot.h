@@ -25,14 +25,14 @@
 
 /* Values of object 0x2000 sub 2. */
 enum program_slot_state {
-    PROGRAM_SLOT_NONE = 0,
-    PROGRAM_SLOT_RECEIVING = 1,
-    PROGRAM_SLOT_READY = 2,
+    PROGRAM_SLOT_NONE = 0,      /* no program */
+    PROGRAM_SLOT_RECEIVING = 1, /* an upload is under way; a program may be active as well */
+    PROGRAM_SLOT_READY = 2,     /* a program is active */
 };
 
 struct program_slot {
-    /* Its `attend` is called at each step of the check of a program, and while one is copied or its records are written,
-     * so that the main loop can send heartbeats. */
+    /* Its `attend` is called at each step of the check of a program, and while one is copied or its records are
+     * written, so that the main loop can send heartbeats. */
     struct program_table_user user;
     struct program program;       /* active, when present */
     struct program_fault refused; /* last refusal; code 0: none */
@@ -69,8 +69,8 @@ int program_slot_write(struct program_slot *slot, uint32_t offset, const uint8_t
 int program_slot_finish(struct program_slot *slot, uint32_t size, const struct config *config);
 void program_slot_abandon(struct program_slot *slot);
 
-/* Whether the program has been checked under this configuration since power-on: program_slot_refresh then costs nothing.
- * Without a program: true. Pure. */
+/* Whether the program has been checked under this configuration since power-on: program_slot_refresh then costs
+ * nothing. Without a program: true. Pure. */
 bool program_slot_is_checked(const struct program_slot *slot, const struct config *config);
 
 /* Brings start, end, `acceptable` and the coefficient records up to date. Costs a whole check if the configuration has

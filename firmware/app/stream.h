@@ -31,7 +31,7 @@
 
 /* Values of object 0x2060 sub 2. */
 enum stream_state {
-    STREAM_NONE = 0,
+    STREAM_NONE = 0,         /* no job */
     STREAM_OPEN = 1,         /* a job has its first chunk; it may be running */
     STREAM_UNDERRUN = 2,     /* rest at the end of a tail: the next chunk is missing */
     STREAM_ENDED = 3,        /* the last chunk has been executed to its end */

@@ -10,53 +10,58 @@
 
 #include <stdint.h>
 
+/* States by the names of the standard; the numbers are our own. */
 enum cia402_state {
-    CIA402_NOT_READY,
-    CIA402_SWITCH_ON_DISABLED,
-    CIA402_READY_TO_SWITCH_ON,
-    CIA402_SWITCHED_ON,
-    CIA402_OPERATION_ENABLED,
-    CIA402_QUICK_STOP_ACTIVE,
-    CIA402_FAULT_REACTION_ACTIVE,
-    CIA402_FAULT
+    CIA402_NOT_READY,             /* the drive initialises itself */
+    CIA402_SWITCH_ON_DISABLED,    /* power stage off; waits for shutdown */
+    CIA402_READY_TO_SWITCH_ON,    /* power stage off; waits for switch on */
+    CIA402_SWITCHED_ON,           /* power stage on; setpoints have no effect */
+    CIA402_OPERATION_ENABLED,     /* the axis follows its setpoints */
+    CIA402_QUICK_STOP_ACTIVE,     /* stops, or has stopped, as 0x605A requests */
+    CIA402_FAULT_REACTION_ACTIVE, /* stops as 0x605E requests; then Fault */
+    CIA402_FAULT                  /* power stage off; waits for a fault reset */
 };
 #define CIA402_STATES 8
 
 /* Modes of operation, 0x6060 and 0x6061. */
-enum cia402_mode { CIA402_MODE_NONE = 0, CIA402_MODE_HOMING = 6, CIA402_MODE_CSP = 8 };
+enum cia402_mode {
+    CIA402_MODE_NONE = 0,
+    CIA402_MODE_HOMING = 6, /* the drive moves the axis by itself and sets its zero */
+    CIA402_MODE_CSP = 8,    /* cyclic synchronous position: a target position for each SYNC */
+};
 
 /* Bit of 0x6502 (supported drive modes) for a mode 1 ... 32. */
 #define CIA402_SUPPORTS(mode) (UINT32_C(1) << ((mode) - 1))
 
 /* Statusword bits that do not belong to the state. */
 #define CIA402_STATUS_VOLTAGE         0x0010u /* power stage is fed */
-#define CIA402_STATUS_WARNING         0x0080u
+#define CIA402_STATUS_WARNING         0x0080u /* the drive has a warning, and goes on */
 #define CIA402_STATUS_REMOTE          0x0200u /* controlword is followed */
-#define CIA402_STATUS_TARGET_REACHED  0x0400u
+#define CIA402_STATUS_TARGET_REACHED  0x0400u /* Quick stop active: at standstill */
 #define CIA402_STATUS_LIMIT           0x0800u /* internal limit active */
 #define CIA402_STATUS_FOLLOWS         0x1000u /* CSP: drive follows the command value */
-#define CIA402_STATUS_FOLLOWING_ERROR 0x2000u /* CSP */
+#define CIA402_STATUS_FOLLOWING_ERROR 0x2000u /* CSP: out of the window 0x6065 */
 
 /* The same bits in homing mode. */
-#define CIA402_STATUS_HOMING_ATTAINED 0x1000u
-#define CIA402_STATUS_HOMING_ERROR    0x2000u
+#define CIA402_STATUS_HOMING_ATTAINED 0x1000u /* the axis has its zero */
+#define CIA402_STATUS_HOMING_ERROR    0x2000u /* homing has ended without a zero */
 
 /* Controlword bits. */
-#define CIA402_CONTROL_SWITCH_ON    0x0001u
-#define CIA402_CONTROL_VOLTAGE      0x0002u
-#define CIA402_CONTROL_QUICK_STOP   0x0004u /* active low */
-#define CIA402_CONTROL_ENABLE       0x0008u
-#define CIA402_CONTROL_START_HOMING 0x0010u /* homing mode */
-#define CIA402_CONTROL_FAULT_RESET  0x0080u
-#define CIA402_CONTROL_HALT         0x0100u
+#define CIA402_CONTROL_SWITCH_ON    0x0001u /* power stage on */
+#define CIA402_CONTROL_VOLTAGE      0x0002u /* enable voltage; 0: power stage off at once */
+#define CIA402_CONTROL_QUICK_STOP   0x0004u /* active low: 0 is a quick stop */
+#define CIA402_CONTROL_ENABLE       0x0008u /* enable operation */
+#define CIA402_CONTROL_START_HOMING 0x0010u /* homing mode: 1 homes, 0 interrupts */
+#define CIA402_CONTROL_FAULT_RESET  0x0080u /* acts at its rising edge */
+#define CIA402_CONTROL_HALT         0x0100u /* homing mode: stops until it is 0 */
 
 /* Commands as whole controlwords. */
-#define CIA402_DISABLE_VOLTAGE  0x0000u
-#define CIA402_QUICK_STOP       0x0002u
-#define CIA402_SHUTDOWN         0x0006u
-#define CIA402_SWITCH_ON        0x0007u /* also: disable operation */
-#define CIA402_ENABLE_OPERATION 0x000Fu
-#define CIA402_FAULT_RESET      0x0080u
+#define CIA402_DISABLE_VOLTAGE  0x0000u /* to Switch on disabled */
+#define CIA402_QUICK_STOP       0x0002u /* to Quick stop active */
+#define CIA402_SHUTDOWN         0x0006u /* to Ready to switch on */
+#define CIA402_SWITCH_ON        0x0007u /* to Switched on; also: disable operation */
+#define CIA402_ENABLE_OPERATION 0x000Fu /* to Operation enabled */
+#define CIA402_FAULT_RESET      0x0080u /* from Fault to Switch on disabled */
 
 /* Bits 0 ... 3, 5 (quick stop) and 6 of a statusword identify the state: a number below CIA402_CODES, and its state. */
 #define CIA402_CODES        64

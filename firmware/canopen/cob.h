@@ -26,6 +26,7 @@
 #define COB_SDO_REQUEST  0x600u /* + node: client to server */
 #define COB_HEARTBEAT    0x700u /* + node */
 
+/* Node numbers that CiA 301 allows. */
 #define NODE_ID_MIN 1u
 #define NODE_ID_MAX 127u
 

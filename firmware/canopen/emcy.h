@@ -15,35 +15,35 @@
 
 #include "can/can_frame.h"
 
-/* Bits of the error register 0x1001. */
-#define EMCY_REGISTER_GENERIC       0x01u
+/* Bits of the error register 0x1001 (CiA 301, 7.5.2.2): kinds of error that are present. */
+#define EMCY_REGISTER_GENERIC       0x01u /* set while any error is */
 #define EMCY_REGISTER_CURRENT       0x02u
 #define EMCY_REGISTER_VOLTAGE       0x04u
 #define EMCY_REGISTER_TEMPERATURE   0x08u
 #define EMCY_REGISTER_COMMUNICATION 0x10u
-#define EMCY_REGISTER_PROFILE       0x20u
+#define EMCY_REGISTER_PROFILE       0x20u /* of the device profile, here CiA 402 */
 #define EMCY_REGISTER_MANUFACTURER  0x80u
 
 /* Error codes that the project uses (CiA 301 table 26, CiA 402-2). */
-#define EMCY_NO_ERROR          0x0000u
-#define EMCY_GENERIC           0x1000u
+#define EMCY_NO_ERROR          0x0000u /* the last error has ended */
+#define EMCY_GENERIC           0x1000u /* no more exact code is known */
 #define EMCY_OVERLOAD          0x2310u /* continuous over current (I2t) */
-#define EMCY_DC_UNDERVOLTAGE   0x3220u
-#define EMCY_SOFTWARE          0x6100u
-#define EMCY_POSITION_SENSOR   0x7300u
+#define EMCY_DC_UNDERVOLTAGE   0x3220u /* supply of the power stage too low */
+#define EMCY_SOFTWARE          0x6100u /* internal software */
+#define EMCY_POSITION_SENSOR   0x7300u /* encoder */
 #define EMCY_POSITION_SENSOR_1 0x7305u /* incremental sensor 1 */
-#define EMCY_COMMUNICATION     0x8100u
-#define EMCY_CAN_OVERRUN       0x8110u
-#define EMCY_CAN_PASSIVE       0x8120u
+#define EMCY_COMMUNICATION     0x8100u /* any other error of the bus */
+#define EMCY_CAN_OVERRUN       0x8110u /* received frames were lost */
+#define EMCY_CAN_PASSIVE       0x8120u /* many bus errors: error passive */
 #define EMCY_HEARTBEAT         0x8130u /* life guard or heartbeat error */
-#define EMCY_BUS_OFF_RECOVERED 0x8140u
+#define EMCY_BUS_OFF_RECOVERED 0x8140u /* back on the bus after bus-off */
 #define EMCY_PDO_LENGTH        0x8210u /* PDO not processed: too short */
-#define EMCY_SYNC_LENGTH       0x8240u
-#define EMCY_RPDO_TIMEOUT      0x8250u
-#define EMCY_FOLLOWING_ERROR   0x8611u
+#define EMCY_SYNC_LENGTH       0x8240u /* SYNC of another length than 0x1019 requires */
+#define EMCY_RPDO_TIMEOUT      0x8250u /* no RPDO within its event timer */
+#define EMCY_FOLLOWING_ERROR   0x8611u /* out of the window 0x6065 for too long */
 #define EMCY_POSITION_LIMIT    0x8612u /* reference limit */
 #define EMCY_SYNC_LOST         0x8700u /* SYNC controller (CiA 402) */
-#define EMCY_MANUFACTURER      0xFF00u
+#define EMCY_MANUFACTURER      0xFF00u /* and above: the maker's own; here app/machine/fault.h */
 
 #define EMCY_HISTORY_MAX 8u
 #define EMCY_DETAIL_SIZE 5u

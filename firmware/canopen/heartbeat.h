@@ -25,7 +25,7 @@ bool heartbeat_producer_process(struct heartbeat_producer *producer, uint16_t pe
                                 enum nmt_state state, uint32_t elapsed_us, struct can_msg *out);
 
 enum heartbeat_event {
-    HEARTBEAT_NOTHING,
+    HEARTBEAT_NOTHING, /* no change */
     HEARTBEAT_BOOTED,  /* boot-up frame: the node (re)started */
     HEARTBEAT_CHANGED, /* first heartbeat, or the state differs from the last one */
     HEARTBEAT_LOST     /* none for longer than the consumer time; reported once, until the next one
@@ -34,8 +34,8 @@ enum heartbeat_event {
 
 enum heartbeat_presence {
     HEARTBEAT_UNKNOWN, /* no heartbeat yet: monitoring starts with the first one */
-    HEARTBEAT_PRESENT,
-    HEARTBEAT_MISSING
+    HEARTBEAT_PRESENT, /* the last one came within the consumer time */
+    HEARTBEAT_MISSING  /* lost; HEARTBEAT_LOST has been reported */
 };
 
 /* Monitors one node. */

@@ -17,18 +17,19 @@
 
 /* Values as in heartbeat frames. */
 enum nmt_state {
-    NMT_INITIALISING = 0x00,
-    NMT_STOPPED = 0x04,
-    NMT_OPERATIONAL = 0x05,
-    NMT_PRE_OPERATIONAL = 0x7F
+    NMT_INITIALISING = 0x00,   /* that of the boot-up frame */
+    NMT_STOPPED = 0x04,        /* NMT commands and heartbeats only */
+    NMT_OPERATIONAL = 0x05,    /* everything, also PDOs */
+    NMT_PRE_OPERATIONAL = 0x7F /* everything except PDOs */
 };
 
+/* First byte of a command frame. */
 enum nmt_command {
-    NMT_START = 0x01,
-    NMT_STOP = 0x02,
+    NMT_START = 0x01, /* to OPERATIONAL */
+    NMT_STOP = 0x02,  /* to STOPPED */
     NMT_ENTER_PRE_OPERATIONAL = 0x80,
-    NMT_RESET_NODE = 0x81,
-    NMT_RESET_COMMUNICATION = 0x82
+    NMT_RESET_NODE = 0x81,         /* all objects to power-on */
+    NMT_RESET_COMMUNICATION = 0x82 /* objects 0x1000 ... 0x1FFF to power-on */
 };
 
 /* Values of 0x1029 sub 1: what a communication error does. */

@@ -43,7 +43,7 @@ enum od_type {
 /* Access, as seen from the bus. */
 #define OD_READ     0x01u
 #define OD_WRITE    0x02u
-#define OD_MAPPABLE 0x04u
+#define OD_MAPPABLE 0x04u /* may be in a PDO */
 
 struct od_entry {
     uint32_t offset; /* of the value in the storage struct; 0 for a DOMAIN */

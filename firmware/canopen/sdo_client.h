@@ -18,22 +18,23 @@
 #include "can/can_frame.h"
 
 enum sdo_client_status {
-    SDO_CLIENT_IDLE,
-    SDO_CLIENT_BUSY,
+    SDO_CLIENT_IDLE,    /* no transfer yet */
+    SDO_CLIENT_BUSY,    /* a transfer is under way */
     SDO_CLIENT_DONE,    /* read: `size` bytes are in the buffer */
     SDO_CLIENT_REFUSED, /* the server aborted with abort_code */
     SDO_CLIENT_FAILED   /* this client aborted with abort_code (SDO_ABORT_TIMEOUT: no answer) */
 };
 
-#define SDO_CLIENT_ERR_BUSY     (-1)
-#define SDO_CLIENT_ERR_ARGUMENT (-2)
+/* Results of the functions that begin a transfer. */
+#define SDO_CLIENT_ERR_BUSY     (-1) /* a transfer is under way */
+#define SDO_CLIENT_ERR_ARGUMENT (-2) /* node not 1 ... 127, or size 0 */
 
 /* The response that is due. */
 enum sdo_client_step {
-    SDO_CLIENT_DOWNLOAD,
-    SDO_CLIENT_DOWNLOAD_SEGMENT,
-    SDO_CLIENT_UPLOAD,
-    SDO_CLIENT_UPLOAD_SEGMENT
+    SDO_CLIENT_DOWNLOAD,         /* to the request to write */
+    SDO_CLIENT_DOWNLOAD_SEGMENT, /* to a segment that was sent */
+    SDO_CLIENT_UPLOAD,           /* to the request to read */
+    SDO_CLIENT_UPLOAD_SEGMENT    /* the next segment */
 };
 
 struct sdo_client {

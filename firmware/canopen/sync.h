@@ -17,7 +17,7 @@
 
 struct sync_producer {
     struct can_msg frame; /* the last SYNC; its counter is 0 before the first */
-    uint8_t overflow;
+    uint8_t overflow;     /* 0x1019 */
 };
 
 /* Timer (or before it starts). `overflow` is 0x1019. */
@@ -35,6 +35,7 @@ struct sync_consumer {
 #define SYNC_ERR_LENGTH  (-2) /* length does not fit 0x1019 */
 #define SYNC_ERR_COUNTER (-3) /* counter 0 or above the overflow value */
 
+/* `overflow` is 0x1019. Before the first frame. */
 void sync_consumer_init(struct sync_consumer *consumer, uint8_t overflow);
 
 /* Periods since the SYNC before: 1 normally and for the first one, more when SYNCs were lost, 0 for

@@ -36,7 +36,8 @@ enum port_error {
 /* --- Life --- */
 
 /* Sets up clock, bus and store; both interrupts stay off. A hosted port reads its command line, a board ignores it (0,
- * NULL). Returns 0; otherwise main() returns the result as its exit status: the reason has been reported. */
+ * NULL). Returns 0; otherwise main() returns the result as its exit status: the reason has been reported. Main loop,
+ * once, before all others. */
 int port_begin(int argc, char **argv);
 
 /* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
@@ -89,7 +90,8 @@ uint32_t port_time_us(void); /* wraps after 71 minutes */
 /* Turns both interrupts on; the first tick comes one period later. Main loop, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* Changes the period: that before the next tick, or, where a timer has loaded it already, that after it. */
+/* Changes the period: that before the next tick, or, where a timer has loaded it already, that after it. Main loop, in
+ * a critical section. */
 void port_tick_period(uint32_t period_us);
 
 /* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
@@ -97,8 +99,8 @@ void port_tick_period(uint32_t period_us);
  * answered), for guard_us at most; then it starts late rather than on time. While the host as a whole stalls the guard
  * time does not run. At lock step the tick starts then at once if `hurry`. A board, whose timer knows nothing but the
  * clock, ignores both. */
-void port_tick_await(uint32_t guard_us, bool hurry);
-void port_tick_ready(void);
+void port_tick_await(uint32_t guard_us, bool hurry); /* timer */
+void port_tick_ready(void);                          /* receive */
 
 /* Whether ticks have to come in time because drives are real: then none is delayed for a main loop that gets no
  * processor time. Initially false. Boards, on which ticks are interrupts, ignore it. Main loop. */
@@ -114,13 +116,16 @@ enum port_timing port_timing(void);
 
 /* --- Main loop --- */
 
-/* Critical section: holds off both interrupts. Short, not nested, main loop only. */
+/* Critical section: holds off both interrupts. Short, not nested, main loop only. On Linux port_lock() waits for the
+ * handler that runs. */
 void port_lock(void);
 void port_unlock(void);
 
 /* Sleeps until port_wake(), a request to stop, or timeout_us; sometimes less. Main loop, outside the critical
  * section. */
 void port_wait(uint32_t timeout_us);
+
+/* Ends the present or the next port_wait(). */
 void port_wake(void);
 
 /* Reports progress in long work, during which the main loop does not call port_wait(). A port with a watchdog feeds it,

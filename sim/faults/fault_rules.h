@@ -11,37 +11,40 @@
 #include <stdint.h>
 
 #define FAULT_RULES_MAX 64u
-#define FAULT_FOR_EVER  UINT32_MAX
-#define FAULT_LINE_MAX  200u   /* characters of a line */
-#define FAULT_FILE_MAX  16384u /* bytes of a file */
+#define FAULT_FOR_EVER  UINT32_MAX /* of for_ticks: until the end */
+#define FAULT_LINE_MAX  200u       /* characters of a line */
+#define FAULT_FILE_MAX  16384u     /* bytes of a file */
 
 enum fault_kind {
-    FAULT_KIND_DROP, /* from here on: executed by the injector */
-    FAULT_KIND_DUPLICATE,
-    FAULT_KIND_DELAY,
-    FAULT_KIND_REORDER,
-    FAULT_KIND_CORRUPT,
-    FAULT_KIND_SHORT,
-    FAULT_KIND_FLOOD,
-    FAULT_KIND_BUS_OFF,
-    FAULT_KIND_STOP, /* from here on: executed by the drives */
-    FAULT_KIND_RESTART,
-    FAULT_KIND_HEARTBEAT_STOP,
-    FAULT_KIND_ENCODER_FREEZE,
-    FAULT_KIND_ENCODER_JUMP,
-    FAULT_KIND_ENCODER_FAULT,
-    FAULT_KIND_SATURATE,
-    FAULT_KIND_LOAD,
-    FAULT_KIND_LIMIT_SWITCH,
-    FAULT_KIND_FAULT,
-    FAULT_KINDS
+    /* Executed by the injector. */
+    FAULT_KIND_DROP,      /* frames are lost */
+    FAULT_KIND_DUPLICATE, /* frames come twice */
+    FAULT_KIND_DELAY,     /* frames come later by delay_us */
+    FAULT_KIND_REORDER,   /* a frame changes places with the next one */
+    FAULT_KIND_CORRUPT,   /* data byte `byte` changes by `mask` */
+    FAULT_KIND_SHORT,     /* frames come with `len` bytes */
+    FAULT_KIND_FLOOD,     /* per_tick more frames in each tick */
+    FAULT_KIND_BUS_OFF,   /* no frames from or to `side` */
+    /* Executed by the drives (sim/node/node_faults.h). */
+    FAULT_KIND_STOP,           /* the drive has no power */
+    FAULT_KIND_RESTART,        /* power lost and back at once */
+    FAULT_KIND_HEARTBEAT_STOP, /* no heartbeats */
+    FAULT_KIND_ENCODER_FREEZE, /* the reading of the encoder stays */
+    FAULT_KIND_ENCODER_JUMP,   /* the reading changes by `counts` */
+    FAULT_KIND_ENCODER_FAULT,  /* the drive detects that its encoder fails */
+    FAULT_KIND_SATURATE,       /* the voltage limit is `volts` */
+    FAULT_KIND_LOAD,           /* a load torque that takes `volts` */
+    FAULT_KIND_LIMIT_SWITCH,   /* the switch at `side` is on */
+    FAULT_KIND_FAULT,          /* the drive goes to Fault with `code` */
+    FAULT_KINDS                /* how many there are */
 };
 
+/* Sides of the injector, and ends of an axis. */
 enum fault_side {
-    FAULT_SIDE_CONTROLLER,
-    FAULT_SIDE_DRIVES,
-    FAULT_SIDE_NEGATIVE,
-    FAULT_SIDE_POSITIVE
+    FAULT_SIDE_CONTROLLER, /* the bus of the controller and the host, */
+    FAULT_SIDE_DRIVES,     /* and that of the drives */
+    FAULT_SIDE_NEGATIVE,   /* the limit switch at the negative end of an axis, */
+    FAULT_SIDE_POSITIVE    /* and that at the positive end */
 };
 
 /* One rule; fields that its kind does not have are 0. */

@@ -10,7 +10,13 @@
 
 #include "port/linux/can_socket.h"
 
-enum gateway_status { GATEWAY_OK = 0, GATEWAY_GONE = 1, GATEWAY_USAGE = 2, GATEWAY_BUS = 4 };
+/* Exit statuses of hodograph-bridge. */
+enum gateway_status {
+    GATEWAY_OK = 0,    /* the board has ended, by itself or after a signal */
+    GATEWAY_GONE = 1,  /* the board or its connection is gone */
+    GATEWAY_USAGE = 2, /* wrong command line */
+    GATEWAY_BUS = 4    /* the bus cannot be opened, or has failed */
+};
 
 /* From now on SIGTERM, SIGINT and, if it is not ignored, SIGHUP of this process are only counted. 0, or -1 with errno
  * set. */

@@ -31,9 +31,9 @@
 #include "hub/virtual_time.h"
 #include "port/linux/local_bus.h"
 
-#define HUB_BUSES       4u
-#define HUB_CONNECTIONS 64u
-#define HUB_QUEUE       2048u
+#define HUB_BUSES       4u    /* of one hub, at most, as all that follow */
+#define HUB_CONNECTIONS 64u   /* of all buses, with the participants */
+#define HUB_QUEUE       2048u /* frames of a member that wait for the bus */
 #define HUB_HELD        2048u /* frames for a member, before its participant wakes */
 #define HUB_UNPOLLED    64u   /* grants between two polls of all connections, at most */
 
@@ -57,7 +57,12 @@ struct hub_held {
     size_t count;
 };
 
-enum hub_role { HUB_UNKNOWN, HUB_MEMBER, HUB_PARTICIPANT }; /* unknown: no hello yet */
+/* Kind of a connection (port/linux/local_bus.h). */
+enum hub_role {
+    HUB_UNKNOWN,    /* no hello yet */
+    HUB_MEMBER,     /* sends and receives frames of a bus */
+    HUB_PARTICIPANT /* takes part in virtual time */
+};
 
 struct hub_connection {
     int fd; /* -1: not in use */

@@ -53,7 +53,10 @@ bool axis_motion_hold(struct axis_motion *axis);
 
 /* One period in which the motor brakes at its limit: of the current (rated torque) or of the voltage. Returns true when
  * the axis is at standstill; its target is then its position. */
-enum axis_motion_limit { AXIS_MOTION_CURRENT, AXIS_MOTION_VOLTAGE };
+enum axis_motion_limit {
+    AXIS_MOTION_CURRENT, /* of the current: the rated torque */
+    AXIS_MOTION_VOLTAGE  /* of the voltage: the shortest distance */
+};
 bool axis_motion_brake(struct axis_motion *axis, enum axis_motion_limit limit);
 
 /* One period in which the speed of the target approaches `speed` (counts per period) by at most the acceleration

@@ -26,8 +26,8 @@ enum drive_homing_phase {
     DRIVE_HOMING_BACK,     /* slowly, until it goes off */
     DRIVE_HOMING_APPROACH, /* slowly, until it comes on again */
     DRIVE_HOMING_STOP,     /* home was passed: stopping */
-    DRIVE_HOMING_DONE,
-    DRIVE_HOMING_FAILED /* stopping, or at standstill */
+    DRIVE_HOMING_DONE,     /* the axis has its zero, at standstill */
+    DRIVE_HOMING_FAILED    /* stopping, or at standstill */
 };
 
 /* All zero is the beginning. */

@@ -41,12 +41,12 @@ struct offline_row {
 };
 
 enum offline_order_kind {
-    OFFLINE_ORDER_HOLD,
-    OFFLINE_ORDER_RESUME,
-    OFFLINE_ORDER_OVERRIDE, /* percent */
-    OFFLINE_ORDER_STOP,
-    OFFLINE_ORDER_FAULT_STOP,
-    OFFLINE_ORDER_KINDS
+    OFFLINE_ORDER_HOLD,       /* feed hold */
+    OFFLINE_ORDER_RESUME,     /* ends it */
+    OFFLINE_ORDER_OVERRIDE,   /* feed override: `percent` */
+    OFFLINE_ORDER_STOP,       /* controlled stop */
+    OFFLINE_ORDER_FAULT_STOP, /* fault stop */
+    OFFLINE_ORDER_KINDS       /* how many there are */
 };
 
 /* A command that takes effect from setpoint `tick` on, which is the first that may differ for it. */

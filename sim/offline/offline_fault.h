@@ -24,7 +24,7 @@ enum offline_fault_kind {
     OFFLINE_FAULT_LOAD,     /* value: load torque as the voltage it takes, V */
     OFFLINE_FAULT_SETPOINT_LOST, /* setpoints do not arrive: the drive stays with the last one. Those of
                                  a tick are sent in it and latched in the next */
-    OFFLINE_FAULT_KINDS
+    OFFLINE_FAULT_KINDS          /* how many there are */
 };
 
 struct offline_fault {

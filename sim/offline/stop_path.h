@@ -8,8 +8,8 @@
  * three derivatives of all axes by arc length (spatial ones), and the greatest feed there. Groups of 4, 16, 64, ...
  * rows have the greatest magnitudes of their rows, so that bounds of a long stretch cost a logarithm of its length.
  *
- * stop_rows() fills the table once; stop_lookup_open() makes the struct that the look-ups use; each thread needs its own.
- * mm, s. No heap: the caller lends all arrays. Any thread of a host; the functions change their arguments only.
+ * stop_rows() fills the table once. stop_lookup_open() makes the struct that the look-ups use; each thread needs its
+ * own. mm, s. No heap: the caller lends all arrays. Any thread of a host; the functions change their arguments only.
  */
 #ifndef HODOGRAPH_OFFLINE_STOP_PATH_H
 #define HODOGRAPH_OFFLINE_STOP_PATH_H

@@ -154,8 +154,8 @@ static void search_piece(const struct stop_setting *setting, struct stop_piece *
     }
 }
 
-/* Takes codes that keep the limits strictly, each less than the greatest by its share of `down` quarters; 0: they do
- * not. */
+/* Tries the codes `from`, each less a quarter of its number in `quarters`; a negative number raises a code. Takes them
+ * as `best` if they are better and keep the limits strictly. Returns whether it took them. */
 static int lower_by(const struct stop_setting *setting, struct stop_piece *piece, const int from[3],
                     const int quarters[3], double after_s, struct choice *best)
 {

@@ -28,7 +28,7 @@
 #include "plant/motor.h"
 #include "plant/pdff.h"
 
-#define DRIVE_PARK_PERIODS    250
+#define DRIVE_PARK_PERIODS    250 /* of the standstill lock, see above */
 #define DRIVE_PARK_INCREMENTS 2
 
 /* What changes from servo sample to servo sample. */
@@ -90,6 +90,7 @@ int32_t drive_position_counts(const struct drive *drive);
 /* Volts applied over the last servo sample, in mV as on the bus. */
 int16_t drive_volts_mv(const struct drive *drive);
 
+/* Whether the standstill lock holds the axis. */
 bool drive_parked(const struct drive *drive);
 
 /* ---- The samples of a period, for callers that compute them themselves (influence.h) ---- */

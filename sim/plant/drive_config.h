@@ -24,10 +24,17 @@ struct drive_pdff {
 
 /* How the drive goes from one setpoint to the next (docs/theory/drives.md section 13): in a straight line, along a
  * cubic, or not at all: the setpoint is the command from the beginning of its period. */
-enum drive_interpolation { DRIVE_LINEAR = 0, DRIVE_CUBIC = 1, DRIVE_NO_INTERPOLATION = 2 };
+enum drive_interpolation {
+    DRIVE_LINEAR = 0,           /* in a straight line */
+    DRIVE_CUBIC = 1,            /* along a cubic */
+    DRIVE_NO_INTERPOLATION = 2, /* at once */
+};
 
 /* Source of the speed for the loop: the motor itself, or the difference of the last two encoder samples. */
-enum drive_speed { DRIVE_SPEED_EXACT = 0, DRIVE_SPEED_DIFFERENCES = 1 };
+enum drive_speed {
+    DRIVE_SPEED_EXACT = 0,       /* of the motor */
+    DRIVE_SPEED_DIFFERENCES = 1, /* of encoder samples */
+};
 
 /* Which errors of the speed the loop's integral counts: those of all samples with the present one (backward Euler), or
  * without it (forward Euler). */

@@ -3,7 +3,7 @@
  * Support of the fuzz harnesses. A harness is tests/fuzz/fuzz_NAME.c: it defines LLVMFuzzerTestOneInput, which reads
  * the bytes of an input as a script (what happens next) and aborts where a rule is broken. It is linked twice: with
  * libFuzzer and coverage by clang (`make fuzz`), and with replay.c by the compiler of the tests, which runs the corpus
- * in tests/data/fuzz/NAME. An input must give the same run each time.
+ * in tests/data/fuzz/NAME. An input must give the same run each time. Used by the harnesses. Any context; no I/O.
  */
 #ifndef HODOGRAPH_TESTS_FUZZ_H
 #define HODOGRAPH_TESTS_FUZZ_H

@@ -2,7 +2,7 @@
 /*
  * What the fixed kernel's functions promise each other beyond what intervals show: consequences of the positive Bernstein
  * coefficients of sigma (docs/theory/proofs.md section 15.3). Eva takes them for granted in eva_fixed.c, and
- * tests/unit/test_kernel_contracts.c holds the functions themselves to them at the corners.
+ * tests/unit/test_kernel_ranges.c holds the functions themselves to them at the corners.
  */
 #ifndef HODOGRAPH_KERNEL_BOUNDS_H
 #define HODOGRAPH_KERNEL_BOUNDS_H

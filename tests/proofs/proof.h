@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a proof is written with; the same words for both provers. tools/prove.py runs the proofs, and
+ * What a proof is written with; the same words for both provers. tools/analysis/prove.py runs the proofs, and
  * docs/theory/proofs.md section 15 says what they show.
  */
 #ifndef HODOGRAPH_PROOF_H

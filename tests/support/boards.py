@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Emulated boards: how they are started, and the processes that make one."""
+"""Emulated boards: how they are started, and the processes that make one. Used by tests/system. Starts processes."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Headless Chromium, driven by the Chrome DevTools Protocol over a WebSocket."""
+"""Headless Chromium, driven by the Chrome DevTools Protocol over a WebSocket. Used by tests/system. Starts a
+process and sends to it.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,7 @@ class Browser:
 
     def __init__(self, folder: Path) -> None:
         program = shutil.which("chromium") or shutil.which("chromium-browser")
-        assert program is not None, "chromium is not installed: tools/packages.py browser"
+        assert program is not None, "chromium is not installed: tools/packages.py test installs it"
         self._folder = folder / "chromium"
         command = [
             program,

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph` commands: as processes in virtual time, or in the test itself."""
+"""`hodograph` commands: as processes in virtual time, or in the test itself. Used by tests of commands. Starts
+processes.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drawings as text, the moves that readers make of them, and points of these moves."""
+"""Drawings as text, the moves that readers make of them, and points of these moves. Used by the tests of toolpaths.
+Writes files.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Short programs of G-code and what the reader makes of them."""
+"""Short programs of G-code and what the reader makes of them. Used by the tests of the G-code reader. No I/O."""
 
 from __future__ import annotations
 

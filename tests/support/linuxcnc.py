@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""LinuxCNC's interpreter `rs274` as an oracle, and its commands and those of `read_gcode` in one form.
+"""LinuxCNC's interpreter `rs274` as an oracle, and its commands and those of `read_gcode` in one form. Used by tests of
+toolpaths and by benchmarks/peers. Starts processes; writes temporary files.
 
 `rs274` prints canonical commands with four decimals, in the units of the program and relative to all offsets.
 `canonical` follows the offsets and gives machine positions in mm, so that a position is off by a few 1e-4 units.

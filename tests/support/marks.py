@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Values of a parameter whose tests run in `make test-all` only: others of the same kind run in `make test`."""
+"""Values of a parameter whose tests run in `make test-all` only: others of the same kind run in `make test`. Used by
+tests. No I/O.
+"""
 
 from __future__ import annotations
 

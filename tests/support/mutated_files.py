@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Files that are broken somewhere: bytes, words, numbers and lines of a sound file changed, by a seed."""
+"""Files that are broken somewhere: bytes, words, numbers and lines of a sound file changed, by a seed. Used by the
+tests of toolpaths. No I/O.
+"""
 
 from __future__ import annotations
 

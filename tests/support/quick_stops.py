@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compiles programs for tests of their motion: their stops are searched with few trials."""
+"""Compiles programs for tests of their motion: their stops are searched with few trials. Used by the tests of feed
+plans. No I/O.
+"""
 
 from hodograph.program import ProgramOptions, StopTerms
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Compares `run --json` on a bus with `simulate --json` without one, for the same motion."""
+"""Compares `run --json` on a bus with `simulate --json` without one, for the same motion. Used by tests/system. Starts
+simulated machines.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A machine of six axes: the five of examples/machines/mill_five_axes.toml, and b, which turns like a."""
+"""A machine of six axes: the five of examples/machines/mill_five_axes.toml, and b, which turns like a. Used by tests of
+machines with six axes. Writes the file of the machine.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Spatial segments in integers: their exact geometry, and program images of them without the planner."""
+"""Spatial segments in integers: their exact geometry, and program images of them without the planner. Used by tests of
+programs in space and by tests/data/make_golden. No I/O.
+"""
 
 from __future__ import annotations
 

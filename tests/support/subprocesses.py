@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Programs that a test runs from start to end, with a limit of time and the expected exit status."""
+"""Programs that a test runs from start to end, with a limit of time and the expected exit status. Used by the tests of
+packages and of the library. Starts processes.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Traffic of a machine as the bus would show it, made from `simulate`."""
+"""Traffic of a machine as the bus would show it, made from `simulate`. Used by the tests of the live page. No I/O."""
 
 from __future__ import annotations
 

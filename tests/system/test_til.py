@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Target in the loop: the controller on an emulated board, on a bus in virtual time, against the simulated drives."""
+"""Target in the loop: the controller on an emulated board, on a bus in virtual time, against the simulated drives.
+
+Starts the emulator, the gateway and the drives as processes. Uses local buses only, no kernel CAN.
+"""
 
 from __future__ import annotations
 

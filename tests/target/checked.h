@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What the images that check a program have in common: the program in the store, and limits as those of the machines in
- * examples/machines. */
+ * examples/machines. Used by checker.c and stop_checker.c. Reads the store. */
 #ifndef TARGET_CHECKED_H
 #define TARGET_CHECKED_H
 

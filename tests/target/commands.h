@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * commands: commands to a motion while it runs, read from a file of pairs of u32, little-endian, in order of
- * their ticks: before this tick (0 is the first), this override in per cent (0 ... 200) or one of the commands below.
+ * commands: commands to a motion while it runs, read from a file of pairs of u32, little-endian, in order of their
+ * ticks: before this tick (0 is the first), this override in per cent (0 ... 200) or one of the commands below. Used by
+ * the images isr and setpoints. Reads the file by semihosting.
  */
 #ifndef TARGET_COMMANDS_H
 #define TARGET_COMMANDS_H

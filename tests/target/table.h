@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * table: the place after the programs in the store where a program's coefficient records (core/coefficients.h) go.
+ * table: the place after the programs in the store where a program's coefficient records (core/coefficients.h) go. Used
+ * by the images isr and setpoints. Writes to the store.
  */
 #ifndef TARGET_TABLE_H
 #define TARGET_TABLE_H

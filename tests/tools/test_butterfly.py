@@ -48,6 +48,16 @@ def test_the_reader_gets_the_printed_curve(tmp_path: Path) -> None:
     assert length == pytest.approx(382.8596, abs=1e-3)
 
 
+@pytest.mark.parametrize("words", [["--only", "Farouki"], ["--only"]])
+def test_only_rows_that_are_there(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        butterfly.main(words)
+    assert end.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "argument --only: " in err.splitlines()[-1]
+
+
 @pytest.mark.long
 def test_a_printed_time_is_ours_or_longer(tmp_path: Path) -> None:
     """Of the row whose curve may have the printed size; docs/validation/butterfly.md has this figure."""

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Deviations from MISRA C: what they cover, and that they go when nothing needs them."""
 
+import re
 import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools" / "misra"))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools" / "misra"))
 
-import check_misra
+import check_misra  # noqa: E402
 
 OUTPUT = """\
 firmware/core/a.c:7: misra-c2012-15.5
@@ -39,3 +41,14 @@ def test_a_deviation_that_nothing_needs_is_complained_of() -> None:
 def test_a_deviation_without_a_reason_is_refused() -> None:
     with pytest.raises(ValueError, match="no reason"):
         check_misra.read_deviations("15.5 *\n")
+
+
+def test_the_page_names_the_rules_with_deviations() -> None:
+    """And no others: docs/validation/testing.md, the last table of its section."""
+    text = (ROOT / "docs/validation/testing.md").read_text(encoding="utf-8")
+    table = text.split("| reason | rules |")[1].split("\n\n")[0]
+    cells = [row.split("|")[2] for row in table.splitlines() if row.count("|") == 3]
+    named = [rule for cell in cells for rule in re.findall(r"\d+\.\d+", cell)]
+    listed = check_misra.read_deviations(check_misra.DEVIATIONS.read_text(encoding="utf-8"))
+    assert len(named) == len(set(named))
+    assert set(named) == {deviation.rule for deviation in listed}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * app_bench: a whole controller on the fake port, with two fake drives, optionally an I/O module, and an SDO client as
- * host, on a bus without delays.
+ * host, on a bus without delays. Used by the tests of firmware/app (test_app_*.c). One thread; no I/O.
  */
 #ifndef TESTS_UNIT_APP_BENCH_H
 #define TESTS_UNIT_APP_BENCH_H

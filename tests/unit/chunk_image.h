@@ -2,7 +2,7 @@
 /*
  * chunk_image: chunks of a job that is small enough to be written by hand: straight along x, from rest to 16 mm/s in
  * 0.5 s (4 mm), then pieces of 1/32 s (0.5 mm) at 16 mm/s. The end of each chunk brakes to rest in 0.5 s (4 mm).
- * Segments of 4 mm. Pieces allow an override of 150 %.
+ * Segments of 4 mm. Pieces allow an override of 150 %. Used by test_app_stream.c and test_app_stream_outputs.c. Pure.
  */
 #ifndef TESTS_UNIT_CHUNK_IMAGE_H
 #define TESTS_UNIT_CHUNK_IMAGE_H

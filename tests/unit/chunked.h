@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * chunked: a program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to
- * its joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has
- * the events of the program on its segments.
+ * chunked: a program cut into the chunks of a job, for tests. Each chunk has the pieces of the program from one to its
+ * joint, and after them a tail: a quintic to rest at the end of a segment, inside the limits of the program. It has the
+ * events of the program on its segments. Used by test_chunk.c, test_stream_cuts.c and fuzz_chunk.c. No I/O.
  */
 #ifndef TESTS_UNIT_CHUNKED_H
 #define TESTS_UNIT_CHUNKED_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * fake_drive: an ideal CiA 402 drive for tests of the controller: the drive's dictionary and protocol objects, a motor
- * that always reaches its target two SYNCs later, and switches for misbehaviour.
+ * that always reaches its target two SYNCs later, and switches for misbehaviour. Used by app_bench and by harnesses of
+ * tests/fuzz. One thread; no I/O.
  */
 #ifndef TESTS_UNIT_FAKE_DRIVE_H
 #define TESTS_UNIT_FAKE_DRIVE_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * fake_port: port.h for tests: time that the test moves, sent frames that the test takes, interrupts that the test
- * calls. Ends the test when a rule of port.h about the lock is broken.
+ * calls. Ends the test when a rule of port.h about the lock is broken. Used by app_bench, the tests of firmware/app and
+ * harnesses of tests/fuzz. One thread; no I/O.
  */
 #ifndef TESTS_UNIT_FAKE_PORT_H
 #define TESTS_UNIT_FAKE_PORT_H

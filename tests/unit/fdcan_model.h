@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * fdcan_model: FDCAN1 of an STM32G4 as its reference manual describes it (RM0440 chapter 44), for one node on a bus
- * that the test plays: configuration protocol, message RAM, filters, FIFOs, flags, bus-off.
+ * that the test plays: configuration protocol, message RAM, filters, FIFOs, flags, bus-off. A part of stm32g4_chip.
+ * Used by the tests of firmware/port/stm32g4. One thread; no I/O.
  */
 #ifndef TESTS_UNIT_FDCAN_MODEL_H
 #define TESTS_UNIT_FDCAN_MODEL_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * flash_model: the flash of an STM32G474 in dual-bank mode as its reference manual describes it (RM0440 chapter 3):
- * keys, erasing pages and programming double words of bank 2, error flags; and a supply that can fail at any of
- * these operations.
+ * keys, erasing pages and programming double words of bank 2, error flags; and a supply that can fail at any of these
+ * operations. A part of stm32g4_chip. Used by the tests of firmware/port/stm32g4. One thread; no I/O.
  */
 #ifndef TESTS_UNIT_FLASH_MODEL_H
 #define TESTS_UNIT_FLASH_MODEL_H

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* hub_thread: a hub that runs in a thread of the test. */
+/* hub_thread: a hub that runs in a thread of the test. Used by the tests of sim/hub and by test_drives.c. Starts a
+ * thread, which makes sockets. */
 #ifndef HUB_THREAD_H
 #define HUB_THREAD_H
 

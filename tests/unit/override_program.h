@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Programs for the override's property test: random feed over a straight line, or a golden image, with override bounds
- * and a stop table made in C from chosen limits by docs/theory/feed.md section 7.
+ * and a stop table made in C from chosen limits by docs/theory/feed.md section 7. Used by test_override.c and chunked.
+ * Reads golden images.
  */
 #ifndef HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H
 #define HODOGRAPH_TESTS_OVERRIDE_PROGRAM_H

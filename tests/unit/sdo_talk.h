@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* sdo_talk: a client made of raw frames, for tests of the SDO server: one node, one small
- * dictionary. */
+/* sdo_talk: a client made of raw frames, for tests of the SDO server: one node, one small dictionary. Used by the tests
+ * of SDO (test_sdo_*.c) and by fuzz_sdo_server.c. One thread; no I/O. */
 #ifndef SDO_TALK_H
 #define SDO_TALK_H
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* small_od: a small object dictionary with recording hooks, for the tests of od and SDO. */
+/* small_od: a small object dictionary with recording hooks, for the tests of od and SDO. Used by sdo_talk and
+ * test_od.c. One thread; no I/O. */
 #ifndef SMALL_OD_H
 #define SMALL_OD_H
 

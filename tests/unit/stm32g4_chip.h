@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stm32g4_chip: an STM32G474 for tests of firmware/port/stm32g4: what its registers do, as reference manual RM0440
- * describes it. The models share no constant with the port. What the manual forbids ends the test.
+ * describes it. The models share no constant with the port. What the manual forbids ends the test. Used by the tests of
+ * firmware/port/stm32g4. One thread; no I/O.
  *
  *     chip_power_on();                      registers as after power-on; the flash keeps what it holds
  *     ...

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* stop_table: the stop table of an image that a test has made, with the bounds that the check requires. */
+/* stop_table: the stop table of an image that a test has made, with the bounds that the check requires. Used by the
+ * other images of this folder. Changes the image only. */
 #ifndef TESTS_UNIT_STOP_TABLE_H
 #define TESTS_UNIT_STOP_TABLE_H
 

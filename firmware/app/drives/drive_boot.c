@@ -138,9 +138,9 @@ static void begin_drive(struct drive_boot *boot)
     boot->reads = 0;
 }
 
-/* Index (not node number) of the node that is configured first: the I/O module, if there is one. Its configuration
- * switches its outputs off, which must not wait for a drive that does not answer. */
-static uint8_t first_node(const struct config *config)
+/* What is configured first, as `axis` of the state: the I/O module, if there is one. Its configuration switches its
+ * outputs off, which must not wait for a drive that does not answer. */
+static uint8_t first_index(const struct config *config)
 {
     return config->outputs.node != 0u ? config->axis_count : 0u;
 }
@@ -249,7 +249,7 @@ static void begin_attempt(struct drive_boot *boot)
     if (nodes_clash(boot)) {
         return;
     }
-    boot->axis = first_node(&boot->config);
+    boot->axis = first_index(&boot->config);
     boot->simulated = true;
     boot->phase = DRIVE_BOOT_CONFIGURE;
     begin_drive(boot);

@@ -19,18 +19,19 @@
 #include "app/machine/config.h"
 #include "canopen/sdo_client.h"
 
+/* Times of an attempt. */
 #define DRIVE_BOOT_SDO_TIMEOUT_US 500000u /* for the answer of a drive */
 #define DRIVE_BOOT_PAUSE_US      20000u /* hosts write several objects at once: wait for the last */
-#define DRIVE_BOOT_RETRY_US      200000u
-#define DRIVE_BOOT_READ_AGAIN_US 5000u /* a value that a drive takes over in its own cycle */
-#define DRIVE_BOOT_READS         20u
+#define DRIVE_BOOT_RETRY_US      200000u /* from a failed attempt to the next one */
+#define DRIVE_BOOT_READ_AGAIN_US 5000u   /* a value that a drive takes over in its own cycle */
+#define DRIVE_BOOT_READS         20u     /* most reads of one object until it has the value */
 
 enum drive_boot_phase {
-    DRIVE_BOOT_IDLE,
+    DRIVE_BOOT_IDLE,      /* no attempt has begun */
     DRIVE_BOOT_PAUSE,     /* before the first drive, or before the next attempt */
     DRIVE_BOOT_CONFIGURE, /* the I/O module or the drive of `configuration` */
     DRIVE_BOOT_START,     /* all are configured; `axis` is to be started next */
-    DRIVE_BOOT_DONE,
+    DRIVE_BOOT_DONE,      /* all are configured and started */
 };
 
 /* Object 0x2025: what the last attempt failed at. */
@@ -52,6 +53,7 @@ struct drive_boot {
     enum drive_boot_phase phase;
     uint32_t pause_us;
     uint32_t refused_code; /* abort code of the refused write that is now read back */
+    /* index of the axis whose drive is configured or started; axis_count of the configuration: the I/O module */
     uint8_t axis;
     uint8_t reads; /* of the present object, without the right answer */
     bool reading_back;

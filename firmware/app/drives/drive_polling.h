@@ -16,8 +16,8 @@
 #include "app/machine/machine.h"
 #include "canopen/sdo_client.h"
 
-#define DRIVE_POLLING_US             250000u
-#define DRIVE_POLLING_SDO_TIMEOUT_US 100000u
+#define DRIVE_POLLING_US             250000u /* the time from one read of an object to the next */
+#define DRIVE_POLLING_SDO_TIMEOUT_US 100000u /* for the answer of a drive */
 
 struct drive_polling {
     struct sdo_client client;

@@ -10,11 +10,11 @@
 #include "canopen/cia402.h"
 
 enum drive_property {
-    DRIVE_VENDOR, /* 0x1018 subs 1 ... 4 */
-    DRIVE_PRODUCT,
-    DRIVE_REVISION,
-    DRIVE_SERIAL,
-    DRIVE_MODES,           /* 0x6502 */
+    DRIVE_VENDOR,          /* 0x1018 sub 1 */
+    DRIVE_PRODUCT,         /* 0x1018 sub 2 */
+    DRIVE_REVISION,        /* 0x1018 sub 3 */
+    DRIVE_SERIAL,          /* 0x1018 sub 4 */
+    DRIVE_MODES,           /* 0x6502: a bit for each mode of operation (CIA402_SUPPORTS) */
     DRIVE_POSITION,        /* 0x6064 before the first write; known if homing is configured */
     DRIVE_INPUTS,          /* 0x60FD exists; its value then */
     DRIVE_INPUTS_MAPPED,   /* and TPDO3 reports its changes */
@@ -33,6 +33,7 @@ struct drive_properties {
     bool known[DRIVE_PROPERTY_COUNT]; /* else the drive has no such object */
 };
 
+/* Stores what the drive reported; DRIVE_NO_PROPERTY is ignored. */
 static inline void drive_properties_read(struct drive_properties *properties, unsigned property,
                                          uint32_t value)
 {

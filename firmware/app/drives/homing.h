@@ -26,19 +26,19 @@
 
 #define HOMING_SWITCH_US 2000000u /* to switch a drive on, or off */
 #define HOMING_SPARE_S   10u      /* in addition to the time for the whole travel */
-#define HOMING_MAX_S     600u
+#define HOMING_MAX_S     600u     /* the most that homing_time_s gives */
 
 /* After so many SYNCs the statusword answers the new controlword: sending, latching and answering take 4, the others
  * are for lost frames. Until then "attained" may be that of an earlier homing. */
 #define HOMING_SYNCS_BEFORE_ANSWER 10u
 
 enum homing_phase {
-    HOMING_IDLE,
-    HOMING_OFF,    /* until the drive is off: the command may be a few ticks old */
-    HOMING_MODE,   /* writes 0x6060 = 6, until 0x6061 is 6 */
-    HOMING_ENABLE, /* to Operation enabled */
-    HOMING_MOVE,   /* the drive seeks its zero */
-    HOMING_DISABLE,
+    HOMING_IDLE,      /* no homing is under way */
+    HOMING_OFF,       /* until the drive is off: the command may be a few ticks old */
+    HOMING_MODE,      /* writes 0x6060 = 6, until 0x6061 is 6 */
+    HOMING_ENABLE,    /* to Operation enabled */
+    HOMING_MOVE,      /* the drive seeks its zero */
+    HOMING_DISABLE,   /* the axis has its zero: until the drive is off */
     HOMING_MODE_BACK, /* 0x6060 = 8 */
 };
 

@@ -18,13 +18,13 @@
 
 #include "canopen/sdo_client.h"
 
-#define HOMING_MODE_SDO_TIMEOUT_US 500000u
-#define HOMING_MODE_READ_AGAIN_US  5000u
-#define HOMING_MODE_READS          20u /* of 0x6061, until it is the mode */
+#define HOMING_MODE_SDO_TIMEOUT_US 500000u /* for the answer of the drive */
+#define HOMING_MODE_READ_AGAIN_US  5000u   /* between two reads of 0x6061 */
+#define HOMING_MODE_READS          20u     /* of 0x6061, until it is the mode */
 
 enum homing_mode_result {
-    HOMING_MODE_PENDING,
-    HOMING_MODE_SET,
+    HOMING_MODE_PENDING, /* not decided yet */
+    HOMING_MODE_SET,     /* the drive has the mode */
     HOMING_MODE_REFUSED, /* `detail`: the abort code, or the mode that 0x6061 stays at */
 };
 

@@ -22,8 +22,8 @@
 #define CONFIG_COUNTS_PER_MM_MAX 8388608u
 
 /* Bits of feedforward. */
-#define CONFIG_TORQUE_FEEDFORWARD   1u
-#define CONFIG_VELOCITY_FEEDFORWARD 2u
+#define CONFIG_TORQUE_FEEDFORWARD   1u /* 0x60B2 in RPDO1 */
+#define CONFIG_VELOCITY_FEEDFORWARD 2u /* 0x60B1 in RPDO2 */
 
 /* The largest lag of a position loop without feedforward, as a time (a gain of 50 / s). */
 #define CONFIG_WINDOW_MS 20u
@@ -60,10 +60,10 @@ struct config_axis {
 };
 
 /* Bits of struct config_outputs.behaviour: the outputs of the path outside of motion. */
-#define CONFIG_OUTPUTS_KEEP_AT_STOP  1u
-#define CONFIG_OUTPUTS_KEEP_AT_FAULT 2u /* and at a quick stop, and with the drives off */
-#define CONFIG_OUTPUTS_OFF_AT_END    4u
-#define CONFIG_OUTPUTS_OFF_IN_HOLD   8u
+#define CONFIG_OUTPUTS_KEEP_AT_STOP  1u /* stay on at a stop on the path */
+#define CONFIG_OUTPUTS_KEEP_AT_FAULT 2u /* the same in a fault, at a quick stop, with drives off */
+#define CONFIG_OUTPUTS_OFF_AT_END    4u /* off at the end of a program */
+#define CONFIG_OUTPUTS_OFF_IN_HOLD   8u /* off while the path is held, or a chunk is missing */
 
 #define CONFIG_OUTPUTS_DELAY_MAX 8u
 

@@ -25,13 +25,13 @@
 
 /* Values of object 0x2002. */
 enum machine_state {
-    MACHINE_BOOT = 0,     /* drives not yet found or configured */
-    MACHINE_OFF = 1,      /* drives configured, not enabled */
-    MACHINE_ENABLING = 2, /* drives are being enabled, then READY */
-    MACHINE_READY = 3,    /* enabled, standstill */
-    MACHINE_RUNNING = 4,  /* a program runs, or the axes settle at its last point */
-    MACHINE_STOPPING = 5, /* the same for a stop along the path */
-    MACHINE_FAULT = 6,
+    MACHINE_BOOT = 0,        /* drives not yet found or configured */
+    MACHINE_OFF = 1,         /* drives configured, not enabled */
+    MACHINE_ENABLING = 2,    /* drives are being enabled, then READY */
+    MACHINE_READY = 3,       /* enabled, standstill */
+    MACHINE_RUNNING = 4,     /* a program runs, or the axes settle at its last point */
+    MACHINE_STOPPING = 5,    /* the same for a stop along the path */
+    MACHINE_FAULT = 6,       /* see enum machine_fault_phase; ends by a reset */
     MACHINE_HOLDING = 7,     /* a feed hold brakes the path, or the program ended first */
     MACHINE_HELD = 8,        /* at standstill on the path until resumed or stopped */
     MACHINE_HOMING = 9,      /* drives home by their own motion, controlled by the main loop */
@@ -49,14 +49,14 @@ enum machine_fault_phase {
 /* Why a request was refused: values of object 0x2003 sub 4. */
 enum machine_refusal {
     MACHINE_ACCEPTED = 0,
-    MACHINE_NO_PROGRAM = 1,
-    MACHINE_AWAY_FROM_START = 2,
-    MACHINE_MOVING = 3,
-    MACHINE_DRIVES_OFF = 4,
-    MACHINE_FAULT_PRESENT = 5,
-    MACHINE_DRIVES_MISSING = 6,
-    MACHINE_OUTSIDE_LIMITS = 7,
-    MACHINE_NOT_RUNNING = 8,
+    MACHINE_NO_PROGRAM = 1,       /* neither a program nor a job to start */
+    MACHINE_AWAY_FROM_START = 2,  /* an axis is further from the start than its start tolerance */
+    MACHINE_MOVING = 3,           /* not while axes move */
+    MACHINE_DRIVES_OFF = 4,       /* the drives have to be enabled first */
+    MACHINE_FAULT_PRESENT = 5,    /* the fault has to be reset first */
+    MACHINE_DRIVES_MISSING = 6,   /* not all drives are found and configured */
+    MACHINE_OUTSIDE_LIMITS = 7,   /* the program breaks limits of the present configuration */
+    MACHINE_NOT_RUNNING = 8,      /* there is nothing to hold or resume */
     MACHINE_DRIVES_ON = 9,        /* homing needs them off */
     MACHINE_NO_HOMING_MODE = 10,  /* the drive of an axis with a homing method has no homing mode */
     MACHINE_NOTHING_TO_HOME = 11, /* no axis has a homing method */

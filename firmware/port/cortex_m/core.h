@@ -6,18 +6,20 @@
 
 #include <stdint.h>
 
-#define CORE_SYST_CSR (*(volatile uint32_t *)0xE000E010u)
-#define CORE_SYST_RVR (*(volatile uint32_t *)0xE000E014u)
-#define CORE_SYST_CVR (*(volatile uint32_t *)0xE000E018u)
-#define CORE_ICSR     (*(volatile uint32_t *)0xE000ED04u)
-#define CORE_SHPR3    (*(volatile uint32_t *)0xE000ED20u)
-#define CORE_ISER     ((volatile uint32_t *)0xE000E100u)
-#define CORE_ISPR     ((volatile uint32_t *)0xE000E200u)
-#define CORE_IPR      ((volatile uint32_t *)0xE000E400u)
+/* Registers, by their names in the ARMv7-M Architecture Reference Manual (B3.2 to B3.4). The last three are arrays: one
+ * bit for each interrupt of the board, of CORE_IPR a byte. */
+#define CORE_SYST_CSR (*(volatile uint32_t *)0xE000E010u) /* SysTick: control and status */
+#define CORE_SYST_RVR (*(volatile uint32_t *)0xE000E014u) /* reload: what it begins with after 0 */
+#define CORE_SYST_CVR (*(volatile uint32_t *)0xE000E018u) /* current value; a write sets it to 0 */
+#define CORE_ICSR     (*(volatile uint32_t *)0xE000ED04u) /* interrupt control and state */
+#define CORE_SHPR3    (*(volatile uint32_t *)0xE000ED20u) /* priorities of PendSV and SysTick */
+#define CORE_ISER     ((volatile uint32_t *)0xE000E100u)  /* a 1 enables */
+#define CORE_ISPR     ((volatile uint32_t *)0xE000E200u)  /* a 1 makes pending */
+#define CORE_IPR      ((volatile uint32_t *)0xE000E400u)  /* priority */
 
-#define CORE_SYST_CSR_RUN    7u         /* the core's clock, interrupt, enable */
-#define CORE_ICSR_PENDSTSET  (1u << 26) /* SysTick is pending */
-#define CORE_SHPR3_SYST(pri) ((pri) << 24)
+#define CORE_SYST_CSR_RUN    7u            /* the core's clock, interrupt, enable */
+#define CORE_ICSR_PENDSTSET  (1u << 26)    /* SysTick is pending */
+#define CORE_SHPR3_SYST(pri) ((pri) << 24) /* field of SysTick's priority */
 
 /* Holds off all interrupts. Returns the previous state for core_unmask(), so these two nest. */
 static inline uint32_t core_mask(void)
@@ -27,6 +29,7 @@ static inline uint32_t core_mask(void)
     return before;
 }
 
+/* Back to the state that core_mask returned. */
 static inline void core_unmask(uint32_t before)
 {
     __asm__ volatile("msr primask, %0\n\tisb" ::"r"(before) : "memory");

@@ -33,12 +33,12 @@ void startup_reset(void);
 /* Loops for ever, for a watchdog or a debugger. All handlers that the board does not define end here. */
 void startup_halt(void);
 
-/* Defined by the board if it needs them. */
-void startup_nmi(void);
+/* Interrupt handlers of the core. Defined by the board if it needs them. */
+void startup_nmi(void);        /* interrupt that cannot be masked */
 void startup_hard_fault(void); /* and all faults that have no handler of their own enabled */
-void startup_systick(void);
+void startup_systick(void);    /* SysTick has reached 0 */
 
-/* Defined by the board: takes the exit status of main(). May return: the core then halts. */
+/* After main(), once. Defined by the board: takes the exit status of main(). May return: the core then halts. */
 void startup_exit(int status);
 
 #endif

@@ -15,10 +15,13 @@
 /* The first interrupt comes one period later. priority: 0 the highest, in the upper bits (core_enable). Main loop,
  * interrupts masked. */
 void systick_begin(uint32_t period_us, uint32_t core_mhz, uint8_t priority);
+/* Stops SysTick; the interrupt does not come any more. Main loop. */
 void systick_end(void);
 
-/* The period that follows the next tick. */
+/* Sets the period that follows the next tick. Any context. */
 void systick_period(uint32_t period_us);
+
+/* The period that is under way. Any context. */
 uint32_t systick_period_us(void);
 
 /* The interrupt calls it first: a period is over. */

@@ -16,14 +16,15 @@
 #include "port/mps2/link.h"
 #include "port/port.h"
 
-#define INTERRUPTS_UART_PRIORITY 0x80u
+#define INTERRUPTS_UART_PRIORITY 0x80u /* for core_enable: below SysTick */
 
 /* Sets the link; once, before the other functions. Main loop. */
 void interrupts_begin(const struct link *link);
 
+/* Stops the tick. Main loop. */
 void interrupts_end(void);
 
-/* Whether the caller is a tick. */
+/* Whether the caller is a tick. Any context. */
 bool interrupts_in_tick(void);
 
 /* A frame for the receive handler. Any interrupt; harmless before port_start(). */

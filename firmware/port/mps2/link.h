@@ -45,6 +45,7 @@ struct link {
     /* Sends what still waits. Main loop, with the tick ended. */
     void (*end)(void);
 
+    /* Main loop. */
     bool (*stop_requested)(void); /* when it becomes true the link wakes the main loop */
     bool (*failed)(void);         /* the other end has ended */
 };

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 
-/* Needs HSI and the pins' port clock. */
+/* Turns the UART on, once. Needs HSI and the pins' port clock (pins_begin). */
 void console_begin(void);
 
 /* "hodograph: TEXT VALUE", a line. */

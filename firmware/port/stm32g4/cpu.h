@@ -11,8 +11,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#define CPU_PRIORITY_TICK    1u
-#define CPU_PRIORITY_RECEIVE 2u
+#define CPU_PRIORITY_TICK    1u /* TIM2 */
+#define CPU_PRIORITY_RECEIVE 2u /* FDCAN1 */
 
 /* Holds off interrupts of this priority and lower ones; 0: none. Returns the previous value, for cpu_hold afterwards.
  * */

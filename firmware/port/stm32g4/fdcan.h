@@ -68,13 +68,17 @@ struct fdcan {
     bool off;        /* not on the bus: not started, or bus-off */
 };
 
-enum fdcan_sender { FDCAN_URGENT, FDCAN_ORDINARY };
+/* Whose frame it is, so which queue it goes to. */
+enum fdcan_sender {
+    FDCAN_URGENT,  /* of an interrupt: `urgent` */
+    FDCAN_ORDINARY /* of the main loop: `ordinary` */
+};
 
 /* Configures the chip and stays off the bus. False: not one of 1000000, 500000, 250000 and 125000 bit/s, or the chip
  * does not answer (no clock). Main loop. */
 bool fdcan_begin(struct fdcan *can, uint32_t bits_s);
 
-/* Between begin and start. False: more filters than the chip has (28). No filter: nothing passes. */
+/* Between begin and start, main loop. False: more filters than the chip has (28). No filter: nothing passes. */
 bool fdcan_accept(const struct can_match *filters, size_t count);
 
 /* Enters the bus (after 11 recessive bits), leaves it. Main loop. */
@@ -93,7 +97,7 @@ uint32_t fdcan_acknowledge(void);
 bool fdcan_fetch(struct can_msg *message);
 void fdcan_attend(struct fdcan *can, uint32_t acknowledged);
 
-/* Main loop. */
+/* The counts, which then begin at 0 again. Main loop. */
 struct fdcan_events fdcan_take_events(struct fdcan *can);
 
 /* Error counters of the chip: transmit, receive (0 to 255, 0 to 127). Any context. */

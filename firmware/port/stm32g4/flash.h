@@ -20,7 +20,7 @@
 /* False when the chip is not in dual-bank mode: then there is no second bank. */
 bool flash_is_dual(void);
 
-/* False: not done, or not proved by reading back. */
+/* Erases page 0 ... 127 of bank 2. False: not done, or not proved by reading back. */
 bool flash_erase_page(uint32_t page);
 
 /* Programs one erased double word. `offset`: from the start of bank 2, a multiple of 8. False: as above. */

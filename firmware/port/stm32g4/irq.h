@@ -20,6 +20,8 @@
 
 /* Both on; the first tick comes one period later. Main loop. */
 void irq_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t period_us);
+
+/* Both off. Main loop. */
 void irq_stop(void);
 
 /* From the next tick on. Main loop, or the tick. */
@@ -28,7 +30,7 @@ void irq_period(uint32_t period_us);
 /* Number of ticks since irq_start. Main loop. */
 uint32_t irq_ticks(void);
 
-/* The handlers themselves, for the vectors. */
+/* The handlers themselves, for the vectors (vectors.c). Called by the hardware only. */
 void irq_tick(void);
 void irq_can(void);
 

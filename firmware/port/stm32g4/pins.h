@@ -14,7 +14,7 @@
 
 #include <stdint.h>
 
-/* Clock of the port. */
+/* Turns the clock of port A on; before pins_alternate. */
 void pins_begin(void);
 
 /* Gives pin 0 ... 15 of port A to a peripheral, with a pull-up. */

@@ -25,18 +25,20 @@ struct tick_timer {
 /* Starts both counters, no ticks; input_mhz: the clock of the timers. Before any other function. */
 void tick_timer_begin(uint32_t input_mhz);
 
-/* Any context. Both wrap. */
+/* Time since tick_timer_begin. Any context. Both wrap. */
 uint32_t tick_timer_ns(void);
 uint32_t tick_timer_us(void);
 
 /* Time until the next tick is due, in counts of TIM2; UINT32_MAX: there are no ticks. 0: it is due. Any context. */
 uint32_t tick_timer_left(void);
 
-/* The first tick comes one period later. Main loop. */
+/* Starts the ticks; the first one comes one period later. Main loop. */
 void tick_timer_start(struct tick_timer *timer, uint32_t period_us);
+
+/* No more ticks; the counters go on. Main loop. */
 void tick_timer_stop(void);
 
-/* From the next tick on. Main loop with the tick held off, or the tick. */
+/* Sets the period from the next tick on. Main loop with the tick held off, or the tick. */
 void tick_timer_period(struct tick_timer *timer, uint32_t period_us);
 
 /* First call in the interrupt: acknowledges it. Returns how late the tick is, in ns (UINT32_MAX at most). */

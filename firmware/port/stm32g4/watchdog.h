@@ -13,13 +13,14 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Once, when ticks are about to begin. The core may run at any clock. */
+/* Main loop, once, when ticks are about to begin. The core may run at any clock. */
 void watchdog_start(void);
 
-/* Main loop; ticks: how many there have been. */
+/* Feeds the watchdog if `ticks`, how many there have been, has changed since the last call. Main loop. */
 void watchdog_feed(uint32_t ticks);
 
-/* Whether the watchdog has restarted the chip. Clears all reset flags: only the first call after a reset is right. */
+/* Whether the watchdog has restarted the chip. Clears all reset flags: only the first call after a reset is right. Main
+ * loop. */
 bool watchdog_has_reset(void);
 
 #endif

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Checks before a program is sent."""
+"""bus/sdo/upload: a program that no bank of the controller holds is refused before anything is sent. No bus: the
+controller is a stand-in.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +21,11 @@ NEEDED = memory_bytes(IMAGE, RECORD_BYTES["fixed"])
 
 
 class UploadBegunError(Exception):
-    """More was asked of the controller than how much room it has."""
+    """The upload has gone on to another object than the sizes of the banks."""
 
 
 class SmallController:
-    """A controller that says how large its banks and its records are, and no more."""
+    """A controller of which only the sizes of banks and records can be read."""
 
     def __init__(self, bank_bytes: int) -> None:
         self._memory = (0, bank_bytes, *astuple(RECORD_BYTES["fixed"]))

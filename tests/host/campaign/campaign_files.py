@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Files for the tests of campaigns: a short path on the machine of the alpha."""
+"""Files for the tests of campaigns: a short path on the machine of the alpha. Used by the tests of this folder. Writes
+files.
+"""
 
 from __future__ import annotations
 

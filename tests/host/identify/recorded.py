@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A recording as a bus would give it, made of a simulated run and noise."""
+"""A recording as a bus would give it, made of a simulated run and noise. Used by the tests of this folder. No I/O."""
 
 from __future__ import annotations
 

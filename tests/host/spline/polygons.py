@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Random polygons for tests and benchmarks, each a pure function of a seed."""
+"""Random polygons for tests and benchmarks, each a pure function of a seed. Used by the tests of this folder and by
+benchmarks. No I/O.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Public functions: the paper's curves, random campaigns, through points, refusals, linear time."""
+"""Public functions: the paper's curves, random polygons, through points, refusals, linear time."""
 
 from __future__ import annotations
 

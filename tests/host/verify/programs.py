@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Random programs for the tests of the verifier, each a pure function of a seed."""
+"""Random programs for the tests of the verifier, each a pure function of a seed. Used by the tests of the verifier and
+of toolpaths. No I/O.
+"""
 
 from __future__ import annotations
 
