@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/commands.h (see there): the commands of objects 0x2001 and 0x2056. Called by app/objects and app/controller. Main
- * loop; command_urgent_request in the receive interrupt. */
+/* Implements app/commands.h (see there): the commands of objects 0x2001 and 0x2056. Called by app/objects and
+ * app/controller. Main loop; command_urgent_request in the receive interrupt. */
 #include "app/commands.h"
 
 #include <string.h>

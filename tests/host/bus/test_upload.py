@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Checks before a program is sent."""
+"""Tests of bus/sdo/upload: what it checks before it sends a program. Run by `make pytest`. Reads an image of
+tests/data; the controller is a class here, so no bus is needed.
+"""
 
 from __future__ import annotations
 
