@@ -34,9 +34,9 @@ new parameters with a default, and new keys of dictionaries may come with every 
 any time. A new version may make another program of the same input; its limits are kept as before.
 
 **Conventions.** Lengths are in mm, times in s; other units are in the names. Arrays are NumPy's, of float64 unless said
-otherwise. Points have one row each: (n, A) for A path axes. Objects are immutable. Importing the package takes some
-milliseconds; a module is loaded when one of its names is first used. Objects on a bus belong to the thread that made
-them; the rest may be shared.
+otherwise. Points have one row each: (n, A) for A path axes. A `kernel` is "fixed", "float" or "double". Objects are
+immutable. Importing the package takes some milliseconds; a module is loaded when one of its names is first used.
+Objects on a bus belong to the thread that made them; the rest may be shared.
 """
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""LinuxCNC of Debian's package, whole and headless: milltask, motmod with trivkins and simulated joints. Used by
+"""Runs a toolpath with LinuxCNC of Debian's package, without a display, and gives the motion that it commands. Used by
 peers/compare. Starts dpkg-query and LinuxCNC; writes to a temporary folder.
+
+All of LinuxCNC takes part: milltask, motmod with trivkins and simulated joints.
 
 HAL's sampler records the joints' position commands in each servo period of 1 ms. Positions are scaled to um, since
 halsampler prints six decimals. The run has its own namespaces of processes, IPC and network: LinuxCNC's shutdown script

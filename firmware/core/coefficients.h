@@ -36,8 +36,8 @@ struct coefficients_piece {
     uint64_t end_q42_s; /* of the last piece the duration */
     int32_t next;       /* bytes from this record to that of the next piece; 0: there is none */
     uint32_t number;    /* of the piece */
-    uint64_t ahead_end_q32_s[OVERRIDE_WINDOWS]; /* of the windows that begin with it: their end,
-                                                        UINT64_MAX with the last piece, */
+    /* Of the look-ahead windows that begin with it: their end, UINT64_MAX if they contain the last piece, */
+    uint64_t ahead_end_q32_s[OVERRIDE_WINDOWS];
     struct program_override ahead[OVERRIDE_WINDOWS]; /* and their least bounds */
     union {
         struct feed_piece integers;
@@ -132,7 +132,8 @@ coefficients_segment_back(const struct coefficients_segment *segment)
     return (const struct coefficients_segment *)at;
 }
 
-/* --- A window: records of some pieces and segments of a program, each without gaps --- */
+/* --- A window of records: those of successive pieces and of successive segments of a program. Not a look-ahead
+ * window (core/override_ramp.h). --- */
 
 struct coefficients_window {
     const struct kernel *kernel;

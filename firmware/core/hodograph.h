@@ -17,7 +17,8 @@
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
  *   of a job in chunks, in place of program_open, program_check and feed_override_begin (core/chunk.h):
- *   main loop chunk_open, chunk_check the same for the program of a chunk, and that it continues its predecessor
+ *   main loop   chunk_open                   reads a chunk and the program in it
+ *               chunk_check                  checks this program, and that the chunk continues its predecessor
  *               feed_override_begin_job      with the first chunk
  *               feed_override_take_over      the next chunk for the program under way; needs the tick held off
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
@@ -38,13 +39,19 @@
  * refuses programs with another number, and programs whose first axis is not the machine's first axis
  * (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to evaluate first_axis().
  *
+ * ## Limits
+ *
+ * program_check compares a program with struct program_limits (core/program_rules.h). 0 means no limit for feed,
+ * acceleration, jerk, axis count, period and stop time. Travel is always checked: min_q40_mm and max_q40_mm need values
+ * for each path axis; for no limit, -4096 and 4096 mm times 2^40.
+ *
  * ## Cost
  *
  *   program_check          some 10^3 to 10^4 instructions a segment and piece, more for limits of the axes
  *   coefficients_make_in   some 2500 instructions a segment; bytes: coefficients_size
  *   feed_override_begin    linear in the number of pieces
  *   feed_override_next     docs/validation/wcet.md: bounds of instructions for each core and kernel
- *   struct interpolator    about 0.1 KiB; struct feed_override about 0.6 KiB
+ *   struct interpolator    about 0.2 KiB; struct feed_override about 0.6 KiB
  *
  * ## Errors
  *
@@ -70,7 +77,7 @@
  *     static struct interpolator interpolator;
  *     static struct feed_override feed;
  *
- *     // Main loop. The image has to stay.
+ *     // Main loop. The image has to stay. In `limits` all is 0 but the travel (see Limits).
  *     int load(const uint8_t *image, uint32_t size, const struct program_limits *limits)
  *     {
  *         struct program_fault fault;

@@ -62,9 +62,8 @@ static inline void interpolator_point_copy(struct interpolator_point *out,
 struct interpolator {
     const struct program *program;
     const struct kernel *kernel;
-    void (*segment_at)(const void *segment, int64_t position_q40[],
-                       int64_t arc_length_q40_mm); /* of the kernel, for
-                                                                        the program's axes */
+    /* of the kernel, for the program's axes */
+    void (*segment_at)(const void *segment, int64_t position_q40[], int64_t arc_length_q40_mm);
     uint32_t axis_count;
     const struct coefficients_piece *piece; /* the present ones */
     const struct coefficients_segment *segment;
@@ -81,7 +80,8 @@ int interpolator_begin(struct interpolator *it, const struct program *p);
 void interpolator_begin_window(struct interpolator *it, const struct program *p,
                                const struct coefficients_window *window);
 
-/* Changes to these records of the same program, which have the present segment. Main loop; constant time. */
+/* Changes to these records of the same program. The record of the present segment must be among them. Main loop with the
+ * tick held off; constant time. */
 void interpolator_use(struct interpolator *it, const struct coefficients_window *window);
 
 /* First and last point of a program, with coefficient records or without. Main loop. */
@@ -94,8 +94,8 @@ const struct coefficients_segment *interpolator_segment_in(const struct coeffici
                                                            int64_t number,
                                                            int64_t arc_length_q40_mm);
 
-/* Changes to another program for the same kernel and axes, which has these records and this exact end point; to this
- * segment of it. Main loop; constant time. */
+/* Changes to this segment of another program, which is for the same kernel and axes, and has these records and this
+ * exact end point. Main loop with the tick held off; constant time. */
 void interpolator_carry(struct interpolator *it, const struct program *p,
                         const struct coefficients_window *window,
                         const struct coefficients_segment *segment,

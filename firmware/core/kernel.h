@@ -17,11 +17,12 @@
 #include "core/ph_segment.h"
 #include "core/program.h"
 
-/* Numbers as in object 0x2004 sub 5. */
+/* Numbers as in object 0x2004 sub 5. The errors are bounds of x, y and z before they are rounded to counts, on segments
+ * longer than 2^-34 mm (docs/theory/numerics.md sections 9 to 11). */
 enum kernel_number {
-    KERNEL_FIXED = 0,  /* integers only, the same bits everywhere, within 1 nm */
-    KERNEL_FLOAT = 1,  /* single precision and integers, within 10 nm */
-    KERNEL_DOUBLE = 2, /* the host's reference, within 1e-9 mm */
+    KERNEL_FIXED = 0,  /* integers only, the same bits everywhere, within 2^-37 mm */
+    KERNEL_FLOAT = 1,  /* single precision and integers, within 1 nm */
+    KERNEL_DOUBLE = 2, /* the host's reference, within 3e-11 mm */
 };
 
 #define KERNELS 3u /* of enum kernel_number */

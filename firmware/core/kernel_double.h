@@ -59,7 +59,7 @@ void kernel_double_piece_at(const void *piece, struct feed_point *out, uint64_t 
 void kernel_double_segment_set(void *segment, const struct ph_segment *ph);
 
 /* Point at an arc length of this segment (counted from the start of the program; a little outside is allowed: the curve
- * is continued). Within 1e-9 mm. Three Newton steps, always. */
+ * is continued). Within 3e-11 mm. Three Newton steps, always. */
 void kernel_double_segment_at(const void *segment, int64_t position_q40[],
                               int64_t arc_length_q40_mm);
 

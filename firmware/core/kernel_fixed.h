@@ -15,7 +15,8 @@
 #include "core/extra_axis.h"
 #include "core/ph_segment.h"
 
-/* First guess of z by a cubic in t = |s - s(middle)| / (its length), one per half. */
+/* First guess of z in one half of a segment: a cubic in t, the arc length from the middle divided by that of the half.
+ */
 struct kernel_fixed_inverse {
     int32_t scale_q26;
     int32_t g_q26[3]; /* coefficient k of t^k times 2^k, k = 1 ... 3 */
@@ -59,8 +60,8 @@ struct kernel_fixed_space {
 void kernel_fixed_segment_set(void *segment, const struct ph_segment *ph);
 
 /* Point at an arc length of this segment (counted from the start of the program; 2^-33 mm outside is allowed: the curve
- * is continued by its tangent). Within 2^-32 mm by the bound that needs no numerics, 2^-37 mm measured. Two Newton
- * steps with one 32-bit division each, 15 wide products. */
+ * is continued by its tangent). Within 2^-37 mm (numerics.md section 9), 2^-31 mm by the bound that needs no search
+ * (section 12). Two Newton steps with one 32-bit division each, 15 wide products. */
 void kernel_fixed_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);
 

@@ -37,7 +37,7 @@ struct kernel_float_arc {
     int64_t middle_q40_mm;        /* arc length at z = 0, rounded down, */
     int32_t middle_remainder_q48; /* the part below that rounding */
     int32_t scale;                /* 2^(48 - q of the polynomials) */
-    int32_t shift;                /* arc length in q48 by this to q30 normalised */
+    int32_t shift;                /* right shift from arc length in q48 to normalised q30 */
     struct kernel_float_polynomial p;
     float s[6]; /* normalised arc length from the middle */
     struct kernel_float_inverse inverse[KERNEL_FLOAT_PARTS];
@@ -61,7 +61,8 @@ struct kernel_float_space {
     struct kernel_float_arc arc;
     struct kernel_float_axis axes[PROGRAM_SPACE];
     float a[PROGRAM_COMPONENTS][3]; /* normalised preimage */
-    float dz_q44; /* 1 / (sigma / 2) where sigma is 1 normalised: arc length in q44 to z in q44 */
+    /* change of z for a unit of arc length, both in q44, where normalised sigma is 1 */
+    float dz_q44;
     uint32_t extras;
     struct extra_axis extra[PROGRAM_EXTRAS];
 };
@@ -70,7 +71,7 @@ struct kernel_float_space {
 
 void kernel_float_segment_set(void *segment, const struct ph_segment *ph);
 
-/* As kernel_fixed_segment_at; within 10 nm. One Newton step, two divisions, six wide products and fifteen narrow
+/* As kernel_fixed_segment_at; within 1 nm. One Newton step, two divisions, six wide products and fifteen narrow
  * ones. */
 void kernel_float_segment_at(const void *segment, int64_t position_q40[],
                              int64_t arc_length_q40_mm);

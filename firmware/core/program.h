@@ -56,8 +56,8 @@ struct program_header {
     uint32_t event_count;
     uint64_t duration_q32_s;
     int64_t length_q40_mm;
-    int64_t offset_q40_mm
-        [PROGRAM_AXES]; /* for information: already contained in the coordinates; 0 beyond axis_count */
+    /* work offset, for information: already contained in the coordinates; 0 beyond axis_count */
+    int64_t offset_q40_mm[PROGRAM_AXES];
     uint32_t feed_limit_um_s;
     uint32_t acceleration_limit_um_s2;
     uint32_t jerk_limit_mm_s3;
@@ -83,8 +83,8 @@ struct program_extra {
 struct program_segment {
     int64_t start_q40_mm;                /* arc length at its start */
     int64_t point_q40_mm[PROGRAM_SPACE]; /* start point; z is 0 in a planar program */
-    int64_t a_q44[PROGRAM_COMPONENTS]
-                 [3]; /* by enum program_component; v and p are 0 in a planar one */
+    /* by enum program_component; v and p are 0 in a planar program */
+    int64_t a_q44[PROGRAM_COMPONENTS][3];
     struct program_extra extra[PROGRAM_EXTRAS]; /* the first axis_count - 3 */
     uint32_t axis_count;                        /* of the program */
 };

@@ -106,7 +106,7 @@ enum program_error {
     PROGRAM_ERR_CHUNK_EVENT = -78,
 };
 
-/* What this controller allows. */
+/* What this controller allows. 0: any, or no limit, except for travel, which is always checked. */
 struct program_limits {
     /* path axes of the machine; a program with another number is refused; 0: any */
     uint32_t axis_count;
@@ -114,7 +114,8 @@ struct program_limits {
     uint32_t feed_um_s; /* 0: no limit; the same for the next two */
     uint32_t acceleration_um_s2;
     uint32_t jerk_mm_s3;
-    /* Of the path axes of the program; mm are degrees for a rotary axis. */
+    /* Of the path axes of the program; mm are degrees for a rotary axis. Travel from -4096 to 4096 mm allows all that
+     * the format allows. */
     int64_t min_q40_mm[PROGRAM_AXES]; /* travel */
     int64_t max_q40_mm[PROGRAM_AXES];
     uint32_t axis_velocity_um_s[PROGRAM_AXES]; /* at every override; 0: no limit */

@@ -56,9 +56,9 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
                        struct stop_extent *out);
 
 /* Where a brake begins: the speed at the greatest override, the acceleration at a constant override, and what a
- * changing override adds. An override that still rises is below the greatest one by what it gains until its slope is 0,
- * which takes at least cut_us. So the slope adds to the speed only for the time by which the brake's jerk takes longer
- * than cut_us. um, s; us. */
+ * changing override adds. Lengths in um, times in s, cut_us in us. An override that still rises is below the greatest one
+ * by what it gains until its slope is 0, which takes at least cut_us. So the slope adds to the speed only for the time
+ * by which the brake's jerk takes longer than cut_us. */
 struct stop_start {
     uint64_t speed_um;
     uint64_t rising_um;

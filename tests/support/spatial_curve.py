@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Curves in space for tests. Used by tests of paths in space. No I/O."""
+"""Random curves in space, for tests of code that takes any curve. Used by tests/host. No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/od.h: an object dictionary. */
+/* Tests of canopen/od.h: an object dictionary. Run by `make unit`. Changes its own dictionary only (small_od.h). */
 #include "canopen/od.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Every golden program, good and broken, against the code and index of tests/data/manifest.txt. */
+/* Tests of core/program_check.h: every golden program, good and broken, gets the code and the index that
+ * tests/data/manifest.txt names. Run by `make unit`. Reads tests/data. */
 #include "core/program_check.h"
 
 #include <inttypes.h>

@@ -200,7 +200,7 @@ def connect(
     wait_s: float = 2.0,
     note: Note | None = None,
 ) -> Iterator[Controller]:
-    """The machine's controller on a bus. A virtual bus without one gets a simulated machine until the context ends.
+    """The machine's controller on a bus. On a virtual bus without one a simulated machine runs until the context ends.
 
     bus      "socketcan:can0", a name from `local_bus`, or another name for `hodograph --bus`; None: the bus of commands
              without --bus

@@ -149,7 +149,8 @@ class Path:
         closed         the end is the start; each point is given once, 3 or more
         ends           of an open path: "cubic", or "natural" (no curvature)
         start_tangent, end_tangent   direction (2,), in space (3,), there, instead of `ends`
-        knots          parameter lengths of the spans: from the distances of the points, or uniform
+        knots          parameter lengths of the spans: "chord" (the distances of the points), "centripetal" (their
+                       square roots), or "uniform"
         name           for messages and for the program
 
         Raises InputError, and PlanError where there is no such path.
@@ -233,8 +234,9 @@ class Path:
 
         limits         in addition to those of the machine, which always apply
         machine        needed for a program, and for limits in volts
-        profile        "optimal": least time inside all limits. The others accelerate for `ramp_time_s`, run at
-                       `nominal_mm_s` and decelerate; the feed is lowered until all limits are kept
+        profile        "optimal": least time inside all limits. "quintic", "exponential" and "minimax" accelerate for
+                       `ramp_time_s`, run at `nominal_mm_s` and decelerate; the feed is lowered until all limits are
+                       kept
         nominal_mm_s   feed; with "optimal" one more limit, which may be left out
         n_c            slope coefficient of "exponential"; "optimise": by pattern search
         degree         of "minimax"

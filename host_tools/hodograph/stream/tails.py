@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Tails of a planning window (docs/glossary.md): brakes along the path from a joint to rest, of which a chunk gets the
-first one that the controller accepts; docs/theory/feed.md 5.6. Used by chunks.py. No I/O.
+first one that the controller accepts; docs/theory/feed.md 5.6, "Tails". Used by chunks.py. No I/O.
 """
 
 from __future__ import annotations

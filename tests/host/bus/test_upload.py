@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""bus/sdo/upload: a program that no bank of the controller holds is refused before anything is sent. No bus: the
-controller is a stand-in.
+"""Tests of bus/sdo/upload: what it checks before it sends a program. Run by `make pytest`. Reads an image of
+tests/data; the controller is a class here, so no bus is needed.
 """
 
 from __future__ import annotations

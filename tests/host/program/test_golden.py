@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Golden images: the table of tests/data/manifest.txt, which the C tests read as well."""
+"""Tests of hodograph/program: check, encoding and inspection of the golden images. tests/data/manifest.txt names the
+expected refusals, for the C tests too. Run by `make pytest`. Reads tests/data.
+"""
 
 import re
 from importlib.util import module_from_spec, spec_from_file_location
