@@ -71,7 +71,10 @@ def document(figures: dict[str, Any], text: str) -> str:
     What a port adds is measured elsewhere (tools/count_til.py): the document's own sentence has it.
     """
     port, wait = (int(re.findall(pattern, text)[0]) for pattern in (_PORT, _WAIT))
-    made = blocks(figures) | {"port": tables.port_table(figures, port, wait)}
+    made = blocks(figures) | {
+        "short": tables.short_table(figures, _SHOWN, port),
+        "port": tables.port_table(figures, port, wait),
+    }
     for name, block in made.items():
         begin, end = f"<!-- {name} -->\n", f"<!-- end {name} -->\n"
         before, rest = text.split(begin)

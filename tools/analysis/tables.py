@@ -192,6 +192,34 @@ def port_table(figures: Figures, port: int, wait: int) -> str:
     return _table(head, rows())
 
 
+def short_table(figures: Figures, pair: str, port: int) -> str:
+    """The most expensive ticks of a core and kernel: motion part, whole interrupt, and interrupt with a port."""
+    motion, isr = figures["motion"][pair], figures["isr"][pair]
+
+    def row(text: str, motion_most: int | None, isr_most: int) -> list[str]:
+        return [
+            text,
+            "" if motion_most is None else str(motion_most),
+            str(isr_most),
+            str(isr_most + port),
+        ]
+
+    rows = [
+        row(
+            "constant override, drives answer",
+            worst(motion, "plain")[1],
+            max(isr[name]["whole"][2] for name in ("plain", "plain, adversary")),
+        ),
+        row(
+            "any sequence of override commands and holds, drives answer or not",
+            worst(motion, "override")[1],
+            worst(isr, "override")[1],
+        ),
+        row("the tick that finds a fault", None, max(isr[name]["whole"][2] for name in _FAULTS)),
+    ]
+    return _table(["tick", "motion part", "whole interrupt", "with a port"], iter(rows))
+
+
 def fault_text(figures: Figures, pair: str) -> str:
     """What finding a fault adds to supervision."""
     scenarios = figures["isr"][pair]
