@@ -7,8 +7,9 @@ Run by `make bench`. Prints to stdout; writes OUT and temporary files.
 
 The machine is examples/machines/mill.toml, the tolerance 10 um. Times are those of the programs, including the time
 that plans lose so that stops may begin soon enough. LinuxCNC 2.9 (G64 P0.01) has no jerk limit. 2.10 was measured with
-its S-curve planner and 50000 mm/s^3. For a file that is in none of the folders a line is printed instead. At the end
-the processor time for generated programs of N lines is measured.
+its S-curve planner and 50000 mm/s^3. Zigzag and rectangle are written here; spiral and 3D_Chips come with LinuxCNC
+(tools/fetch_linuxcnc.sh). The file of heart05 is not published. For a file that is in none of the folders a
+line is printed instead. At the end the processor time for generated programs of N lines is measured.
 """
 
 from __future__ import annotations
@@ -26,15 +27,16 @@ from _figures import figures_parser, write_figures
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "host_tools")]
 
+from peers.toolpaths import rectangle, zigzag  # noqa: E402
+
 from hodograph.config import load_machine  # noqa: E402
 from hodograph.job import load_job  # noqa: E402
 from hodograph.toolpath.files import ReadOptions  # noqa: E402
 
 MILL = ROOT / "examples" / "machines" / "mill.toml"
-FOLDERS = (
-    ROOT.parent / "shared" / "toolpaths",
-    ROOT / "build" / "linuxcnc" / "root" / "usr" / "share" / "linuxcnc" / "ncfiles",
-)
+FOLDERS = (ROOT / "build/linuxcnc/root/usr/share/linuxcnc/ncfiles",)
+WRITTEN = {"zigzag": zigzag, "rrect": rectangle}
+"""Toolpaths that are written here, by the first word of their names."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +67,14 @@ ROWS = (
 )
 
 
-def found(name: str, folders: list[Path]) -> Path | None:
-    """The file of this name in the first folder that has it."""
-    return next((folder / name for folder in folders if (folder / name).is_file()), None)
+def found(row: Row, folders: list[Path], scratch: Path) -> Path | None:
+    """The file of a row: written to `scratch`, or in the first folder that has it."""
+    write = WRITTEN.get(row.file.partition("_")[0])
+    if write is None:
+        return next((at / row.file for at in folders if (at / row.file).is_file()), None)
+    file = scratch / row.file
+    file.write_text(write(60.0 * row.feed_mm_s) + "M2\n", encoding="ascii")
+    return file
 
 
 def first_lines(file: Path, lines: int | None, folder: Path) -> Path:
@@ -177,7 +184,7 @@ def results(names: list[str] | None, folders: list[Path]) -> Iterator[dict[str, 
         for row in ROWS:
             if names and not any(name in row.file for name in names):
                 continue
-            file = found(row.file, folders)
+            file = found(row, folders, Path(folder))
             if file is None:
                 print(f"{row.file}: in none of the folders, left out", file=sys.stderr)
                 continue

@@ -50,8 +50,8 @@ def toolpaths(feed_mm_min: float) -> list[Toolpath]:
     """All programs with this feed."""
     found = [
         Toolpath("heart", feed_mm_min, _heart(feed_mm_min), True, True),
-        Toolpath("rounded rectangle", feed_mm_min, _rectangle(feed_mm_min), False, True),
-        Toolpath("zigzag", feed_mm_min, _zigzag(feed_mm_min), False, True),
+        Toolpath("rounded rectangle", feed_mm_min, rectangle(feed_mm_min), False, True),
+        Toolpath("zigzag", feed_mm_min, zigzag(feed_mm_min), False, True),
     ]
     for name, lines in (("spiral", None), ("3D_Chips", 2000)):
         file = LINUXCNC_FILES / f"{name}.ngc"
@@ -70,19 +70,19 @@ def _heart(feed: float) -> str:
     return "".join(chain([_HEAD.format(feed=feed)], lines))
 
 
-def _rectangle(feed: float) -> str:
+def rectangle(feed_mm_min: float) -> str:
     """100 mm x 60 mm with arcs of 5 mm, from the middle of a side."""
     moves = (
         "G1 X45 Y0", "G3 X50 Y5 I0 J5", "G1 X50 Y55", "G3 X45 Y60 I-5 J0", "G1 X-45 Y60",
         "G3 X-50 Y55 I0 J-5", "G1 X-50 Y5", "G3 X-45 Y0 I5 J0", "G1 X0 Y0",
     )  # fmt: skip
-    return _HEAD.format(feed=feed) + "\n".join(moves) + "\n"
+    return _HEAD.format(feed=feed_mm_min) + "\n".join(moves) + "\n"
 
 
-def _zigzag(feed: float) -> str:
+def zigzag(feed_mm_min: float) -> str:
     """21 legs of 10 mm, with 20 corners of 90 degrees."""
     steps = [(10 * ((k + 1) // 2), 10 * (k // 2)) for k in range(1, 22)]
-    return _HEAD.format(feed=feed) + "".join(f"G1 X{x} Y{y}\n" for x, y in steps)
+    return _HEAD.format(feed=feed_mm_min) + "".join(f"G1 X{x} Y{y}\n" for x, y in steps)
 
 
 _FEED_WORD = re.compile(r"(?i)F\s*(\[[^\]]*\]|[\d.]+)")
