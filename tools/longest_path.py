@@ -180,6 +180,9 @@ def main() -> int:
     except LongestError as error:
         print(f"longest_path: {error}", file=sys.stderr)
         return 1
+    except FileNotFoundError as error:
+        print(f"longest_path: {error.filename} is missing: run `make firmware`", file=sys.stderr)
+        return 1
     return 0
 
 
