@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3). Used by bus/, faults/ and
-monitor/. No I/O.
+"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3). Used by bus/, faults/,
+monitor/ and job_run. No I/O.
 """
 
 from __future__ import annotations
