@@ -51,10 +51,11 @@ DEFAULT_TOLERANCE_MM = 0.01
 GREATEST_TOLERANCE_MM = 10.0
 
 _TOOL_OFFSET = "tool offset (G43)"
+_TOOL_CHANGE = "tool change (M6)"
 _IGNORED: dict[tuple[type[Command], ...], str] = {
     (Spindle,): "spindle (M3, M4, M5)",
     (Coolant,): "coolant (M7, M8, M9)",
-    (ToolChange,): "tool change (M6)",
+    (ToolChange,): _TOOL_CHANGE,
     (DigitalOutput, AnalogOutput): "outputs (M62 to M65, M67, M68)",
     (ToolOffset,): _TOOL_OFFSET,
 }
@@ -337,8 +338,10 @@ def ignored_kind(command: Command, outputs: Outputs | None) -> str | None:
 def ignored_note(file: Path, kind: str, lines: Sequence[int]) -> str:
     """The note on all commands of a kind that the machine does not execute."""
     more = f" and {len(lines) - 1} more" if len(lines) > 1 else ""
-    effect = "the machine has none, it moves as if they were done"
-    if kind == _TOOL_OFFSET:
+    effect = "the machine file has no output for it, the motion goes on without"
+    if kind == _TOOL_CHANGE:
+        effect = "done by hand: run and stream wait there for Enter"
+    elif kind == _TOOL_OFFSET:
         effect = (
             "there is no tool table, 0 is added: give the offset with G43.1, or in [work] offset_mm"
         )

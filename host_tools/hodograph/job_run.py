@@ -17,10 +17,11 @@ from time import perf_counter
 import numpy as np
 
 from .bus.capture.setpoint_check import SetpointJumpError
+from .bus.diagnostics.texts import STATES
 from .bus.goto import goto
 from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
-from .bus.sdo.controller import READY
-from .errors import PlanError, RunError
+from .bus.sdo.controller import FAULT_STATE, READY
+from .errors import BusError, PlanError, RunError
 from .job import Job, JobSection
 from .job_simulation import JobMotion
 from .native import NativeProgram
@@ -240,5 +241,11 @@ def _check_bus(at: RunSession, wait_s: float) -> None:
     """Waits at rest. Raises RunError for a fault, BusError: the drives are off, or the controller is gone."""
     if at.rig is not None:
         at.rig.check()
+    state = at.controller.state()
+    if state not in (READY, FAULT_STATE):
+        raise BusError(
+            f"{at.controller.who()} is in state {STATES.get(state, state)} at a rest of the job: another command has "
+            "moved the axes or switched the drives off, so the job ends here: see hodograph status"
+        )
     at.controller.wait_for((READY,), 0.0)
     at.controller.clock.sleep(wait_s)

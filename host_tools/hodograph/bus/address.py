@@ -101,21 +101,44 @@ def _check_socketcan(address: BusAddress) -> None:
             f"{address}: no permission to open CAN sockets: run as another user"
         ) from None
     except OSError:
-        raise BusError(
-            f"{address}: this kernel has no CAN: `hodograph rig FILE` serves a local bus, which other commands find "
-            "(or put tools/with-vcan in front of the command)"
-        ) from None
+        raise BusError(f"{address}: this kernel has no CAN: {_no_can_remedy(address)}") from None
     with probe:
         try:
             request = struct.pack("16sH14x", name.encode()[:15], 0)
             flags = struct.unpack("16sH14x", fcntl.ioctl(probe, _SIOCGIFFLAGS, request))[1]
         except OSError:
             raise BusError(
-                f"{address}: no such network interface: put tools/with-vcan in front of the command, "
-                f"or as root: ip link add dev {name} type vcan && ip link set {name} up"
+                f"{address}: no such network interface: {_missing_remedy(address)}"
             ) from None
     if not flags & _IFF_UP:
-        raise BusError(f"{address}: the interface is down: as root: ip link set {name} up")
+        raise BusError(f"{address}: the interface is down: as root: {_up_command(address)}")
+
+
+def _no_can_remedy(address: BusAddress) -> str:
+    if is_virtual(address):
+        return (
+            "`hodograph rig FILE` serves a local bus, which other commands find "
+            "(or put tools/with-vcan in front of the command)"
+        )
+    return "as root: modprobe can_raw; if there is no such module, use a kernel that has it"
+
+
+def _missing_remedy(address: BusAddress) -> str:
+    name = address.channel
+    if is_virtual(address):
+        return (
+            "put tools/with-vcan in front of the command, "
+            f"or as root: ip link add dev {name} type vcan && ip link set {name} up"
+        )
+    return "is the adapter connected, and its driver loaded? `ip link` lists the interfaces"
+
+
+def _up_command(address: BusAddress) -> str:
+    """The command that starts the interface. A real one needs the bit rate of the drives first."""
+    up = f"ip link set {address.channel} up"
+    if is_virtual(address):
+        return up
+    return f"ip link set {address.channel} type can bitrate 1000000 && {up} (with the drives' bit rate)"
 
 
 def is_virtual(address: BusAddress) -> bool:

@@ -100,7 +100,7 @@ _STORED = {
     "nothing": "nothing is stored",
     "of another firmware": "what is stored is of another firmware: hodograph configure FILE --store",
     "damaged": "what is stored is damaged: hodograph configure FILE --store",
-    "defaults": "the defaults are stored",
+    "defaults": "nothing is stored (configure --forget)",
 }
 
 
@@ -164,7 +164,9 @@ def _axis_words(axis: AxisStatus) -> str:
 def _homed_words(axis: AxisStatus) -> str:
     if axis.homed:
         return "homed"
-    return "not homed (a start needs it: hodograph home)" if axis.homing_method else "not homed"
+    return (
+        "not homed (a start needs it: hodograph home)" if axis.homing_method else "needs no homing"
+    )
 
 
 def _load_rows(load: BusLoad) -> list[Row]:

@@ -34,6 +34,14 @@ def seconds(text: str) -> float:
     return value
 
 
+def waiting_time(text: str) -> float:
+    """A time that is not below zero."""
+    value = finite(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f'"{text}" is below 0')
+    return value
+
+
 def positive(text: str) -> float:
     """A number above zero."""
     value = finite(text)
@@ -146,7 +154,7 @@ def bus(parser: argparse.ArgumentParser, *, can_serve: bool = False) -> None:
     bus_name(parser, can_serve=can_serve)
     parser.add_argument(
         "--wait",
-        type=finite,
+        type=waiting_time,
         default=2.0,
         metavar="S",
         help="how long to wait for the controller (default 2)",

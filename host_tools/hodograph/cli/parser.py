@@ -49,7 +49,7 @@ class _Parser(argparse.ArgumentParser):
         """As argparse, but unknown options of a command are refused here, where its options are known."""
         found, unknown = super().parse_known_args(args, namespace)
         if unknown:
-            self.error(f"unknown: {' '.join(unknown)}{self._advice(unknown)}")
+            self.error(f"unknown argument: {' '.join(unknown)}{self._advice(unknown)}")
         return found, unknown
 
     def _advice(self, unknown: Sequence[str]) -> str:

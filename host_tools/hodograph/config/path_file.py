@@ -162,7 +162,7 @@ def load_path_file(file: Path) -> PathFile:
     if is_toolpath(file):
         raise InputError(
             f"{file}: is a toolpath, which only import, simulate, verify, report, compile, run and stream take: "
-            "give a path file"
+            f"hodograph run {file}, or give a path file"
         )
     root = Table(file, "", read_toml(file), _SECTIONS)
     if root.is_list("path"):

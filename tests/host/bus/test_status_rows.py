@@ -90,10 +90,17 @@ def test_a_run() -> None:
     assert "axis x: node 2: operation enabled, at 1.250000 mm, target 1.500000 mm" in text
     assert "following error 250.000 um, homed, 3 TPDOs missed, home switch on" in text
     assert "axis y: node 3: " in text
-    assert "not homed" in text
+    assert "not homed (a start needs it: hodograph home)" in text
     assert status_line(RUNNING, LOAD) == (
         "running, 45.000 mm, 100.0 mm/s, override 120/150 %, missed ticks 2, bus 61.3 %"
     ).replace("61.3", f"{61.25:.1f}")
+
+
+def test_an_axis_without_a_homing_method_needs_no_homing() -> None:
+    axis = replace(AXIS, homed=False, homing_method=0)
+    text = shown(replace(RUNNING, axes=(axis, axis)))
+    assert text.count("needs no homing") == 2
+    assert "not homed" not in text
 
 
 def test_troubles() -> None:

@@ -64,9 +64,12 @@ USAGE = [
     ),
     (
         ("--quite", "simulate", ALPHA),
-        r'unknown: --quite; did you mean "--quiet"\? \(see hodograph --help',
+        r'unknown argument: --quite; did you mean "--quiet"\? \(see hodograph --help',
     ),
-    (("simulate", ALPHA, "other.toml"), r"unknown: other.toml \(see hodograph simulate --help\)"),
+    (
+        ("simulate", ALPHA, "other.toml"),
+        r"unknown argument: other.toml \(see hodograph simulate --help\)",
+    ),
     (("quik-stop",), r'did you mean "quick-stop"\?'),
     (("spline",), r"FILE"),
     (("spline", ALPHA, "--jsn"), r"--jsn"),
@@ -193,9 +196,15 @@ def test_spoilt_images(
 
 
 def test_no_bus(capsys: pytest.CaptureFixture[str]) -> None:
-    status, line = failed(capsys, "status", "--bus", "socketcan:nocan7")
+    status, line = failed(capsys, "status", "--bus", "socketcan:vcan7")
     assert status == 4
     assert "tools/with-vcan" in line
+
+
+def test_a_waiting_time_is_not_below_zero(capsys: pytest.CaptureFixture[str]) -> None:
+    status, line = failed(capsys, "status", "--wait", "-1")
+    assert status == 2
+    assert 'argument --wait: "-1" is below 0' in line
 
 
 def test_unknown_interface(capsys: pytest.CaptureFixture[str]) -> None:

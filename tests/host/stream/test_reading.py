@@ -65,6 +65,6 @@ def test_what_the_machine_does_not_have_is_noted_once(tmp_path: Path) -> None:
     found = reader(tmp_path, "mill.toml", "M62 P0\nG1 X10\nM63 P0\nM3 S5\nG1 X20")
     read(found)
     assert [note.partition("job.ngc:")[2] for note in found.notes] == [
-        "3: outputs (M62 to M65, M67, M68): the machine has none, it moves as if they were done",
-        "6: spindle (M3, M4, M5): the machine has none, it moves as if they were done",
+        "3: outputs (M62 to M65, M67, M68): the machine file has no output for it, the motion goes on without",
+        "6: spindle (M3, M4, M5): the machine file has no output for it, the motion goes on without",
     ]

@@ -125,7 +125,7 @@ def test_standard_input_is_gcode() -> None:
         ("simulate none.csv --feed 20", "none.csv: no such file"),
         ("import part.toml", "part.toml: no toolpath by the end of its name"),
         ("feed G.NGC", "G.NGC: is a toolpath, which only"),
-        ("goto G.NGC", "G.NGC: is a toolpath, which only"),
+        ("goto G.NGC", "stream take: hodograph run G.NGC, or give a path file"),
         ("rig d.svg", "d.svg: is a toolpath, which only"),
     ],
 )

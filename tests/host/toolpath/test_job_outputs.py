@@ -112,7 +112,7 @@ def test_outputs_that_the_machine_does_not_have(
 def test_a_machine_without_outputs_notes_them(tmp_path: Path) -> None:
     plain = load_machine(MACHINES / "tuned.toml")
     found = job(tmp_path, plain, "M62 P0\nG1 X10")
-    assert "outputs (M62 to M65, M67, M68): the machine has none" in found.notes[0]
+    assert "outputs (M62 to M65, M67, M68): the machine file has no output for it" in found.notes[0]
     assert events(found) == [[]]
 
 

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: MIT
-"""Diagnostics texts: states, faults and refusals in words, with remedies. Used by bus/, faults/ and monitor/.
-No I/O.
+"""Diagnostics texts: states, faults and refusals in words, with remedies. Used by bus/, faults/, monitor/ and
+job_run. No I/O.
 """

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3). Used by bus/, faults/ and
-monitor/. No I/O.
+"""Texts for the codes of the controller's objects (docs/reference/protocol.md section 3). Used by bus/, faults/,
+monitor/ and job_run. No I/O.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ STORED = {
 
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
-    2: "the axes are away from the program's start: hodograph goto FILE",
+    2: "the axes are away from the program's start: hodograph goto FILE; for `start --from MM` first hodograph goto "
+    "--to the point of `hodograph spline FILE --at MM`, then hodograph upload FILE",
     3: "the axes are moving: wait, or hodograph stop",
     4: "the drives are off: hodograph start switches them on",
     5: "a fault is present: see hodograph status",

@@ -18,7 +18,7 @@ import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...errors import BusError, BusyError, RefusedError, one_line
-from ..address import BusAddress
+from ..address import BusAddress, is_virtual
 from ..clock import REAL_CLOCK, Clock
 from .channel_lock import TURN_WAIT_S, Turns
 from .objects import COMMAND, STATE
@@ -414,10 +414,16 @@ class Node:
         `busy_s` (None: `wait_s`).
         """
         if not self.answers(wait_s, wait_s if busy_s is None else busy_s):
-            raise BusError(
-                f"no answer from {self.who()} in {wait_s:g} s: start the controller "
+            raise BusError(f"no answer from {self.who()} in {wait_s:g} s: {self._start_remedy()}")
+
+    def _start_remedy(self) -> str:
+        """What to do if no controller answers: on a bus with hardware a simulated machine is no remedy."""
+        if is_virtual(self.address):
+            return (
+                "start the controller "
                 f"(hodograph rig --bus {self.address} brings up a simulated machine)"
             )
+        return "start the controller, and compare its bit rate and node number with those of this command"
 
 
 def _nowhere(number: int) -> bytes:
