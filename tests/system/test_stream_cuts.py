@@ -13,8 +13,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+from cut_oracle import away_um  # noqa: E402
 from marks import long  # noqa: E402
-from stream_cuts import KINDS, away_um, draw, run_case  # noqa: E402
+from stream_cuts import JOBS, KINDS, draw, run_case  # noqa: E402
 
 
 @pytest.mark.parametrize(("seed", "kind"), [(131, "kill"), *(long(7, kind) for kind in KINDS)])
