@@ -30,6 +30,10 @@ _REST_TICKS = 3
 """Ticks without motion after which the axes rest."""
 _STOP_S = 1.5
 """Longest stop along the path, whose outputs are off while the axes brake."""
+_BACK_UM = 5.0
+"""How far axes beside the path go back along it before the job goes on (docs/guides/streaming.md, "Loss of power"). The
+outputs are off then, as before each start.
+"""
 _TICKS = 2000
 _OFF: tuple[int, ...] = (0, 0, 0, 0)
 
@@ -70,7 +74,9 @@ def line_of(
     for chunks in jobs:
         for positions, values in _executed_offline(chunks, limits):
             points.append(counts_from_q40_mm(positions, counts_per_unit).astype(np.float64))
-            outputs.append(np.column_stack((values["digital"], values["analogue"])).astype(np.int64))
+            outputs.append(
+                np.column_stack((values["digital"], values["analogue"])).astype(np.int64)
+            )
     whole = np.concatenate(points)
     first = np.flatnonzero(_differs(whole))
     per_um = np.array(counts_per_unit, dtype=np.float64) * 1e-3
@@ -164,12 +170,21 @@ def outputs_trouble(frames: Frames, machine: Machine, line: JobLine) -> str | No
     seen = np.column_stack((values["digital"], values["analogue"])).astype(np.int64)
     moving = np.flatnonzero(_differs(targets))
     segments, apart = places(targets[moving], line.points, line.per_um)
-    judge = _OutputJudge(round(_STOP_S * 1e6 / machine.period_us))
+    judge, rest = OutputJudge(round(_STOP_S * 1e6 / machine.period_us)), targets[0]
     for k, segment, distance in zip(moving.tolist(), segments.tolist(), apart, strict=True):
         if distance > NEAR_UM:
             judge.rest(k)
             continue
+        if judge.rests_before(k):
+            rest = targets[k - 1]
         own = tuple(seen[k].tolist())
+        if (
+            own == _OFF
+            and not judge.begun
+            and np.linalg.norm((targets[k] - rest) / line.per_um) < _BACK_UM
+        ):
+            judge.last = k
+            continue
         if not judge.accepts(k, own, line.outputs_near(segment)):
             place = ", ".join(f"{one:.4f}" for one in targets[k] / line.per_um / 1000.0)
             wanted = sorted(line.outputs_near(segment))
@@ -185,7 +200,7 @@ def final_outputs(frames: Frames, machine: Machine) -> tuple[int, ...]:
 
 
 @dataclass
-class _OutputJudge:
+class OutputJudge:
     """Follows the outputs from moving tick to moving tick."""
 
     longest_ticks: int
@@ -197,10 +212,15 @@ class _OutputJudge:
         """The axes rest before this tick, or move beside the path."""
         self.last, self.begun, self.off_at = tick, False, None
 
+    def rests_before(self, tick: int) -> bool:
+        """Whether the axes have rested before this tick, so that another motion begins."""
+        if tick <= self.last + _REST_TICKS:
+            return False
+        self.rest(tick)
+        return True
+
     def accepts(self, tick: int, own: tuple[int, ...], wanted: set[tuple[int, ...]]) -> bool:
         """Whether the outputs at a tick may be these."""
-        if tick > self.last + _REST_TICKS:
-            self.rest(tick)
         self.last = tick
         if self.off_at is not None:
             return own == _OFF and tick - self.off_at <= self.longest_ticks

@@ -35,7 +35,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from hodograph.bus.address import BUS_VARIABLE, BusAddress
+
 from cut_oracle import (
     NEAR_UM,
     JobLine,
@@ -46,7 +46,7 @@ from cut_oracle import (
     line_of,
     outputs_trouble,
 )
-
+from hodograph.bus.address import BUS_VARIABLE, BusAddress
 from hodograph.bus.capture.frames import Frames
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
@@ -617,8 +617,8 @@ class Run:
         keep = np.ones(len(frames), dtype=np.bool_)
         for begin, end in self.aside:
             keep[begin:end] = False
-        frames = frames[keep]
-        points = changing(executed(frames, nodes)[0])
+        own = frames[keep]
+        points = changing(executed(own, nodes)[0])
         line = job_line(self.case.job, self.case.period_us)
         found.away_um = away_um(points, line.points, line.per_um)
         if self.ended:
@@ -630,7 +630,7 @@ class Run:
         if found.left_out_um > NEAR_UM:
             found.troubles.append(f"{found.left_out_um:.3f} um of the path left out")
         if self.machine.outputs is not None:
-            self._judge_outputs(frames, line)
+            self._judge_outputs(own, line)
         jumps = find_jumps(frames, nodes, step_limits(self.machine))
         if jumps:
             found.troubles.append(f"{jumps[0]} ({len(jumps)} in all)")

@@ -50,8 +50,8 @@ on them.
 """
 
 _BESIDE_MM = 1e-6
-"""A begin nearer than this to an end of a segment counts as that end. Tails end at ends of segments, and the rounding of
-arc lengths would leave some 1e-12 mm of a segment: there the rounded numbers of the format are no curve.
+"""A begin nearer than this to an end of a segment counts as that end. Tails end at ends of segments, and the rounding
+of arc lengths would leave some 1e-12 mm of a segment: there the rounded numbers of the format are no curve.
 """
 LEAST_REST_MM = 0.002
 """A section with a shorter remainder counts as done."""

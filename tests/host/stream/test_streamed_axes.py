@@ -189,7 +189,7 @@ def test_a_job_goes_on_inside_a_section(tmp_path: Path, machine: Machine) -> Non
 def test_a_job_that_goes_on_at_an_end_of_a_segment_has_no_piece_of_the_one_before(
     tmp_path: Path, machine: Machine, beside_mm: float
 ) -> None:
-    """Tails end there. Of some 1e-12 mm of a segment the rounded numbers are a curve above the jerk limit of an axis."""
+    """Tails end there. The rounded numbers of some 1e-12 mm of a segment are above the jerk limit of an axis."""
     (block,) = _blocks(_written(tmp_path, _walk(2, 16, 1.0, 10.0)), machine)
     ends = block.curve.segment_starts_mm
     for k, end_mm in enumerate(ends[1:-1].tolist(), 1):
