@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Streamed jobs that are cut at random instants, and continued to their end.
 
-    .venv/bin/python tools/stream_cuts.py [--seeds 1-100] [--kind kill ...] [--json FILE]
+    .venv/bin/python tools/stream_cuts.py [--seeds 1-100] [--kind kill ...] [--job five_axes ...] [--json FILE]
 
 Run by `make cuts-stream` and by tests/system/test_stream_cuts.py. Starts machines and commands on local buses in
 virtual time, receives all frames, and writes journals into a temporary folder; writes FILE.
@@ -10,8 +10,9 @@ virtual time, receives all frames, and writes journals into a temporary folder; 
 Each seed draws a job, a controller memory and disturbances: the host killed, stopped, terminated, its cable pulled,
 frames lost or doubled, the controller without power. After each of them `hodograph stream --continue` runs, which may
 be disturbed too. At the end all setpoints together must lie on the path of the job, leave nothing of it out, and keep
-all limits; the journal, the exit statuses and the end of the job must be as documented. Prints a line for each seed and
-the counts for each kind; exit status 1 if a seed failed.
+all limits; outputs must be those of the job wherever the axes move (cut_oracle.py); the journal, the exit statuses and
+the end of the job must be as documented. Prints a line for each seed and the counts for each kind; exit status 1 if a
+seed failed.
 """
 
 from __future__ import annotations
@@ -34,10 +35,18 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cut_oracle import (
+    NEAR_UM,
+    JobLine,
+    away_um,
+    changing,
+    executed,
+    final_outputs,
+    line_of,
+    outputs_trouble,
+)
 from hodograph.bus.address import BUS_VARIABLE, BusAddress
-from hodograph.bus.capture.decode import RPDO1, SYNC_ID
 from hodograph.bus.capture.frames import Frames
 from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
@@ -59,20 +68,16 @@ from hodograph.errors import HodographError
 from hodograph.faults.bench import INJECTOR
 from hodograph.fixed_point import MM_PER_Q40, nearest_q40
 from hodograph.machine_limits import program_limits
-from hodograph.native.program import NativeLimits, NativeProgram
-from hodograph.program import encode
+from hodograph.native.program import NativeLimits
 from hodograph.stream.journal import Entry, FileMark
 from hodograph.stream.plan import JobFiles, JobPlan, Place
-from hodograph.stream.simulation import concatenated, from_rest_to_rest
 from hodograph.toolpath.files import ReadOptions
 
 ROOT = Path(__file__).resolve().parents[1]
-MILL = ROOT / "examples" / "machines" / "mill.toml"
+MACHINES = ROOT / "examples" / "machines"
+OUTPUTS_MACHINE = MACHINES / "dispenser.toml"
 TOOLPATHS = ROOT / "examples" / "toolpaths"
 TOLERANCE_MM = 0.01
-PER_UM = 1000.0
-NEAR_UM = 1.0
-"""Greatest distance from the path, as lines between setpoints 1 ms apart."""
 KINDS = (
     "kill", "suspend", "interrupt", "interrupt-twice", "terminate", "hang-up", "power",
     "cable", "answers-lost", "requests-lost", "doubled",
@@ -99,10 +104,7 @@ _HANDLED_S = 0.1
 _CABLE_S = 25.0
 """After it the cable is in again."""
 _ATTEMPTS = 14
-_WINDOW, _BLOCK = 1500, 64
 _INPUT_STATUS, _BUS_STATUS, _REFUSED_STATUS = 2, 4, 5
-
-Counts = NDArray[np.float64]
 
 
 # -- jobs -------------------------------------------------------------------------------------
@@ -129,12 +131,33 @@ def _there_and_back() -> str:
     return "G64 P0.01\nF4000\nG1 X30 Y4\nG1 X0 Y8\nG1 X30 Y12 Z-1\nM0\nG1 X0 Y0 Z0\nM2\n"
 
 
+def _pulses() -> str:
+    """Two outputs and a value switch with nearly every move, at rest, and before and after dwells."""
+    lines = []
+    for k in range(1, 60):
+        lines.append(f"M{62 + k % 2} P{k % 4 // 2}")
+        if k % 3 == 0:
+            lines.append(f"M67 E0 Q{k}")
+        lines.append(f"G1 X{1.5 * k:.4f} Y{5 * np.sin(0.3 * k):.4f}")
+        if k % 20 == 0:
+            lines += ["M64 P1", "G4 P0.1", "M65 P1"]
+    return "\n".join(["G64 P0.02", "F3000", *lines, "M68 E0 Q0", "G1 X0 Y0 Z-1", "M2", ""])
+
+
 @dataclass(frozen=True)
 class Job:
-    """Files of a job, by name: text, or a path of an example."""
+    """Files of a job, by name: text, or a path of an example.
+
+    machine    its file among the examples
+    outputs    whether the machine has the outputs of OUTPUTS_MACHINE
+    slowness   factor of the period, where five axes would fill the bus
+    """
 
     name: str
     texts: tuple[str | Path, ...]
+    machine: str = "mill"
+    outputs: bool = False
+    slowness: int = 1
 
     def write(self, folder: Path) -> list[Path]:
         """The files, in this folder."""
@@ -153,92 +176,38 @@ JOBS = (
     Job("back", (_there_and_back(),)),
     Job("engraving", (TOOLPATHS / "engraving.ngc",)),
     Job("several", (_slow(), _there_and_back(), _stairs())),
+    Job("five_axes", (TOOLPATHS / "five_axes.ngc",), machine="mill_five_axes", slowness=2),
+    Job("dispensing", (TOOLPATHS / "dispensing.ngc",), outputs=True),
+    Job("pulses", (_pulses(),), outputs=True),
 )
-_SHARES = (0.25, 0.25, 0.2, 0.15, 0.02, 0.13)
+_SHARES = (0.18, 0.17, 0.12, 0.1, 0.02, 0.09, 0.1, 0.08, 0.14)
 """Of the jobs among the seeds: long ones are rare."""
 _INPUT_SHARE = 0.1
 """Of the jobs of one file that come from standard input."""
 
 
 @cache
-def job_counts(job: Job, period_us: int) -> Counts:
-    """The setpoints (n, A) of the job planned in one piece, in counts."""
+def job_line(job: Job, period_us: int) -> JobLine:
+    """The job executed undisturbed."""
     with tempfile.TemporaryDirectory(prefix="hodograph-") as folder:
-        machine = machine_at(period_us, Path(folder))
-        scale = tuple(axis.counts_per_unit for axis in machine.path_axes)
-        limits = NativeLimits(**asdict(program_limits(machine)) | {"stop_time_ms": 0})
+        machine = machine_at(job, period_us, Path(folder))
+        limits = NativeLimits(**asdict(program_limits(machine)), chunk=1)
         files = JobFiles(tuple(job.write(Path(folder))), machine, TOLERANCE_MM, ReadOptions())
-        parts: list[Counts] = []
         with JobPlan(files, 16384, 1, Place(), stops=False) as plan:
-            for chunks in plan.by_job():
-                for part in from_rest_to_rest(chunks):
-                    program = NativeProgram(encode(concatenated(part)))
-                    if program.check(limits) is not None:
-                        raise AssertionError("the job is refused offline")
-                    parts.append(program.setpoints("fixed", scale)[1].astype(np.float64))
-    return np.concatenate(parts)
+            return line_of(plan.by_job(), limits, machine.path_counts)
 
 
-def machine_at(period_us: int, folder: Path) -> Machine:
-    """The mill at this period, in a file of its own."""
-    text = MILL.read_text().replace('"../drives/', f'"{ROOT}/examples/drives/')
-    file = folder / f"mill{period_us}.toml"
-    file.write_text(text.replace("period_us = 1000", f"period_us = {period_us}"))
+def machine_at(job: Job, period_us: int, folder: Path) -> Machine:
+    """The machine of a job at this period, in a file of its own."""
+    text = (MACHINES / f"{job.machine}.toml").read_text()
+    if job.outputs:
+        given = OUTPUTS_MACHINE.read_text()
+        text += "\n" + given[given.index("[outputs]") : given.index("[[axis]]")]
+    text = text.replace('"../drives/', f'"{ROOT}/examples/drives/')
+    text = re.sub(r"period_us = \d+", f"period_us = {period_us}", text)
+    file = folder / f"{job.machine}{period_us}.toml"
+    file.write_text(text)
     return load_machine(file)
-
-
-# -- the oracle -------------------------------------------------------------------------------
-
-
-def away_um(points: Counts, line: Counts) -> float:
-    """How far points (n, A) are from a polyline (m, A) at most, um. They come to its places about in order."""
-    points, line = _changing(points) / PER_UM, _changing(line) / PER_UM
-    if len(line) < 2:
-        line = np.repeat(line, 2, axis=0)
-    at, away = 0, 0.0
-    for first in range(0, len(points), _BLOCK):
-        block = points[first : first + _BLOCK]
-        low = max(at - _WINDOW, 0)
-        part = line[low : at + _WINDOW + _BLOCK]
-        if len(part) < 2:
-            low = max(len(line) - 2, 0)
-            part = line[low:]
-        begin, step = part[:-1], np.diff(part, axis=0)
-        length = np.maximum((step * step).sum(axis=1), 1e-12)
-        relative = block[:, None, :] - begin[None, :, :]
-        share = np.clip((relative * step).sum(axis=2) / length, 0.0, 1.0)
-        apart = np.linalg.norm(relative - share[:, :, None] * step, axis=2)
-        nearest = apart.argmin(axis=1)
-        away = max(away, float(apart.min(axis=1).max()))
-        at = low + int(nearest[-1])
-    return away
-
-
-def _changing(points: Counts) -> Counts:
-    """Without points that repeat the one before."""
-    keep = np.ones(len(points), dtype=np.bool_)
-    keep[1:] = (np.diff(points, axis=0) != 0).any(axis=1)
-    return points[keep]
-
-
-def executed(frames: Frames, nodes: Sequence[int]) -> Counts:
-    """Targets (n, A) at each SYNC at which all drives are enabled, each change once."""
-    syncs = frames["id"] == SYNC_ID
-    own = [_at_syncs(frames, node, syncs) for node in nodes]
-    known = np.logical_and.reduce([enabled for _, enabled in own])
-    return _changing(np.stack([targets[known] for targets, _ in own], axis=1))
-
-
-def _at_syncs(
-    frames: Frames, node: int, syncs: NDArray[np.bool_]
-) -> tuple[Counts, NDArray[np.bool_]]:
-    """The last target before each SYNC, and whether it came with the command to follow."""
-    setpoints = frames["id"] == RPDO1 + node
-    latest = np.maximum.accumulate(np.where(setpoints, np.arange(len(frames)), -1))[syncs]
-    data = np.ascontiguousarray(frames["data"][np.maximum(latest, 0)])
-    control = np.ascontiguousarray(data[:, 0:2]).view("<u2")[:, 0]
-    targets = np.ascontiguousarray(data[:, 2:6]).view("<i4")[:, 0].astype(np.float64)
-    return targets, (latest >= 0) & ((control & 0x1F) == 0x0F)
 
 
 # -- the machine and the host -----------------------------------------------------------------
@@ -401,10 +370,11 @@ class Case:
     """The job comes from standard input, and cannot be continued."""
 
 
-def draw(seed: int, kinds: Sequence[str] = KINDS) -> Case:
-    """The case of a seed."""
+def draw(seed: int, kinds: Sequence[str] = KINDS, jobs: Sequence[Job] = JOBS) -> Case:
+    """The case of a seed, with one of these jobs."""
     rng = np.random.default_rng(seed)
-    job = JOBS[int(rng.choice(len(JOBS), p=_SHARES))]
+    shares = np.array([share for one, share in zip(JOBS, _SHARES, strict=True) if one in jobs])
+    job = jobs[int(rng.choice(len(jobs), p=shares / shares.sum()))]
     wanted = [str(rng.choice(list(kinds))) for _ in range(int(rng.integers(1, 4)))]
     wanted = [kind for k, kind in enumerate(wanted) if kind not in _RULED or k == 0]
     rules = [line for kind in wanted if kind in _RULED for line in _rules(kind, rng)]
@@ -421,7 +391,7 @@ def draw(seed: int, kinds: Sequence[str] = KINDS) -> Case:
     return Case(
         seed,
         job,
-        int(rng.choice([1000, 2000])),
+        int(rng.choice([1000, 2000])) * job.slowness,
         int(rng.choice([12, 16, 24, 48])),
         cuts,
         "\n".join(rules) + "\n",
@@ -464,7 +434,7 @@ class Run:
 
     def __init__(self, case: Case, folder: Path) -> None:
         self.case, self.folder = case, folder
-        self.machine = machine_at(case.period_us, folder)
+        self.machine = machine_at(case.job, case.period_us, folder)
         self.files = case.job.write(folder)
         self.journal = folder / "stream.json"
         self.found = Found(case)
@@ -633,7 +603,7 @@ class Run:
         if not self.case.from_input and not self._is_done():
             self.found.troubles.append("the job has ended, and the journal does not say so")
         state, _, targets = self.rig.status()
-        end = job_counts(self.case.job, self.case.period_us)[-1]
+        end = job_line(self.case.job, self.case.period_us).points[-1]
         near = self.machine.start_tolerance_counts if "power" in self.case.kinds else 4
         if state not in (BOOT, OFF) and np.abs(end - targets).max() > near:  # restarted since
             self.found.troubles.append(f"ended at {targets}, not at {end.tolist()}")
@@ -647,18 +617,31 @@ class Run:
         keep = np.ones(len(frames), dtype=np.bool_)
         for begin, end in self.aside:
             keep[begin:end] = False
-        points = executed(frames[keep], nodes)
-        line = job_counts(self.case.job, self.case.period_us)
-        found.away_um = away_um(points, line) if len(points) else 0.0
+        own = frames[keep]
+        points = changing(executed(own, nodes)[0])
+        line = job_line(self.case.job, self.case.period_us)
+        found.away_um = away_um(points, line.points, line.per_um)
         if self.ended:
-            found.left_out_um = away_um(line[::5], points) if len(points) else np.inf
+            found.left_out_um = np.inf
+            if len(points):
+                found.left_out_um = away_um(line.points[::5], points, line.per_um)
         if "power" not in self.case.kinds and found.away_um > NEAR_UM:
             found.troubles.append(f"setpoints {found.away_um:.3f} um off the path")
         if found.left_out_um > NEAR_UM:
             found.troubles.append(f"{found.left_out_um:.3f} um of the path left out")
+        if self.machine.outputs is not None:
+            self._judge_outputs(own, line)
         jumps = find_jumps(frames, nodes, step_limits(self.machine))
         if jumps:
             found.troubles.append(f"{jumps[0]} ({len(jumps)} in all)")
+
+    def _judge_outputs(self, frames: Frames, line: JobLine) -> None:
+        trouble = outputs_trouble(frames, self.machine, line)
+        last, wanted = final_outputs(frames, self.machine), tuple(line.outputs[-1].tolist())
+        if trouble is None and self.ended and last != wanted:
+            trouble = f"outputs {last} at the end, not {wanted}"
+        if trouble is not None:
+            self.found.troubles.append(trouble)
 
 
 def host_text(line: str) -> str:
@@ -716,19 +699,21 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="stream_cuts.py", description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=_numbers, default=_numbers("1-100"))
     parser.add_argument("--kind", choices=KINDS, nargs="+", default=list(KINDS))
+    parser.add_argument("--job", choices=[job.name for job in JOBS], nargs="+")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args(arguments)
     signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # a shell may start this with it ignored
+    jobs = [job for job in JOBS if options.job is None or job.name in options.job]
     counts: Counter[str] = Counter()
     bad: Counter[str] = Counter()
     results = []
     with tempfile.TemporaryDirectory(prefix="hodograph-") as own:
         os.environ["XDG_STATE_HOME"] = os.environ["XDG_RUNTIME_DIR"] = own
         for seed in options.seeds:
-            found = run_case(draw(seed, options.kind))
+            found = run_case(draw(seed, options.kind, jobs))
             case = found.case
             counts.update(set(case.kinds))
             bad.update(set(case.kinds) if found.troubles else ())

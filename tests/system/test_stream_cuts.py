@@ -13,8 +13,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+from cut_oracle import OutputJudge, away_um  # noqa: E402
 from marks import long  # noqa: E402
-from stream_cuts import KINDS, away_um, draw, run_case  # noqa: E402
+from stream_cuts import KINDS, draw, run_case  # noqa: E402
 
 
 @pytest.mark.parametrize(("seed", "kind"), [(131, "kill"), *(long(7, kind) for kind in KINDS)])
@@ -46,3 +47,23 @@ def test_what_is_off_the_path_or_left_out_is_found() -> None:
     assert 4.9 < away_um(aside, path) < 5.1
     cut = np.delete(slower, range(2800, 3200), axis=0)  # over the corner
     assert away_um(path, cut) > 1.0
+
+
+def test_outputs_that_are_not_those_of_the_job_are_found() -> None:
+    """Off while the axes brake for a stop, and until they rest; else as in the job."""
+    on, off, other = (1, 0, 0, 0), (0, 0, 0, 0), (2, 0, 0, 0)
+
+    def accepted(outputs: list[tuple[int, ...]]) -> list[bool]:
+        judge = OutputJudge(longest_ticks=3)
+        return [judge.accepts(tick, own, {on}) for tick, own in enumerate(outputs)]
+
+    assert accepted([on, on, off, off]) == [True, True, True, True]
+    assert accepted([off]) == [False]
+    assert accepted([on, other]) == [True, False]
+    assert accepted([on, off, on]) == [True, True, False]
+    assert accepted([on, off, off, off, off, off])[-1] is False
+    judge = OutputJudge(longest_ticks=3)
+    assert judge.accepts(0, on, {on})
+    assert judge.accepts(1, off, {on})
+    assert judge.rests_before(20)
+    assert not judge.accepts(20, off, {on})

@@ -50,7 +50,9 @@ on them.
 """
 
 _BESIDE_MM = 1e-6
-"""A begin nearer than this to the start of the section counts as the start."""
+"""A begin nearer than this to an end of a segment counts as that end. Tails end at ends of segments, and the rounding
+of arc lengths would leave some 1e-12 mm of a segment: there the rounded numbers of the format are no curve.
+"""
 LEAST_REST_MM = 0.002
 """A section with a shorter remainder counts as done."""
 _FARTHEST_Q40 = 1 << 62
@@ -125,8 +127,8 @@ def blocks_from(
     short: Block | None = None
     for block in blocks:
         length = block.curve.length_mm
-        if begin_mm >= length:
-            begin_mm -= length
+        if begin_mm > 0.0 and begin_mm >= length - _BESIDE_MM:
+            begin_mm = max(begin_mm - length, 0.0)
             switched.act(block.events)
             continue
         if begin_mm > 0.0:
@@ -166,6 +168,9 @@ def _after(block: Block, begin_mm: float, switched: SwitchedOutputs) -> Block:
 
 def curve_after(curve: Curve, begin_mm: float) -> tuple[int, Curve]:
     """A curve without its first part, after the number of whole segments in that part."""
+    near = int(np.argmin(np.abs(curve.segment_starts_mm - begin_mm)))
+    if near < curve.segment_count and abs(curve.segment_starts_mm[near] - begin_mm) < _BESIDE_MM:
+        return near, sliced(curve, near)
     segment, xi = curve.locate(begin_mm)
     first, x = int(segment), float(xi)
     if isinstance(curve, PHSpline):

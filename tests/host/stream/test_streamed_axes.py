@@ -24,7 +24,7 @@ from hodograph.spline.spatial import SpatialPHSpline
 from hodograph.stream import reading
 from hodograph.stream.chunk import Chunk, shared_fault
 from hodograph.stream.chunks import FEWEST_SHARED_PIECES, SectionChunks
-from hodograph.stream.geometry import Block, blocks_from, curve_after, with_joints
+from hodograph.stream.geometry import Block, blocks_from, curve_after, short_segments, with_joints
 from hodograph.stream.journal import Entry
 from hodograph.stream.output_check import require_outputs
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlannedSection
@@ -183,6 +183,36 @@ def test_a_job_goes_on_inside_a_section(tmp_path: Path, machine: Machine) -> Non
     end = blocks[-1].curve
     assert isinstance(end, SpatialPHSpline)
     assert np.allclose(_fed(chunks, machine), end.axes_nodes[-1], atol=1e-8)
+
+
+@pytest.mark.parametrize("beside_mm", [0.0, -1e-12, -3e-11, -5e-10, 1e-12, 1e-9])
+def test_a_job_that_goes_on_at_an_end_of_a_segment_has_no_piece_of_the_one_before(
+    tmp_path: Path, machine: Machine, beside_mm: float
+) -> None:
+    """Tails end there. The rounded numbers of some 1e-12 mm of a segment are above the jerk limit of an axis."""
+    (block,) = _blocks(_written(tmp_path, _walk(2, 16, 1.0, 10.0)), machine)
+    ends = block.curve.segment_starts_mm
+    for k, end_mm in enumerate(ends[1:-1].tolist(), 1):
+        (after,) = blocks_from(iter([block]), end_mm + beside_mm, SwitchedOutputs())
+        assert after.curve.segment_starts_mm[1] > 0.9 * (ends[k + 1] - end_mm)
+        assert after.line.tolist() == block.line[k:].tolist()
+        assert short_segments(after).line.size == short_segments(after).curve.segment_count
+    begin_mm = float(ends[-4]) + beside_mm
+    parts = blocks_from(iter([block]), begin_mm, SwitchedOutputs())
+    made = SectionChunks(machine, "walk", parts, 1, MOST, round(begin_mm * 2**40))
+    for one in made.chunks():
+        assert check_image(one.chunk.image, program_limits(machine), chunk=True) is None
+
+
+def test_a_job_that_goes_on_where_two_parts_meet_begins_with_the_second(
+    tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _short_windows(monkeypatch)
+    blocks = _blocks(_written(tmp_path, _walk(5, 140, 0.6, 25.0)), machine)
+    length_mm = blocks[0].curve.length_mm
+    for beside_mm in (-3e-7, -1e-12, 0.0, 1e-12, 3e-7):
+        after = list(blocks_from(iter(blocks), length_mm + beside_mm, SwitchedOutputs()))
+        assert [one.line.size for one in after] == [one.line.size for one in blocks[1:]]
 
 
 def test_parts_of_a_curve_have_its_extra_axes(tmp_path: Path, machine: Machine) -> None:
