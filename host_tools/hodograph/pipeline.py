@@ -316,9 +316,16 @@ class Pipeline:
             self._compiled_again,
             self._searched,
             self.machine.stop_time_ms * 1e-3,
+            self._shows_few,
         )
         with _named_by(f"{self.file.file}:"):
             return again.in_time(plan, late)
+
+    def _shows_few(self, limits: Limits, late: Program) -> bool:
+        """Whether an excerpt of the path shows that a plan with these limits has late stops too often. False: there is
+        no excerpt.
+        """
+        return False
 
     def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
         """The plan made again with further feed zones; `why` goes to its notes."""

@@ -17,13 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .equal_sections import SharedPrograms, moved_program
+from .errors import PlanError
 from .events import Events, no_events
 from .feed import FeedPieces, FeedPlan, FeedZone, Limits
+from .fixed_point import MM_PER_Q40
 from .machine_limits import program_limits
 from .pipeline import THOROUGH_GAIN, Judged, Pipeline
 from .program.compiler import Compilation
 from .program.geometry import first_point_q40, quantise
+from .program.image import Program
 from .program.stop_planning import LongStopError, StopTerms
+from .program.stop_reserve import late_share, late_too_often
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
 from .spline.spatial import SpatialPHSpline
@@ -40,6 +44,15 @@ _SLOWER, _MOST_SLOWER = 0.7, 12
 _THOROUGH_CHORDS = 1000
 """A section with at most so many chords and feed pieces is searched for stops with all trials, if few do not suffice.
 """
+
+_EXCERPT_STOPS = 5.0
+"""Duration of an excerpt of a section, as a multiple of the longest stop."""
+
+_LONG_EXCERPTS = 8.0
+"""A section that lasts this multiple of its excerpt is long enough for one."""
+
+_ALIKE = 1.1
+"""Stops may be late more often in the excerpt than in the whole by this factor; otherwise it shows nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +121,40 @@ class SectionPipeline(Pipeline):
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
         return self._passed_slowly(plan)
 
+    def _shows_few(self, limits: Limits, late: Program) -> bool:
+        stop_s = self.machine.stop_time_ms * 1e-3
+        excerpt = self._excerpt(late, stop_s)
+        if excerpt is None:
+            return False
+        length_mm = excerpt.curve.length_mm
+        zones = tuple(
+            replace(one, to_mm=min(one.to_mm, length_mm))
+            for one in limits.zones
+            if one.from_mm < length_mm
+        )
+        try:
+            excerpt._searched(excerpt._planned(replace(limits, zones=zones)))
+        except LongStopError as error:
+            return late_too_often(error.program, stop_s)
+        except PlanError:
+            pass
+        return False
+
+    def _excerpt(self, late: Program, stop_s: float) -> SectionPipeline | None:
+        """The start of the section, where stops are late as often as in the whole of `late`, a program of the section.
+        None: there is none, or the section is short.
+        """
+        assert self.fitted is not None
+        end_s = np.cumsum(late.pieces.duration_s)
+        if end_s[-1] < _LONG_EXCERPTS * _EXCERPT_STOPS * stop_s:
+            return None
+        count = int(np.searchsorted(end_s, _EXCERPT_STOPS * stop_s)) + 1
+        if late_share(late, stop_s, slice(count)) > _ALIKE * late_share(late, stop_s):
+            return None
+        end_mm = float(late.pieces.start_q40[count]) * MM_PER_Q40
+        fitted = replace(self.fitted, curve=_start_of(self.fitted.curve, end_mm))
+        return replace(self, fitted=fitted, given_events=no_events(), shared=SharedPrograms())
+
     def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
         again = super()._slower(plan, zones, why)
         passed = self._passed_slowly(again)
@@ -157,6 +204,14 @@ class SectionPipeline(Pipeline):
             if not few or error.late_by > THOROUGH_GAIN:
                 raise
             return super()._with_stops(plan, replace(terms, quick=False))
+
+
+def _start_of(curve: SpatialPHSpline, end_mm: float) -> SpatialPHSpline:
+    """The segments of a curve that begin before an arc length."""
+    own = slice(int(np.count_nonzero(curve.segment_starts_mm[:-1] < end_mm)))
+    return replace(
+        curve, origin=curve.origin[own], preimage=curve.preimage[own], extra=curve.extra[own]
+    )
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:

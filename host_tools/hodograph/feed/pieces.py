@@ -12,7 +12,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from ..fixed_point import MM_PER_Q40, nearest_q40, to_q40
+from ..fixed_point import MM_PER_Q40, to_q40
 from .limits import FeedZone
 from .override_levels import FACTOR_ONE_Q14, FULL, Codes, rates_per_s, seconds_per_s2
 from .request import LEAST_FEED_MM_S
@@ -157,23 +157,31 @@ def round_pieces(times: Int, starts: Int, shapes: Real) -> Int:
 
     times (n + 1,) in 2^-32 s, starts (n + 1,) in 2^-40 mm; shapes (n, 8): powers of u = 0 … 1 over a piece, mm
     """
-    duration = np.diff(times)
+    return _rounded(np.diff(times), np.diff(starts), shapes)
+
+
+def _rounded(duration: Int, distance: Int, shapes: Real) -> Int:
+    """As `round_pieces`, from durations (n,) and distances (n,)."""
     e = exponents(duration)
     stretch = np.ldexp(1.0, e + 32) / duration
     k = np.arange(1, DEGREE + 1)
     c = to_q40(shapes[:, 1:] * stretch[:, None] ** k)
-    distance = np.diff(starts)
     curved = np.any(c[:, 1:] != 0, axis=1)
-    for i in range(duration.size):
-        d, shift = int(duration[i]), int(e[i]) + 32
-        rest = int(distance[i]) << (shift * DEGREE)
-        if curved[i]:
-            rest -= sum(
-                int(c[i, n - 1]) * d**n << (shift * (DEGREE - n)) for n in range(2, DEGREE + 1)
-            )
-        below = d << (shift * (DEGREE - 1))
-        c[i, 0] = (2 * rest + below) // (2 * below)
+    each = (duration, e + 32, distance, curved, c)
+    c[:, 0] = [_linear_term(*one) for one in zip(*(one.tolist() for one in each), strict=True)]
     return c
+
+
+def _linear_term(d: int, shift: int, distance: int, curved: bool, c: list[int]) -> int:
+    """The c1 with which a piece of duration `d` comes nearest to this distance; `shift` is e + 32."""
+    rest = 0
+    if curved:  # the other terms by Horner's rule, times 2^(shift * DEGREE)
+        for n in range(DEGREE, 1, -1):
+            rest = rest * d + (c[n - 1] << shift * (DEGREE - n))
+        rest *= d * d
+    rest = (distance << shift * DEGREE) - rest
+    below = d << shift * (DEGREE - 1)
+    return (2 * rest + below) // (2 * below)
 
 
 def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real]:
@@ -263,18 +271,17 @@ def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> Fe
     rows = np.repeat(np.arange(len(pieces)), 1 + chosen)
     duration, start, c = pieces.duration_q32_s[rows], pieces.start_q40[rows], pieces.c_q40[rows]
     ends = np.append(pieces.start_q40[1:], length_q40)
-    first = np.flatnonzero(chosen) + np.arange(int(chosen.sum()))
-    for at, row in zip(first.tolist(), np.flatnonzero(chosen).tolist(), strict=True):
-        whole = int(pieces.duration_q32_s[row])
-        times = np.array([0, whole // 2, whole], dtype=np.int64)
-        shape = _powers(whole, pieces.c_q40[row])
-        low, high = _parts(shape, times[1] / whole)
-        begin = int(pieces.start_q40[row])
-        middle = begin + nearest_q40(float(low.sum()))
-        starts = np.array([begin, middle, ends[row]], dtype=np.int64)
-        duration[at : at + 2] = np.diff(times)
-        start[at : at + 2] = starts[:2]
-        c[at : at + 2] = round_pieces(times, starts, np.stack((low, high)))
+    old = np.flatnonzero(chosen)
+    first = old + np.arange(old.size)
+    whole, begin = pieces.duration_q32_s[old], pieces.start_q40[old]
+    half = whole // 2
+    low, high = _parts(_powers(whole, pieces.c_q40[old]), half / whole)
+    middle = begin + to_q40(low.sum(axis=1))
+    both = ((first, half, middle - begin, low), (first + 1, whole - half, ends[old] - middle, high))
+    start[first + 1] = middle
+    for at, seconds, distance, shape in both:
+        duration[at] = seconds
+        c[at] = _rounded(seconds, distance, shape)
     return FeedPieces(
         duration,
         start,
@@ -285,26 +292,27 @@ def halved(pieces: FeedPieces, chosen: NDArray[np.bool_], length_q40: int) -> Fe
     )
 
 
-def _powers(duration_q32_s: int, c_q40: Int) -> Real:
-    """Powers (8,) of u = 0 … 1 over a piece, from its start; mm."""
-    e = int(exponents(np.array([duration_q32_s], dtype=np.int64))[0])
-    end = float(np.ldexp(float(duration_q32_s), -(e + 32)))
-    shape: Real = np.zeros(DEGREE + 1)
-    shape[1:] = np.ldexp(c_q40.astype(np.float64), -40) * end ** np.arange(1, DEGREE + 1)
+def _powers(duration_q32_s: Int, c_q40: Int) -> Real:
+    """Powers (n, 8) of u = 0 … 1 over each piece, from its start; mm."""
+    e = exponents(duration_q32_s)
+    end = np.ldexp(duration_q32_s.astype(np.float64), -(e + 32))
+    shape: Real = np.zeros((duration_q32_s.size, DEGREE + 1))
+    k = np.arange(1, DEGREE + 1)
+    shape[:, 1:] = np.ldexp(c_q40.astype(np.float64), -40) * end[:, None] ** k
     return shape
 
 
-def _parts(shape: Real, middle: float) -> tuple[Real, Real]:
-    """The same polynomial before and after u = middle, each in powers of its own 0 … 1 from its own start."""
+def _parts(shape: Real, middle: Real) -> tuple[Real, Real]:
+    """The same polynomials (n, 8) before and after u = middle (n,), each in powers of its own 0 … 1 from its own
+    start.
+    """
     k = np.arange(DEGREE + 1)
-    after = np.array(
-        [
-            sum(comb(n, i) * shape[n] * middle ** (n - i) for n in range(i, DEGREE + 1))
-            for i in range(DEGREE + 1)
-        ]
-    )
-    after[0] = 0.0
-    return shape * middle**k, after * (1.0 - middle) ** k
+    power = middle[:, None] ** k
+    after: Real = np.zeros_like(shape)
+    for i in range(1, DEGREE + 1):
+        for n in range(i, DEGREE + 1):
+            after[:, i] += comb(n, i) * shape[:, n] * power[:, n - i]
+    return shape * power, after * (1.0 - middle[:, None]) ** k
 
 
 def _halved(coefficients: Real) -> Real:

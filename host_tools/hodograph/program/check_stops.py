@@ -101,13 +101,13 @@ def _bound_fault(program: Program, kind: int, most_ms: int) -> tuple[ProgramErro
 
 def bounds(program: Program, kind: int) -> tuple[Real, Real]:
     """Least allowed bounds (M,) of the time in us and of the distance in um, from the command to rest."""
-    own_s, own_mm, waits = own_bounds(program, kind)
-    duration = program.pieces.duration_s
+    own_s, own_mm, waits = (one.tolist() for one in own_bounds(program, kind))
+    duration = program.pieces.duration_s.tolist()
     start = np.append(program.pieces.start_q40, program.length_q40).astype(np.float64) * MM_PER_Q40
-    distance = np.maximum(np.diff(start), 0.0)
+    distance = np.maximum(np.diff(start), 0.0).tolist()
     window_s = WINDOW_TICKS * program.period_us * 1e-6
-    count = duration.size
-    out_s, out_mm = np.zeros(count + 1), np.zeros(count + 1)
+    count = len(duration)
+    out_s, out_mm = [0.0] * (count + 1), [0.0] * (count + 1)
     out_s[count] = END_TICKS * program.period_us * 1e-6
     for i in range(count - 1, -1, -1):
         if waits[i] > 0.0:
@@ -117,8 +117,8 @@ def bounds(program: Program, kind: int) -> tuple[Real, Real]:
         while last < min(count, i + 1 + WINDOW) and ahead < window_s:
             ahead += duration[last]
             last += 1
-        out_s[i], out_mm[i] = own_s[i:last].max(), own_mm[i:last].max()
-    return out_s[:-1] * 1e6, out_mm[:-1] * 1e3
+        out_s[i], out_mm[i] = max(own_s[i:last]), max(own_mm[i:last])
+    return np.array(out_s[:-1]) * 1e6, np.array(out_mm[:-1]) * 1e3
 
 
 def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:

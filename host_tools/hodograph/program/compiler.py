@@ -109,7 +109,8 @@ def compile_path(
     program = _program(spline, geometry, plan, pieces, options)
     _require_override_headroom(program, spline)
     program = plan_stops(program, plan, options.stops)
-    fault = check(program, options.limits)
+    # A program with fault stops only is never run, and its plan is compiled again.
+    fault = None if options.stops.only_fault else check(program, options.limits)
     if fault is not None:
         raise PlanError(_advice(fault, program, options.limits, spline, plan.limits.names))
     return Compilation(program, plan, plan.notes, geometry.drift_mm)

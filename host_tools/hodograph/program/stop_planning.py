@@ -346,23 +346,25 @@ def _better_without(program: Program, kind: int, groups: Sequence[object]) -> ND
     continuing into the next part. Also all parts of a group (`groups`, (M,)) in which different numbers reduce no bound
     by a tenth.
     """
-    own_s, _, waits = own_bounds(program, kind)
-    duration_s = program.pieces.duration_s
-    out: NDArray[np.bool_] = np.zeros(duration_s.size, dtype=np.bool_)
+    own_s, _, waits = (one.tolist() for one in own_bounds(program, kind))
+    duration_s, codes = program.pieces.duration_s, program.stops.codes[:, kind]
+    seconds = duration_s.tolist()
+    out = [False] * len(seconds)
     next_s = END_TICKS * program.period_us * 1e-6
-    for _, group in groupby(range(duration_s.size - 1, -1, -1), key=groups.__getitem__):
+    for _, group in groupby(range(len(seconds) - 1, -1, -1), key=groups.__getitem__):
         parts = list(group)
         whole_s, worst_s = float(duration_s[parts].sum()) + next_s, 0.0
         for i in parts:
-            waiting_s = float(duration_s[i]) + next_s
-            numbers_s = max(own_s[i], waits[i] * duration_s[i] + next_s if waits[i] > 0.0 else 0.0)
+            waiting_s = seconds[i] + next_s
+            numbers_s = max(own_s[i], waits[i] * seconds[i] + next_s if waits[i] > 0.0 else 0.0)
             out[i] = waiting_s < WORTH_SHARE * numbers_s
             next_s = waiting_s if out[i] else numbers_s
             worst_s = max(worst_s, next_s)
-        differ = (program.stops.codes[parts, kind] != program.stops.codes[parts[0], kind]).any()
-        if differ and worst_s > WORTH_SHARE * whole_s:
-            out[parts], next_s = True, whole_s
-    return out
+        if worst_s > WORTH_SHARE * whole_s and (codes[parts] != codes[parts[0]]).any():
+            for i in parts:
+                out[i] = True
+            next_s = whole_s
+    return np.array(out, dtype=np.bool_)
 
 
 def _with_codes(program: Program, codes: NDArray[np.uint8]) -> Program:

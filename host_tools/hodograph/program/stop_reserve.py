@@ -50,9 +50,14 @@ _MOST_LATE = 0.3
 
 def late_too_often(program: Program, stop_time_s: float) -> bool:
     """Whether fault stops may take longer than `stop_time_s` for more than _MOST_LATE of the time."""
-    seconds = program.pieces.duration_s
-    late = program.stops.late(FAULT, stop_time_s)
-    return float(seconds[late].sum()) > _MOST_LATE * float(seconds.sum())
+    return late_share(program, stop_time_s) > _MOST_LATE
+
+
+def late_share(program: Program, stop_time_s: float, pieces: slice = slice(None)) -> float:
+    """Share of the time of these pieces in which fault stops may take longer than `stop_time_s`."""
+    seconds = program.pieces.duration_s[pieces]
+    late = program.stops.late(FAULT, stop_time_s)[pieces]
+    return float(seconds[late].sum()) / float(seconds.sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,15 +2,18 @@
 """A path whose fault stops would come too late is planned again, and refused only where no plan helps."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hodograph import section_pipeline
 from hodograph.cli.main import main
 from hodograph.config import load_machine, load_path_file
 from hodograph.errors import PlanError
+from hodograph.feed import Limits
 from hodograph.feed.request import LEAST_FEED_MM_S
 from hodograph.job import load_job
 from hodograph.pipeline import Pipeline, load_pipeline
@@ -143,6 +146,7 @@ class Attempts:
     def __init__(self, made: Pipeline, fails: str, times: int = 1) -> None:
         self.made, self.fails, self.left = made, fails, times
         self.calls: list[str] = []
+        self.shows_few: Callable[[Limits, Program], bool] = lambda limits, late: False
 
     def of(self, name: str) -> object:
         """A callable of the pipeline."""
@@ -168,7 +172,8 @@ class Attempts:
         with pytest.raises(LongStopError) as late:
             self.made._with_stops(plan, self.made.stop_terms)
         each = [self.of(name) for name in ("plan", "slower", "compile", "search")]
-        return Replanning(*each, stop_time_ms * 1e-3).in_time(plan, late.value)
+        again = Replanning(*each, stop_time_ms * 1e-3, self.shows_few)
+        return again.in_time(plan, late.value)
 
 
 @pytest.mark.parametrize("fails", ["plan", "search", "compile"])
@@ -180,6 +185,77 @@ def test_a_reserve_of_which_no_program_can_be_made_is_passed_over(
     assert found.program.stops.worst(FAULT).time_s <= 0.12
     assert "planned again with more room" in found.notes[-1]
     assert "slower" not in attempts.calls
+
+
+def test_a_plan_with_late_stops_in_an_excerpt_is_not_made(tmp_path: Path) -> None:
+    attempts = Attempts(corner(tmp_path, 120), "none")
+    attempts.shows_few = lambda limits, late: jerk_of(limits) > 25000.0
+    found = attempts.in_time(120)
+    assert found.program.stops.worst(FAULT).time_s <= 0.12
+    assert jerk_of(found.plan.limits) == 20000.0
+    assert attempts.calls.count("search") == 1
+
+
+def jerk_of(limits: Limits) -> float:
+    """The limit of the jerk of the machine's first axis."""
+    assert limits.machine.jerk_mm_s3 is not None
+    return limits.machine.jerk_mm_s3[0]
+
+
+def toolpath(folder: Path, *lines: str) -> SectionPipeline:
+    """The only section of a toolpath."""
+    file = folder / "path.ngc"
+    file.write_text("\n".join(("G21 G91 F6000", *lines, "M2\n")), encoding="utf-8")
+    mill = load_machine(EXAMPLES / "machines/mill.toml")
+    return load_job(file, mill).only_section("test").pipeline
+
+
+STAIRS = ("G1 X0.5", "G1 Y0.5") * 25
+
+
+def with_brief_excerpts(patch: pytest.MonkeyPatch) -> None:
+    """Excerpts that short stairs have too."""
+    patch.setattr(section_pipeline, "_EXCERPT_STOPS", 3.0)
+    patch.setattr(section_pipeline, "_LONG_EXCERPTS", 1.5)
+
+
+def test_an_excerpt_shows_which_plan_is_useless(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Stops of long stairs are late with limits that are 16 % lower, not with 25 %."""
+    whole = toolpath(tmp_path, *STAIRS).image
+    with_brief_excerpts(monkeypatch)
+    monkeypatch.setattr(section_pipeline, "_ALIKE", 1.5)  # the end of the whole has no late stops
+    made = toolpath(tmp_path, *STAIRS)
+    planned: list[tuple[float, float]] = []
+    usual = SectionPipeline._planned
+
+    def counted(self: SectionPipeline, limits: Limits) -> object:
+        planned.append((self.curve.length_mm, jerk_of(limits)))
+        return usual(self, limits)
+
+    monkeypatch.setattr(SectionPipeline, "_planned", counted)
+    assert made.image == whole
+    shares = [round(jerk / planned[0][1], 2) for _, jerk in planned]
+    excerpts = [length < made.curve.length_mm for length, _ in planned]
+    assert shares == [1.0, 0.84, 0.75, 0.75, 1.0]
+    assert excerpts == [False, True, True, False, False]
+
+
+@pytest.mark.parametrize("stairs_first", [True, False])
+def test_an_excerpt_is_like_the_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stairs_first: bool
+) -> None:
+    """An excerpt in which stops are late more often than in the whole shows nothing."""
+    with_brief_excerpts(monkeypatch)
+    parts = [*STAIRS[:24], "G1 X150"]
+    made = toolpath(tmp_path, *(parts if stairs_first else parts[::-1]))
+    with pytest.raises(LongStopError) as late:
+        made._with_stops(made.plan, made.stop_terms)
+    excerpt = made._excerpt(late.value.program, 0.5)
+    assert (excerpt is None) == stairs_first
+    if excerpt is not None:
+        assert 0.0 < excerpt.curve.length_mm < made.curve.length_mm
 
 
 @pytest.mark.parametrize("fails", ["slower", "search", "compile"])
