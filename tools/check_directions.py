@@ -177,7 +177,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("job_outputs", "equal_sections", "section_pipeline"),
     },
     "section_pipeline": {
-        *("events", "feed", "spline", "program", "toolpath"),
+        *("errors", "fixed_point", "events", "feed", "spline", "program", "toolpath"),
         *("machine_limits", "pipeline", "equal_sections"),
     },
     "job_simulation": {"errors", "job", "simulate"},

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The G-code programs that `make compare` gives to all peers: generated ones, and two that come with LinuxCNC. Used by
-peers/compare. Reads these files and the examples.
+peers/compare and benchmarks/toolpaths. Reads these files and the examples.
 """
 
 from __future__ import annotations

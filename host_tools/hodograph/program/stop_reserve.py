@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Places at which a plan has to leave more of its limits free, so that stops may begin soon enough;
-docs/theory/toolpath-fitting.md section 8. Used by late_stops.py.
+docs/theory/toolpath-fitting.md section 8. Used by late_stops.py and section_pipeline.
 
 If a plan uses the axis limits fully all along a winding path, no brake may begin. Short stretches with a reserve, some
 tenths of a second apart, cost little and bound the stop delay. The feed override may not use the reserve
