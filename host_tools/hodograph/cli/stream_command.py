@@ -90,7 +90,7 @@ def stream(options: Namespace) -> None:
     require_places(options.record)
     for file in options.files:
         _require_job_file(options, file)
-    _require_one_file(options)
+    _require_begin(options)
     gc.freeze()  # modules stay: the garbage collector need not search them again
     if options.simulate:
         if options.record is not None:
@@ -114,7 +114,7 @@ def stream_on(options: Namespace, address: BusAddress) -> None:
         _run(job, options, address, number, begin or Place(), entry)
 
 
-def _require_one_file(options: Namespace) -> None:
+def _require_begin(options: Namespace) -> None:
     """Raises InputError: the place of --from-line or --from is not that of one file that can be read twice."""
     name = "--from-line" if options.from_line is not None else "--from"
     if options.from_line is None and options.from_mm is None:
@@ -354,11 +354,9 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     """The place of the job nearest to the axes. Raises RefusedError: they are not homed, or not on the path."""
     machine = job.machine
     note("the controller no longer knows the job: it goes on where the axes stand on its path")
-    lost = _not_homed(at, machine)
-    if lost and not unhomed:
-        raise RefusedError(
-            f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home, hodograph goto "
-            "back to the path, then hodograph stream --continue"
+    if not unhomed:
+        _require_homed(
+            at, machine, ", hodograph goto back to the path, then hodograph stream --continue"
         )
     counts = at.controller.targets(machine.path_count)
     found = nearest_place(
@@ -380,22 +378,23 @@ def _nearest(at: RunSession, job: JobFiles, entry: Entry, *, unhomed: bool) -> P
     return found.place
 
 
-def _not_homed(at: RunSession, machine: Machine) -> list[str]:
-    """The axes with a homing method that are not homed."""
-    return [
+def _require_homed(at: RunSession, machine: Machine, then: str = "") -> None:
+    """Raises RefusedError: axes with a homing method are not homed. `then`: what the operator does after homing."""
+    lost = [
         axis.name
         for i, axis in enumerate(machine.axes, 1)
         if at.controller.read(HOMING_METHOD, i) and not at.controller.read(HOMED, i)
     ]
+    if lost:
+        raise RefusedError(
+            f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home{then}"
+        )
 
 
 def _require_at(at: RunSession, machine: Machine, place: Nearest, *, unhomed: bool) -> None:
     """Raises RefusedError: the axes are not homed, or not at this place. A straight move there could pass the part."""
-    lost = _not_homed(at, machine)
-    if lost and not unhomed:
-        raise RefusedError(
-            f"axis {', '.join(lost)} is not homed, so its position is not known: hodograph home"
-        )
+    if not unhomed:
+        _require_homed(at, machine)
     counts = at.controller.targets(machine.path_count)
     scales = machine.path_counts
     off = [
