@@ -316,12 +316,12 @@ class Pipeline:
             self._compiled_again,
             self._searched,
             self.machine.stop_time_ms * 1e-3,
-            self._shows_few,
+            self._late_in_excerpt,
         )
         with _named_by(f"{self.file.file}:"):
             return again.in_time(plan, late)
 
-    def _shows_few(self, limits: Limits, late: Program) -> bool:
+    def _late_in_excerpt(self, limits: Limits, late: Program) -> bool:
         """Whether an excerpt of the path shows that a plan with these limits has late stops too often. False: there is
         no excerpt.
         """

@@ -30,7 +30,7 @@ from .program.stop_planning import LongStopError, StopTerms
 from .program.stop_reserve import late_share, late_too_often
 from .spline.build import FoundSpline
 from .spline.curve import PHSpline
-from .spline.spatial import SpatialPHSpline
+from .spline.spatial import SpatialPHSpline, sliced
 from .toolpath.fit.fitting import FittedPath
 
 Int = NDArray[np.int64]
@@ -121,7 +121,7 @@ class SectionPipeline(Pipeline):
             plan = super()._planned(replace(limits, reserve=max(limits.reserve, reserve)))
         return self._passed_slowly(plan)
 
-    def _shows_few(self, limits: Limits, late: Program) -> bool:
+    def _late_in_excerpt(self, limits: Limits, late: Program) -> bool:
         stop_s = self.machine.stop_time_ms * 1e-3
         excerpt = self._excerpt(late, stop_s)
         if excerpt is None:
@@ -152,7 +152,9 @@ class SectionPipeline(Pipeline):
         if late_share(late, stop_s, slice(count)) > _ALIKE * late_share(late, stop_s):
             return None
         end_mm = float(late.pieces.start_q40[count]) * MM_PER_Q40
-        fitted = replace(self.fitted, curve=_start_of(self.fitted.curve, end_mm))
+        curve = self.fitted.curve
+        segments = int(np.count_nonzero(curve.segment_starts_mm[:-1] < end_mm))
+        fitted = replace(self.fitted, curve=sliced(curve, 0, segments))
         return replace(self, fitted=fitted, given_events=no_events(), shared=SharedPrograms())
 
     def _slower(self, plan: FeedPlan, zones: Sequence[FeedZone], why: str) -> FeedPlan:
@@ -204,14 +206,6 @@ class SectionPipeline(Pipeline):
             if not few or error.late_by > THOROUGH_GAIN:
                 raise
             return super()._with_stops(plan, replace(terms, quick=False))
-
-
-def _start_of(curve: SpatialPHSpline, end_mm: float) -> SpatialPHSpline:
-    """The segments of a curve that begin before an arc length."""
-    own = slice(int(np.count_nonzero(curve.segment_starts_mm[:-1] < end_mm)))
-    return replace(
-        curve, origin=curve.origin[own], preimage=curve.preimage[own], extra=curve.extra[own]
-    )
 
 
 def _in_plane(curve: SpatialPHSpline) -> PHSpline:

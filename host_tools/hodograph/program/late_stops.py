@@ -44,7 +44,8 @@ class Replanning:
     compile      the program of a plan; raises LongStopError, and another PlanError
     search       the program of a plan with few trials and fault stops only; raises as `compile` does
     stop_time_s  greatest bound of a fault stop
-    shows_few    whether an excerpt of the path shows that a plan with these limits has late stops too often; the
+    late_in_excerpt
+                 whether an excerpt of the path shows that a plan with these limits has late stops too often; the
                  program is that of the first plan
     """
 
@@ -53,7 +54,7 @@ class Replanning:
     compile: Callable[[FeedPlan], Compilation]
     search: Callable[[FeedPlan], Compilation]
     stop_time_s: float
-    shows_few: Callable[[Limits, Program], bool]
+    late_in_excerpt: Callable[[Limits, Program], bool]
 
     def in_time(self, plan: FeedPlan, late: LongStopError) -> Compilation:
         """The first program whose fault stops are in time; `late` is the refusal of `plan`. Plans that are not found,
@@ -80,7 +81,7 @@ class Replanning:
             if whole and late_too_often(program, self.stop_time_s):
                 break
             less = replace(limits, machine=limits.machine.scaled(1.0 - share))
-            if self.shows_few(less, late.program):
+            if self.late_in_excerpt(less, late.program):
                 continue
             try:
                 lower = self.plan(less)

@@ -25,7 +25,7 @@ from ..program.check import REACH_Q40
 from ..program.geometry import LONGEST_SEGMENT_MM, arc_to_q40, quantise, segment_arcs
 from ..spline import PHSpline
 from ..spline.quintics import part_of_quintics
-from ..spline.spatial import SpatialPHSpline
+from ..spline.spatial import SpatialPHSpline, sliced
 from ..spline.splitting import cut_segments, part_of
 
 Real = NDArray[np.float64]
@@ -91,18 +91,6 @@ def short_segments(block: Block) -> Block:
         feeds.append(block.feed_mm_s[source])
         lines.append(block.line[source])
     return Block(joined(curves), np.concatenate(feeds), np.concatenate(lines), block.events)
-
-
-def sliced(curve: Curve, first: int, last: int | None = None) -> Curve:
-    """Segments first … last - 1 of a curve, copied, so that the bits of sums do not depend on where the segments come
-    from.
-    """
-    part = slice(first, last)
-    if isinstance(curve, PHSpline):
-        return PHSpline(curve.origin[part].copy(), curve.w[part].copy(), False)
-    return SpatialPHSpline(
-        curve.origin[part].copy(), curve.preimage[part].copy(), False, curve.extra[part].copy()
-    )
 
 
 def joined(curves: Sequence[Curve]) -> Curve:

@@ -30,12 +30,13 @@ from ..job import (
     toolpath_commands,
 )
 from ..job_outputs import EventMaker, without_effect
+from ..spline.spatial import sliced
 from ..toolpath.files import ReadOptions
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import SHORTEST_MM, turns
 from ..toolpath.moves import ORIGIN, Command, Move
-from .geometry import Block, sliced, with_joints
+from .geometry import Block, with_joints
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""

@@ -146,7 +146,7 @@ class Attempts:
     def __init__(self, made: Pipeline, fails: str, times: int = 1) -> None:
         self.made, self.fails, self.left = made, fails, times
         self.calls: list[str] = []
-        self.shows_few: Callable[[Limits, Program], bool] = lambda limits, late: False
+        self.late_in_excerpt: Callable[[Limits, Program], bool] = lambda limits, late: False
 
     def of(self, name: str) -> object:
         """A callable of the pipeline."""
@@ -172,7 +172,7 @@ class Attempts:
         with pytest.raises(LongStopError) as late:
             self.made._with_stops(plan, self.made.stop_terms)
         each = [self.of(name) for name in ("plan", "slower", "compile", "search")]
-        again = Replanning(*each, stop_time_ms * 1e-3, self.shows_few)
+        again = Replanning(*each, stop_time_ms * 1e-3, self.late_in_excerpt)
         return again.in_time(plan, late.value)
 
 
@@ -189,7 +189,7 @@ def test_a_reserve_of_which_no_program_can_be_made_is_passed_over(
 
 def test_a_plan_with_late_stops_in_an_excerpt_is_not_made(tmp_path: Path) -> None:
     attempts = Attempts(corner(tmp_path, 120), "none")
-    attempts.shows_few = lambda limits, late: jerk_of(limits) > 25000.0
+    attempts.late_in_excerpt = lambda limits, late: jerk_of(limits) > 25000.0
     found = attempts.in_time(120)
     assert found.program.stops.worst(FAULT).time_s <= 0.12
     assert jerk_of(found.plan.limits) == 20000.0

@@ -7,11 +7,12 @@ Used by most modules of host_tools. No I/O.
 """
 
 from .build import SpatialSplineResult, spatial_from_control_polygon, spatial_through_points
-from .curve import SpatialPHSpline
+from .curve import SpatialPHSpline, sliced
 
 __all__ = [
     "SpatialPHSpline",
     "SpatialSplineResult",
+    "sliced",
     "spatial_from_control_polygon",
     "spatial_through_points",
 ]

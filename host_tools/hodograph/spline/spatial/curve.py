@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,8 @@ _GREATEST_COMPONENT = 8.0 - 2.0**-40
 
 _STRAIGHT = 1e-12
 """Curvature times the length of its segment below which a segment counts as straight: it has no torsion there."""
+
+_Curve = TypeVar("_Curve", PHSpline, "SpatialPHSpline", "PHSpline | SpatialPHSpline")
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,3 +248,15 @@ def embedded(planar: PHSpline, height_mm: float) -> SpatialPHSpline:
     zero = np.zeros_like(planar.w.real)
     preimage = np.stack((planar.w.real, zero, zero, planar.w.imag), axis=1)
     return SpatialPHSpline(origin, preimage, planar.closed)
+
+
+def sliced(curve: _Curve, first: int, last: int | None = None) -> _Curve:
+    """Segments first … last - 1 of a curve in the plane or in space, as an open one. They are copied, so that the bits
+    of sums do not depend on where the segments come from.
+    """
+    part = slice(first, last)
+    if isinstance(curve, PHSpline):
+        return PHSpline(curve.origin[part].copy(), curve.w[part].copy(), False)
+    return SpatialPHSpline(
+        curve.origin[part].copy(), curve.preimage[part].copy(), False, curve.extra[part].copy()
+    )
