@@ -74,9 +74,7 @@ def line_of(
     for chunks in jobs:
         for positions, values in _executed_offline(chunks, limits):
             points.append(counts_from_q40_mm(positions, counts_per_unit).astype(np.float64))
-            outputs.append(
-                np.column_stack((values["digital"], values["analogue"])).astype(np.int64)
-            )
+            outputs.append(_columns(values))
     whole = np.concatenate(points)
     first = np.flatnonzero(_differs(whole))
     per_um = np.array(counts_per_unit, dtype=np.float64) * 1e-3
@@ -166,8 +164,7 @@ def outputs_trouble(frames: Frames, machine: Machine, line: JobLine) -> str | No
     """
     assert machine.outputs is not None
     targets, syncs = executed(frames, machine.nodes[: machine.path_count])
-    values = decode_outputs(frames, machine.outputs)[syncs]
-    seen = np.column_stack((values["digital"], values["analogue"])).astype(np.int64)
+    seen = _columns(decode_outputs(frames, machine.outputs)[syncs])
     moving = np.flatnonzero(_differs(targets))
     segments, apart = places(targets[moving], line.points, line.per_um)
     judge, rest = OutputJudge(round(_STOP_S * 1e6 / machine.period_us)), targets[0]
@@ -195,8 +192,13 @@ def outputs_trouble(frames: Frames, machine: Machine, line: JobLine) -> str | No
 def final_outputs(frames: Frames, machine: Machine) -> tuple[int, ...]:
     """The outputs at the end of a recording."""
     assert machine.outputs is not None
-    last = decode_outputs(frames, machine.outputs)[-1]
-    return (int(last["digital"]), *last["analogue"].tolist())
+    last = _columns(decode_outputs(frames, machine.outputs)[-1:])
+    return tuple(last[0].tolist())
+
+
+def _columns(values: NDArray[np.void]) -> NDArray[np.int64]:
+    """Outputs (n, 4) as `JobLine` has them."""
+    return np.column_stack((values["digital"], values["analogue"])).astype(np.int64)
 
 
 @dataclass

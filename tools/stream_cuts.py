@@ -29,10 +29,11 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 
@@ -256,20 +257,6 @@ class Rig:
             )
 
 
-@contextmanager
-def _variable(name: str, value: str) -> Iterator[None]:
-    """A variable of the environment, for this process and those that it starts; restored at the end."""
-    before = os.environ.get(name)
-    os.environ[name] = value
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
-
-
 class Host:
     """One command on the bus of the host."""
 
@@ -423,7 +410,7 @@ class Found:
 
     case: Case
     troubles: list[str] = field(default_factory=list)
-    outputs: list[str] = field(default_factory=list)
+    printed: list[str] = field(default_factory=list)
     statuses: list[int] = field(default_factory=list)
     away_um: float = 0.0
     left_out_um: float = 0.0
@@ -449,7 +436,7 @@ class Run:
         rules.write_text(self.case.rules)
         controller = f"{find_program(CONTROLLER)} --ring {self.case.ring_kib}"
         with ExitStack() as stack:
-            stack.enter_context(_variable("HODOGRAPH_CONTROLLER", controller))
+            stack.enter_context(patch.dict(os.environ, {"HODOGRAPH_CONTROLLER": controller}))
             hub = stack.enter_context(LocalHub(buses=2))
             clock = virtual_clock(hub.address)
             assert clock is not None
@@ -496,7 +483,7 @@ class Run:
         self.ended = False
         self.clock.sleep(_CABLE_S)
         if self._once(("--continue",), None, None, _INPUT_STATUS) != _INPUT_STATUS:
-            self.found.troubles.append(f"--continue of standard input: {self.found.outputs[-1]}")
+            self.found.troubles.append(f"--continue of standard input: {self.found.printed[-1]}")
 
     def _once(
         self, words: Sequence[str], cut: Cut | None, read: Path | None = None, status: int = 0
@@ -517,9 +504,9 @@ class Run:
         self.found.statuses.append(status)
         ruled = {4, 5, 6} if self.case.rules.strip() else set()
         if status not in {*expected, *ruled, _REFUSED_STATUS}:
-            self.found.troubles.append(f"status {status}: {self.found.outputs[-1]}")
-        if status == 1 or "Traceback" in host_text(self.found.outputs[-1]):
-            self.found.troubles.append(f"internal error: {self.found.outputs[-1]}")
+            self.found.troubles.append(f"status {status}: {self.found.printed[-1]}")
+        if status == 1 or "Traceback" in host_text(self.found.printed[-1]):
+            self.found.troubles.append(f"internal error: {self.found.printed[-1]}")
         return status
 
     def _act(self, host: Host, cut: Cut) -> tuple[int, ...]:
@@ -545,7 +532,7 @@ class Run:
         return statuses
 
     def _note(self, head: str, printed: str) -> None:
-        self.found.outputs.append(f"{head}: {' | '.join(printed.strip().splitlines())}")
+        self.found.printed.append(f"{head}: {' | '.join(printed.strip().splitlines())}")
 
     def _pause(self, attempt: int, status: int) -> None:
         """Waits, and looks at the journal once the machine rests."""
@@ -579,7 +566,7 @@ class Run:
 
     def _back_to_path(self) -> None:
         """Does what a refusal says: reset, goto."""
-        printed = self.found.outputs[-1]
+        printed = self.found.printed[-1]
         way = re.search(r"hodograph (goto \S+ --to [-0-9.]+ [-0-9.]+(?: --z [-0-9.]+)?)", printed)
         if way is None:
             return
@@ -721,14 +708,14 @@ def main(arguments: list[str]) -> int:
             for trouble in found.troubles:
                 print(f"    {trouble}", flush=True)
             if found.troubles or options.verbose:
-                for line in found.outputs:
+                for line in found.printed:
                     print(f"    > {line}", flush=True)
             results.append(
                 {
                     "seed": seed,
                     "kinds": case.kinds,
                     "troubles": found.troubles,
-                    "outputs": found.outputs,
+                    "printed": found.printed,
                 }
             )
     for kind in KINDS:

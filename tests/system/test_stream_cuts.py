@@ -22,7 +22,7 @@ from stream_cuts import KINDS, draw, run_case  # noqa: E402
 def test_a_job_that_is_cut_comes_to_its_end_on_its_path(seed: int, kind: str) -> None:
     before = dict(os.environ)
     found = run_case(draw(seed, (kind,)))
-    assert not found.troubles, "\n".join([*found.troubles, *found.outputs])
+    assert not found.troubles, "\n".join([*found.troubles, *found.printed])
     assert os.environ == before  # other tests of this process start controllers, too
 
 
@@ -30,7 +30,7 @@ def test_a_job_that_is_cut_comes_to_its_end_on_its_path(seed: int, kind: str) ->
 def test_many_kinds_in_one_job() -> None:
     for seed in range(1, 11):
         found = run_case(draw(seed))
-        assert not found.troubles, "\n".join([str(found.case), *found.troubles, *found.outputs])
+        assert not found.troubles, "\n".join([str(found.case), *found.troubles, *found.printed])
 
 
 def test_what_is_off_the_path_or_left_out_is_found() -> None:

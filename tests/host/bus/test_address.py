@@ -35,10 +35,11 @@ def kernel_can(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "socket", lambda *args: Probe())
 
 
-def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*args: object) -> None:
-        raise OSError
+def refuse(*args: object) -> None:
+    raise OSError
 
+
+def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "socket", refuse)
     assert "hodograph rig FILE" in message("vcan7")
     real = message("can7")
@@ -48,10 +49,7 @@ def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("kernel_can")
 def test_a_missing_interface(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(*args: object) -> None:
-        raise OSError
-
-    monkeypatch.setattr(fcntl, "ioctl", none)
+    monkeypatch.setattr(fcntl, "ioctl", refuse)
     assert "ip link add dev vcan7 type vcan" in message("vcan7")
     real = message("can7")
     assert "is the adapter connected" in real
