@@ -410,7 +410,7 @@ include packaging/packaging.mk
 
 ## ---- lint ------------------------------------------------------------------------------------------
 
-C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/analysis/*.c packaging/library/*.c examples/embed/*.c)
+C_FILES    := $(OWN_C) $(OWN_H) $(BARE_C) $(UNIT_SRC) $(UNIT_SUPPORT) $(FUZZ_SRC) $(TARGET_TEST_SRC) $(wildcard tests/fuzz/*.h tests/target/*.h tools/analysis/*.c tools/vcan/*.c packaging/library/*.c examples/embed/*.c)
 PY_TREES   := $(wildcard host_tools tools tests benchmarks setup.py)
 JS_FILES   := $(wildcard host_tools/hodograph/monitor/page/*.js)
 SH_FILES   := $(wildcard tools/*.sh tools/*/*.sh .ci/run)

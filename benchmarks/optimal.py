@@ -297,12 +297,15 @@ def main() -> int:
     parser.add_argument("--only", nargs="*", help="cases whose names begin so")
     parser.add_argument("--intervals", type=int, default=128, help="of the finest grid, in all")
     options = parser.parse_args()
+    every = list(cases())
+    chosen = [one for one in every if not options.only or one.name.startswith(tuple(options.only))]
+    if not chosen:
+        names = "; ".join(one.name for one in every)
+        parser.error(f"--only {' '.join(options.only)}: no such case; the cases are {names}")
     results = {}
     print(HEADER)
     with tempfile.TemporaryDirectory() as folder:
-        for case in cases():
-            if options.only and not any(case.name.startswith(start) for start in options.only):
-                continue
+        for case in chosen:
             results[case.name] = measure(case, options.intervals, Path(folder))
             print(row(case.name, results[case.name]), flush=True)
     write_figures(options.json, results)

@@ -93,15 +93,14 @@ _PACKAGE_OF = {
 }
 
 BUS = (
+    *(_program("gcc"), _file("/usr/include/stdlib.h", "libc6-dev")),
     _program("linux.uml"),
     _program("ip"),
     _program("insmod"),
     _program("taskset"),
 )
 BUILD = (
-    _program("gcc"),
     _program("ar"),
-    _file("/usr/include/stdlib.h", "libc6-dev"),
     _file("/usr/include/linux/can.h", "linux-libc-dev"),
     Need("Python.h", _has_python_header, "python3-dev"),
     Need("the Python modules venv and ensurepip", _has_venv, "python3-venv"),

@@ -26,6 +26,7 @@ _PR_SET_CHILD_SUBREAPER = 36
 _LIBC = ctypes.CDLL(None)
 _MODULES = Path("/usr/lib/uml/modules")
 _HERE = Path(__file__).resolve().parent
+_COMPILER = ("gcc", "-O2", "-shared", "-fPIC")
 
 
 def boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]:
@@ -43,6 +44,7 @@ def boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]:
         MODULES=str(modules),
         HOST=platform.node(),
     )
+    library = large_registers(bus.folder)
     fd = line.fileno()
     with (bus.folder / "log").open("wb") as log:
         return subprocess.Popen(
@@ -68,10 +70,30 @@ def boot(bus: Bus, line: socket.socket, memory: str) -> subprocess.Popen[bytes]:
                 "PATH": os.environ.get("PATH", "/usr/bin:/bin"),
                 "TMPDIR": _memory_folder(memory),
                 "HOME": str(bus.folder),
+                "LD_PRELOAD": str(library),
             },
             start_new_session=True,
             preexec_fn=lambda: _prepare_kernel(bus.cpu),
         )
+
+
+def large_registers(folder: Path) -> Path:
+    """Compiles large_registers.c, which user-mode Linux needs on some processors."""
+    library = folder / "large_registers.so"
+    source = _HERE / "large_registers.c"
+    try:
+        subprocess.run(
+            [*_COMPILER, "-o", str(library), str(source)],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except FileNotFoundError as error:
+        raise BusUnavailable(f"{_COMPILER[0]} is missing; apt-get install gcc libc6-dev") from error
+    except subprocess.CalledProcessError as error:
+        raise BusUnavailable(f"{source} does not compile: {error.stderr.strip()}") from error
+    return library
 
 
 def _prepare_kernel(cpu: int | None) -> None:
