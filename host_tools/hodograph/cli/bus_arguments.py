@@ -22,6 +22,9 @@ from .options import (
     seconds,
 )
 
+_JOBS = 2
+"""Processes that prepare a streamed job."""
+
 
 def _upload(command: Command) -> None:
     upload = command("upload", "configure the controller and send it a program")
@@ -97,7 +100,7 @@ def _stream(command: Command) -> None:
         "--jobs",
         type=int,
         choices=(1, 2),
-        default=2,
+        default=_JOBS,
         metavar="N",
         help="processes that prepare the job: 1, or 2 (default); the chunks are the same",
     )
@@ -133,6 +136,8 @@ def _pace(parser: ArgumentParser) -> None:
 
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
+    # A job that does not fit the controller's memory is streamed, with the defaults of `stream`.
+    run.set_defaults(from_line=None, from_mm=None, journal=None, jobs=_JOBS)
     options.file(run, many=True, what=f"path file (TOML), or {options.TOOLPATH}")
     options.unhomed(run)
     options.machine(run)

@@ -53,7 +53,7 @@ from ..stream.journal import (
     require_same_machine,
 )
 from ..stream.output_check import require_outputs
-from ..stream.plan import PROCESSES, JobFiles, JobPlan, Place, PlanRests
+from ..stream.plan import JobFiles, JobPlan, Place, PlanRests
 from ..stream.resuming import Nearest, nearest_place, place_of_arc, place_of_line
 from ..stream.sender import Sender, StreamedJob, StreamProgress
 from ..stream.simulation import StreamedMotion, simulate_chunks
@@ -131,9 +131,9 @@ def _require_begin(options: Namespace) -> None:
 
 def _begin(job: JobFiles, options: Namespace) -> Nearest | None:
     """The place of --from-line or --from; None: the job begins at its start. Raises InputError, PlanError."""
-    if getattr(options, "from_line", None) is not None:
+    if options.from_line is not None:
         return place_of_line(job, options.from_line)
-    if getattr(options, "from_mm", None) is not None:
+    if options.from_mm is not None:
         return place_of_arc(job, options.from_mm)
     return None
 
@@ -184,9 +184,9 @@ def _require_outputs(job: JobFiles) -> None:
 
 def journal_file(options: Namespace) -> Path:
     """Where the journal is. Raises InputError: no place is named, and the user has no home folder."""
-    given = getattr(options, "journal", None)
+    given: Path | None = options.journal
     if given is not None:
-        return Path(given)
+        return given
     try:
         home = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
     except RuntimeError:  # no HOME, and no entry of this user, as in a container
@@ -259,7 +259,7 @@ def _run(
         begin = _rests_at(entry, job.machine, address, options.wait)  # None: the job is lost
 
     def planned(begin: Place) -> JobPlan:
-        stops, processes = not options.no_stops, _processes(options)
+        stops, processes = not options.no_stops, options.jobs
         return JobPlan(job, None, job_number, begin, stops=stops, processes=processes)
 
     with ExitStack() as stack:
@@ -477,11 +477,6 @@ def _print(done: StreamedJob, options: Namespace) -> None:
     )
 
 
-def _processes(options: Namespace) -> int:
-    """Number of processes that plan the job; `run`, which may stream too, has no option for it."""
-    return int(getattr(options, "jobs", PROCESSES))
-
-
 @dataclass(frozen=True)
 class _SimulatedJob:
     """Figures of a job that was planned and simulated.
@@ -546,7 +541,7 @@ def _simulated(job: JobFiles, options: Namespace) -> _SimulatedJob:
     begin_s = time.perf_counter()
     most = largest_chunk(RING_BYTES - BLOCK_HEAD)
     with (
-        JobPlan(job, most, 1, place, processes=_processes(options)) as plan,
+        JobPlan(job, most, 1, place, processes=options.jobs) as plan,
         progress("simulate", "job") as bar,
     ):
         for chunks in plan.by_job():
