@@ -12,8 +12,8 @@ import os
 import signal
 import sys
 import traceback
-from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from types import FrameType
 
@@ -92,9 +92,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         options = make_parser().parse_args(arguments)
         debug = debug or options.debug
-        _on_signals()
-        _run(options)
-        sys.stdout.flush()
+        with _on_signals():
+            _run(options)
+            sys.stdout.flush()
         return 0
     except HodographError as error:
         return _end(str(error), error.exit_status, debug)
@@ -164,19 +164,26 @@ def _end(message: str, status: int, debug: bool) -> int:
     return status
 
 
-def _on_signals() -> None:
+@contextmanager
+def _on_signals() -> Iterator[None]:
+    """Meanwhile SIGTERM and SIGHUP raise exceptions. Afterwards they end the process at once, without a traceback."""
+
     def terminate(number: int, frame: FrameType | None) -> None:
         raise Terminated
 
     def hang_up(number: int, frame: FrameType | None) -> None:
         raise HungUp
 
-    try:
-        signal.signal(signal.SIGTERM, terminate)
+    before = {}
+    with suppress(ValueError):  # not the main thread: the caller decides
+        before[signal.SIGTERM] = signal.signal(signal.SIGTERM, terminate)
         if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # nohup
-            signal.signal(signal.SIGHUP, hang_up)
-    except ValueError:  # not the main thread: the caller decides
-        return
+            before[signal.SIGHUP] = signal.signal(signal.SIGHUP, hang_up)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import zlib
@@ -14,6 +15,7 @@ from typing import Any
 import can
 import pytest
 
+from hodograph.cli import main as cli_main
 from hodograph.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
@@ -252,6 +254,27 @@ def test_closed_pipe() -> None:
     os.close(writing)
     assert done.stderr == ""
     assert done.returncode == 1
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_second_signal_ends_the_process_at_once(
+    number: signal.Signals, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one ends the command with a line; after it no exception can come into the last lines of `main`."""
+    said: list[object] = []
+    before = signal.signal(number, signal.SIG_DFL)
+
+    def complain(text: str) -> None:
+        said.extend((text, signal.getsignal(number)))
+
+    monkeypatch.setattr(cli_main, "complain", complain)
+    monkeypatch.setattr(cli_main, "_run", lambda options: signal.raise_signal(number))
+    try:
+        assert main(["feed", ALPHA]) == status
+    finally:
+        signal.signal(number, before)
+    assert len(said) == 2
+    assert said[1] is signal.SIG_DFL
 
 
 def test_run_needs_socketcan(capsys: pytest.CaptureFixture[str]) -> None:
