@@ -188,8 +188,10 @@ def _scaling(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
         text = f"counts for a turn are not reported: check in the drive's tool that 1 {unit} is {axis.counts_per_unit}"
         yield Finding(0x6092, 1, NOTE, text, feed)
         return
-    distance = feed / turns / axis.counts_per_unit
-    text = f"a turn of the shaft is {distance:g} {unit} by {key}"
+    gear = _gear(reader, axis)
+    distance = feed / turns / gear / axis.counts_per_unit
+    turned = "shaft" if gear == 1.0 else f"motor, with its gear of {gear:g} to 1 (0x6091),"
+    text = f"a turn of the {turned} is {distance:g} {unit} by {key}"
     if axis.drive is None:
         text += f": if that is not so, add [axis.scaling] or correct {key}"
         yield Finding(0x6092, 1, NOTE, text, feed)
@@ -200,6 +202,14 @@ def _scaling(reader: NodeReader, axis: Axis) -> Iterator[Finding]:
     else:
         text += f", but {screw:g} in the drive file: add [axis.scaling], or correct {key} or the drive file"
         yield Finding(0x6092, 1, NOTE, text, feed)
+
+
+def _gear(reader: NodeReader, axis: Axis) -> float:
+    """Turns of the motor for one of the shaft: as the controller writes them, else those of the drive, else 1."""
+    wanted = axis.scaling
+    if wanted.gear_motor_revolutions:
+        return wanted.gear_motor_revolutions / wanted.gear_shaft_revolutions
+    return (reader.number(0x6091, 1) or 1) / (reader.number(0x6091, 2) or 1)
 
 
 def _limits(reader: NodeReader, axis: Axis) -> Iterator[Finding]:

@@ -153,11 +153,19 @@ def test_values_that_do_not_fit(
 def test_scaling_is_compared_with_the_drive_file() -> None:
     """A screw of 9.990 mm a turn."""
     machine = load_machine(ROOT / "examples/machines/paper_alpha.toml")
-    for feed, verdict, text in (
-        (9_990_265, OK, "as in the drive file"),
-        (5_000_000, NOTE, "is 5 mm by counts_per_mm, but 9.99026 in the drive file"),
+    for feed, gear, verdict, text in (
+        (9_990_265, 1, OK, "as in the drive file"),
+        (19_980_530, 2, OK, "a turn of the motor, with its gear of 2 to 1 (0x6091), is 9.99"),
+        (9_990_265, 2, NOTE, "is 4.99513 mm by counts_per_mm, but 9.99026 in the drive file"),
+        (5_000_000, 1, NOTE, "is 5 mm by counts_per_mm, but 9.99026 in the drive file"),
     ):
-        findings = check(complete() | {(0x6092, 1): feed, (0x6092, 2): 1}, machine)
+        drive: dict[Place, int | bytes] = {
+            (0x6092, 1): feed,
+            (0x6092, 2): 1,
+            (0x6091, 1): gear,
+            (0x6091, 2): 1,
+        }
+        findings = check(complete() | drive, machine)
         scaling = [one for one in findings if one.index == 0x6092]
         assert [(one.verdict, text in one.text) for one in scaling] == [(verdict, True)]
 
