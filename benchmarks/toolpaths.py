@@ -95,6 +95,12 @@ def smooth(lines: int) -> Iterator[str]:
         yield f"G1 X{r * math.cos(0.1 * t):.4f} Y{r * math.sin(0.1 * t):.4f}"
 
 
+def feeds(lines: int) -> Iterator[str]:
+    """The wavy spiral with another feed in each line, from 50 to 100 mm/s."""
+    for k, line in enumerate(smooth(lines)):
+        yield f"{line} F{3000 + 7919 * k % 3001}"
+
+
 def raster(lines: int) -> Iterator[str]:
     """Rows of 60 mm over a surface, a point each 0.3 mm."""
     for k in range(lines):
@@ -110,7 +116,7 @@ def stairs(lines: int) -> Iterator[str]:
         yield f"G1 X{0.5 * ((k + 1) // 2):g} Y{0.5 * (k // 2):g}"
 
 
-GENERATED = {"smooth": smooth, "raster": raster, "stairs": stairs}
+GENERATED = {"smooth": smooth, "feeds": feeds, "raster": raster, "stairs": stairs}
 
 
 def seconds_by_stage(kind: str, lines: int, folder: Path) -> dict[str, object]:

@@ -8,9 +8,12 @@ docs/theory/feed.md 5.5.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..names import AXES, in_unit
@@ -139,6 +142,37 @@ class ReserveZone:
     from_mm: float
     to_mm: float
     share: float
+
+
+def least_in_zones(
+    arc_mm: NDArray[np.float64],
+    zones: Sequence[FeedZone | ReserveZone],
+    values: Iterable[float],
+    *,
+    with_ends: bool,
+) -> NDArray[np.float64]:
+    """The least of the zones' `values` at places of any shape and order; inf outside of all zones.
+
+    with_ends  whether a zone contains its ends
+
+    G-code may have a feed for each line. So places are sorted once, rather than compared with each zone.
+    """
+    if not zones:
+        return np.full(arc_mm.shape, inf)
+    order = np.argsort(arc_mm, axis=None, kind="stable")
+    ordered = arc_mm.ravel()[order]
+    firsts = np.searchsorted(
+        ordered, [zone.from_mm for zone in zones], side="left" if with_ends else "right"
+    )
+    ends = np.searchsorted(
+        ordered, [zone.to_mm for zone in zones], side="right" if with_ends else "left"
+    )
+    least = np.full(ordered.size, inf)
+    for low, high, value in zip(firsts, ends, values, strict=True):
+        np.minimum(least[low:high], value, out=least[low:high])
+    found = np.empty_like(least)
+    found[order] = least
+    return found.reshape(arc_mm.shape)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from .kinematics import (
     raised,
     sample,
 )
-from .limits import ControllerLimits, Limits
+from .limits import ControllerLimits, Limits, least_in_zones
 from .override_levels import (
     FACTOR_ONE_Q14,
     FULL,
@@ -268,10 +268,8 @@ class Headroom:
         limits, arc_mm = self.bounds.limits, self._samples.arc_mm
         if not limits.reserve_zones:
             return limit
-        kept = np.ones_like(arc_mm)
-        for zone in limits.reserve_zones:
-            inside = (arc_mm >= zone.from_mm) & (arc_mm <= zone.to_mm)
-            kept = np.where(inside, np.minimum(kept, 1.0 - zone.share), kept)
+        left = [1.0 - zone.share for zone in limits.reserve_zones]
+        kept = np.minimum(least_in_zones(arc_mm, limits.reserve_zones, left, with_ends=True), 1.0)
         return np.asarray(
             np.minimum(limit, np.maximum(kept * limit, used / (1.0 - limits.reserve)))
         )
@@ -280,10 +278,8 @@ class Headroom:
         """The factor f (M,); below 1: a limit is exceeded at an override of 1."""
         limits, samples, axes = self.bounds.limits, self._samples, self.axes
         feed = raised(samples.feed) + _TINY
-        f = np.full_like(feed, np.inf)
-        for zone in limits.zones:
-            inside = (samples.arc_mm > zone.from_mm) & (samples.arc_mm < zone.to_mm)
-            f = np.where(inside, np.minimum(f, zone.feed_mm_s / feed), f)
+        feeds = [zone.feed_mm_s for zone in limits.zones]
+        f = least_in_zones(samples.arc_mm, limits.zones, feeds, with_ends=False) / feed
         if limits.centripetal_mm_s2 is not None:
             f = np.minimum(
                 f, np.sqrt(limits.centripetal_mm_s2 / (raised(samples.centripetal) + _TINY))

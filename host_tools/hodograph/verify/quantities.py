@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..config import Drive
 from ..errors import InputError
 from ..feed import FeedZone, Limit, Limits
+from ..feed.limits import least_in_zones
 from .cells import Cells
 from .instants import Motion
 
@@ -102,8 +103,4 @@ def _in_zones(cells: Cells, zones: Sequence[FeedZone]) -> Real:
     """The least feed limit of zones over the middle of each cell; cells end where zones do."""
     every = np.arange(len(cells))
     middle = cells.arc_length_mm(every, np.full(len(cells), 0.5))
-    out = np.full(len(cells), np.inf)
-    for zone in zones:
-        inside = (middle > zone.from_mm) & (middle < zone.to_mm)
-        out[inside] = np.minimum(out[inside], zone.feed_mm_s)
-    return out
+    return least_in_zones(middle, zones, [zone.feed_mm_s for zone in zones], with_ends=False)

@@ -9,7 +9,7 @@ jerk along the path, from the fastest motion from rest to rest.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import cbrt, inf, sqrt
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...errors import PlanError
 from ...spline.frames import LEFT, RIGHT, Curve, frames
-from ..limits import Limit, Plant
+from ..limits import FeedZone, Limit, Plant
 from ..request import LEAST_FEED_MM_S
 from .plan_limits import PlanLimits
 
@@ -175,7 +175,7 @@ def _places(spline: Curve) -> tuple[Real, NDArray[np.int8]]:
 
 def _along(s: Real, limits: PlanLimits) -> Iterator[LimitedFeed]:
     yield _steady(s, limits.feed, limits.feed.value * np.ones(s.size), 1)
-    for zone in limits.zones:
+    for zone in _least_zones(limits.zones, float(s[0]), float(s[-1])):
         within = np.where((s >= zone.from_mm) & (s <= zone.to_mm), zone.feed_mm_s, inf)
         if not np.isfinite(within).any():  # between two points
             middle = 0.5 * (zone.from_mm + zone.to_mm)
@@ -184,6 +184,18 @@ def _along(s: Real, limits: PlanLimits) -> Iterator[LimitedFeed]:
     yield _reached(s, limits.acceleration, 1.0, 2)
     if limits.jerk.source:
         yield _reached(s, limits.jerk, 1.0, 3)
+
+
+def _least_zones(zones: Sequence[FeedZone], low_mm: float, high_mm: float) -> list[FeedZone]:
+    """Of the zones those that can be named: the one with the lowest feed, and the one that takes the longest time."""
+
+    def time_s(zone: FeedZone) -> float:
+        return (min(zone.to_mm, high_mm) - max(zone.from_mm, low_mm)) / zone.feed_mm_s
+
+    if not zones:
+        return []
+    slowest, longest = min(zones, key=lambda zone: zone.feed_mm_s), max(zones, key=time_s)
+    return [slowest] if slowest is longest else [slowest, longest]
 
 
 def _steady(s: Real, limit: Limit, feed: Real, power: int) -> LimitedFeed:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...spline.frames import LEFT, RIGHT, Curve, frames
+from ..limits import least_in_zones
 from ..pieces import LONGEST_PIECE_MM
 from .plan_limits import PlanLimits
 
@@ -101,10 +102,8 @@ def _steady_limit(spline: Curve, limits: PlanLimits, s: Real, side: int) -> Real
             q = np.minimum(q, (jerk.value / np.abs(r3)) ** (2.0 / 3.0))
     for plant in limits.plants or ():
         q = np.minimum(q, plant.reach_mm_s**2)
-    for zone in limits.zones:
-        inside = (s >= zone.from_mm) & (s <= zone.to_mm)
-        q[inside] = np.minimum(q[inside], zone.feed_mm_s**2)
-    return q
+    squares = [zone.feed_mm_s**2 for zone in limits.zones]
+    return np.minimum(q, least_in_zones(s, limits.zones, squares, with_ends=True))
 
 
 def first_estimate(

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...fixed_point import MM_PER_Q40, nearest_q40, to_q40
 from ...spline.frames import LEFT, RIGHT, Curve, frames
 from ..kinematics import axis_motion
-from ..limits import Limit, Peak
+from ..limits import Limit, Peak, least_in_zones
 from ..pieces import RawPieces, derivative_peaks, exponents, round_pieces
 from ..ramp import Ramp
 from .plan_limits import PlanLimits
@@ -305,9 +305,7 @@ def _limited(
 
 
 def _in_zones(limits: PlanLimits, feed: Real, s: Real) -> Iterator[_Limited]:
-    most = np.full(s.size, inf)
-    for zone in limits.zones:
-        within = (s >= zone.from_mm) & (s <= zone.to_mm)
-        most[within] = np.minimum(most[within], zone.feed_mm_s)
+    feeds = [zone.feed_mm_s for zone in limits.zones]
+    most = least_in_zones(s, limits.zones, feeds, with_ends=True)
     if np.isfinite(most).any():
         yield _Limited(Limit("feed_mm_s", inf, zone=limits.zones[0]), feed, s, most)

@@ -5,9 +5,10 @@ Used by feed/optimal/ and stream/. No I/O.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from .rows import JERK_ROW, About, Rows, Selection, make_rows
 from .solver import TOLERANCE, Problem, solve
 
 Real = NDArray[np.float64]
+_Zone = TypeVar("_Zone", FeedZone, ReserveZone)
 Index = NDArray[np.intp]
 
 US = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
@@ -366,9 +368,7 @@ def _inside(grid: Grid, joints: Real) -> tuple[Index, Real]:
 def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
     """The limit of the feed (n,) by the zones that meet each interval."""
     most = np.full(knots.size - 1, np.inf)
-    slack = 1e-9 * (knots[-1] - knots[0])
-    for zone in limits.zones:
-        part = _touched(knots, zone, slack)
+    for zone, part in _touched(knots, limits.zones):
         most[part] = np.minimum(most[part], zone.feed_mm_s)
     return most
 
@@ -376,19 +376,21 @@ def _interval_zones(limits: PlanLimits, knots: Real) -> Real:
 def _interval_reserve(limits: PlanLimits, knots: Real) -> Real | None:
     """Factors (n,) by which limits are divided on intervals that reserve zones meet; None: there is no such zone."""
     tight = np.ones(knots.size - 1)
-    slack = 1e-9 * (knots[-1] - knots[0])
-    for zone in limits.reserve_zones:
+    for zone, part in _touched(knots, limits.reserve_zones):
         if zone.to_mm > knots[0] and zone.from_mm < knots[-1]:
-            part = _touched(knots, zone, slack)
             tight[part] = np.maximum(tight[part], JERK_ROW / (JERK_ROW - zone.share))
     return tight if (tight > 1.0).any() else None
 
 
-def _touched(knots: Real, zone: FeedZone | ReserveZone, slack: float) -> slice:
-    """The intervals that a zone meets."""
-    first = int(np.searchsorted(knots, zone.from_mm + slack, side="right")) - 1
-    last = int(np.searchsorted(knots, zone.to_mm - slack, side="left"))
-    return slice(max(first, 0), max(last, 0))
+def _touched(knots: Real, zones: Sequence[_Zone]) -> Iterator[tuple[_Zone, slice]]:
+    """Each zone with the intervals that it meets."""
+    slack = 1e-9 * (knots[-1] - knots[0])
+    low = np.array([zone.from_mm for zone in zones]) + slack
+    high = np.array([zone.to_mm for zone in zones]) - slack
+    firsts = np.searchsorted(knots, low, side="right") - 1
+    lasts = np.searchsorted(knots, high, side="left")
+    for zone, first, last in zip(zones, firsts.tolist(), lasts.tolist(), strict=True):
+        yield zone, slice(max(first, 0), max(last, 0))
 
 
 class _Rounds:
