@@ -26,7 +26,7 @@ from .feed import FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
 from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
 from .section_pipeline import SectionPipeline
-from .toolpath.files import ReadOptions, is_gcode, read_toolpath
+from .toolpath.files import ReadOptions, is_gcode, read_toolpath, replaced_feed_mm_s
 from .toolpath.fit.fitting import FittedPath, Tolerance, fit
 from .toolpath.fit.sections import Section, Toolpath, cut_at, divided
 from .toolpath.fit.speeds import MotionLimits
@@ -260,7 +260,7 @@ def load_job(
     path = divided(commands, tolerance_mm, str(file), laser_mode=in_laser_mode(machine))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
-    maker = SectionMaker(file, machine, reading.feed_mm_s, notes, EqualSections())
+    maker = SectionMaker(file, machine, replaced_feed_mm_s(file, reading), notes, EqualSections())
     sections = tuple(made for section in path.sections for made in maker.made(section))
     notes += _ignored_commands(path, file, machine.outputs)
     sections = _with_outputs(sections, path.after, machine, file, notes)

@@ -6,7 +6,7 @@ users. Reads toolpath files.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -15,7 +15,7 @@ from pathlib import Path as FilePath
 from .. import job as jobs
 from ..job_simulation import simulate_job
 from ..native import NativeProgram
-from ..toolpath.files import ReadOptions
+from ..toolpath.files import ReadOptions, asked_tolerance_mm
 from .machine import Machine
 from .path import Path, Plan, path_of_section
 from .program import Kernel, Program, Run
@@ -176,12 +176,15 @@ def load_job(
     *,
     tolerance_mm: float = jobs.DEFAULT_TOLERANCE_MM,
     feed_mm_s: float | None = None,
+    feeds: Mapping[str, float] | None = None,
     layers: Sequence[str] = (),
     ids: Sequence[str] = (),
     gap_mm: float | None = None,
     lift_mm: float | None = None,
     scale: float | None = None,
     unit_mm: float | None = None,
+    columns: Sequence[str] = (),
+    noise_mm: float | None = None,
     closed: bool = False,
     block_delete: bool = False,
     skip_optional_stops: bool = False,
@@ -190,10 +193,13 @@ def load_job(
 
     tolerance_mm   greatest distance between programmed path and curves; 0: stop at the end of each move
     feed_mm_s      in place of the feeds of the file; drawings need it
+    feeds          drawings: feeds by layer or colour, in place of `feed_mm_s`
     layers, ids    drawings: only these layers, in this order; only elements with these identities
     gap_mm         drawings: ends of contours that are this near are joined
     lift_mm        drawings: height of rapid moves above the drawing
     scale, unit_mm drawings and points: factor of lengths; length of a unit
+    columns        points: names of the columns ("-": not read)
+    noise_mm       points: greatest distance of points from the curve that they sample, which is the tolerance then
     closed         points: the path returns to the first point
     block_delete   G-code: lines that begin with "/" are left out
     skip_optional_stops  G-code: M1 is left out
@@ -201,15 +207,19 @@ def load_job(
     Raises InputError, naming file and line, and PlanError.
     """
     reading = ReadOptions(
-        feed_mm_s,
-        tuple(layers),
-        tuple(ids),
-        gap_mm,
-        lift_mm,
-        scale,
-        unit_mm,
-        closed,
-        block_delete,
-        skip_optional_stops,
+        feed_mm_s=feed_mm_s,
+        feeds=tuple((feeds or {}).items()),
+        layers=tuple(layers),
+        ids=tuple(ids),
+        gap_mm=gap_mm,
+        lift_mm=lift_mm,
+        scale=scale,
+        unit_mm=unit_mm,
+        columns=tuple(columns),
+        noise_mm=noise_mm,
+        closed=closed,
+        block_delete=block_delete,
+        skip_optional_stops=skip_optional_stops,
     )
-    return Job(jobs.load_job(FilePath(file), machine._file, tolerance_mm, reading), machine)
+    asked_mm = asked_tolerance_mm(tolerance_mm, reading)
+    return Job(jobs.load_job(FilePath(file), machine._file, asked_mm, reading), machine)

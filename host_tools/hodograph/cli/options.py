@@ -63,6 +63,19 @@ def length_unit(text: str) -> float:
         ) from None
 
 
+def named_feed(text: str) -> tuple[str, float]:
+    """A name and its feed: NAME=MM/S."""
+    name, found, feed = text.rpartition("=")
+    if not (found and name):
+        raise argparse.ArgumentTypeError(f'"{text}" is not NAME=MM/S')
+    return name, positive(feed)
+
+
+def column_names(text: str) -> tuple[str, ...]:
+    """Names, separated by commas."""
+    return tuple(name.strip() for name in text.split(","))
+
+
 def node_or_own(text: str) -> int:
     """A node number, or 0."""
     if not text.isdigit() or int(text) > 127:
@@ -251,6 +264,14 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         metavar="MM/S",
         help="of a toolpath: feed instead of its own ones; drawings need it",
     )
+    parser.add_argument(
+        "--feed-of",
+        type=named_feed,
+        action="append",
+        default=[],
+        metavar="NAME=MM/S",
+        help="of a drawing: feed of this layer or colour (may be repeated; --feed is that of the others)",
+    )
     for name, text in (
         ("layer", "of a drawing: this layer only (may be repeated: in this order)"),
         ("id", "of a drawing: this element only, by its id or handle (may be repeated)"),
@@ -264,6 +285,11 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         ),
         ("lift", "MM", "of a drawing: height of rapid moves above it (default 0: in its plane)"),
         ("scale", "K", "of a drawing or of points: factor of all lengths"),
+        (
+            "noise",
+            "MM",
+            "of points: greatest distance of the points from the curve that they sample",
+        ),
     ):
         parser.add_argument(f"--{name}", type=finite, metavar=unit, help=text)
     parser.add_argument(
@@ -271,6 +297,13 @@ def toolpath(parser: argparse.ArgumentParser) -> None:
         type=length_unit,
         metavar="UNIT",
         help="of a drawing or of points: mm, cm, m, um, in, or a number of mm (default: as the file says)",
+    )
+    parser.add_argument(
+        "--columns",
+        type=column_names,
+        default=(),
+        metavar="NAMES",
+        help='of points: x, y, z, a, b, c, feed, or "-" for a column that is not read, as --columns=x,y,-,feed',
     )
     for name, text in (
         ("closed", "of points: return to the first one"),

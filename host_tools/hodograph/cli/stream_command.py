@@ -34,7 +34,6 @@ from ..bustime import machine_bus_time, require_fit
 from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
 from ..fixed_point import MM_PER_Q40, nearest_q40
-from ..job import DEFAULT_TOLERANCE_MM
 from ..machine_limits import program_limits
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
@@ -69,7 +68,12 @@ from .output import (
     require_places,
     size_text,
 )
-from .toolpath_commands import reading_of, refuse_toolpath_options, require_toolpath
+from .toolpath_commands import (
+    reading_of,
+    refuse_toolpath_options,
+    require_toolpath,
+    tolerance_of,
+)
 
 _EVERY_S = 5.0
 _EXACT_COUNTS = 1.5
@@ -161,11 +165,10 @@ def _machine(options: Namespace) -> Machine:
 
 
 def _job(options: Namespace) -> JobFiles:
-    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
     for file in options.files:
         _require_regular(file)
     machine = _machine(options)
-    job = JobFiles(tuple(options.files), machine, tolerance_mm, reading_of(options))
+    job = JobFiles(tuple(options.files), machine, tolerance_of(options), reading_of(options))
     _require_outputs(job)
     return job
 

@@ -18,19 +18,22 @@ from ..job import DEFAULT_TOLERANCE_MM, Job, JobSection, load_job
 from ..job_simulation import simulate_job, write_job_trace
 from ..names import TOOLPATH_SUFFIXES, is_toolpath
 from ..pipeline import Pipeline
-from ..toolpath.files import ReadOptions
+from ..toolpath.files import ReadOptions, asked_tolerance_mm
 from ..toolpath.moves import Command
 from .output import note, number, print_json, print_rows, progress, require_places, write_file
 
 _OPTIONS = (
     "tolerance",
     "feed",
+    "feed_of",
     "layer",
     "id",
     "gap",
     "lift",
     "scale",
     "unit",
+    "columns",
+    "noise",
     "closed",
     "block_delete",
     "skip_optional_stops",
@@ -40,7 +43,7 @@ _OPTIONS = (
 def refuse_toolpath_options(options: Namespace, file: Path) -> None:
     """Raises InputError: options of toolpaths are given with a path file."""
     for name in _OPTIONS:
-        if getattr(options, name) not in (None, [], False):
+        if getattr(options, name) not in (None, [], (), False):
             raise InputError(
                 f"{file}: --{name.replace('_', '-')} is for toolpaths, not for path files: leave it out"
             )
@@ -50,23 +53,33 @@ def toolpath_job(options: Namespace, file: Path) -> Job:
     """The job of a file on options.machine, its notes on stderr. Raises InputError: no machine."""
     if options.machine is None:
         raise InputError(f"{file}: a toolpath names no machine: add --machine FILE")
-    tolerance_mm = DEFAULT_TOLERANCE_MM if options.tolerance is None else options.tolerance
-    job = load_job(file, load_machine(options.machine), tolerance_mm, reading_of(options))
+    machine = load_machine(options.machine)
+    job = load_job(file, machine, tolerance_of(options), reading_of(options))
     for line in job.notes:
         note(line)
     return job
+
+
+def tolerance_of(options: Namespace) -> float:
+    """The tolerance of a toolpath from the command line, in mm."""
+    given: float | None = options.tolerance
+    least = DEFAULT_TOLERANCE_MM if given is None else given
+    return asked_tolerance_mm(least, reading_of(options))
 
 
 def reading_of(options: Namespace) -> ReadOptions:
     """The reading options of a toolpath from the command line."""
     return ReadOptions(
         feed_mm_s=options.feed,
+        feeds=tuple(options.feed_of),
         layers=tuple(options.layer),
         ids=tuple(options.id),
         gap_mm=options.gap,
         lift_mm=options.lift,
         scale=options.scale,
         unit_mm=options.unit,
+        columns=options.columns,
+        noise_mm=options.noise,
         closed=options.closed,
         block_delete=options.block_delete,
         skip_optional_stops=options.skip_optional_stops,

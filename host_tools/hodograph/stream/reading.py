@@ -31,7 +31,7 @@ from ..job import (
 )
 from ..job_outputs import EventMaker, without_effect
 from ..spline.spatial import sliced
-from ..toolpath.files import ReadOptions
+from ..toolpath.files import ReadOptions, replaced_feed_mm_s
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import SHORTEST_MM, turns
@@ -178,7 +178,9 @@ class StreamReader:
 
     def _parts(self) -> Iterator[_Part]:
         """Fitted parts, tied to each other or from rest to rest."""
-        sections = SectionMaker(self.file, self.machine, self.reading.feed_mm_s, self.notes)
+        sections = SectionMaker(
+            self.file, self.machine, replaced_feed_mm_s(self.file, self.reading), self.notes
+        )
         outputs = self.machine.outputs
         events = None if outputs is None else EventMaker(outputs, self.file)
         first, noted = True, False

@@ -34,36 +34,45 @@ class ReadOptions:
     """Options for what a file itself does not define. None and empty: not given.
 
     feed_mm_s  feed: required for drawings, and for points without a column of feeds; in G-code it replaces F
+    feeds      drawings: layers or colours, each with its feed in place of `feed_mm_s`
     layers     drawings: only these layers, in this order
     ids        drawings: only elements with these identities (SVG: id, DXF: handle)
     gap_mm     drawings: ends of contours at this distance or less are joined
     lift_mm    drawings: height of rapid moves above the drawing
     scale      drawings and points: factor on lengths
     unit_mm    drawings and points: length of a unit of the file
+    columns    points: names of the columns
+    noise_mm   points: greatest distance of points from the curve that they sample, which is the tolerance then
     closed     points: the path returns to the first point
     block_delete         G-code: lines that begin with "/" are left out
     skip_optional_stops  G-code: M1 is left out
     """
 
     feed_mm_s: float | None = None
+    feeds: tuple[tuple[str, float], ...] = ()
     layers: tuple[str, ...] = ()
     ids: tuple[str, ...] = ()
     gap_mm: float | None = None
     lift_mm: float | None = None
     scale: float | None = None
     unit_mm: float | None = None
+    columns: tuple[str, ...] = ()
+    noise_mm: float | None = None
     closed: bool = False
     block_delete: bool = False
     skip_optional_stops: bool = False
 
 
 _OPTIONS_OF = {
+    "--feed-of": ("feeds", DRAWING_SUFFIXES),
     "--layer": ("layers", DRAWING_SUFFIXES),
     "--id": ("ids", DRAWING_SUFFIXES),
     "--gap": ("gap_mm", DRAWING_SUFFIXES),
     "--lift": ("lift_mm", DRAWING_SUFFIXES),
     "--scale": ("scale", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
     "--unit": ("unit_mm", (*DRAWING_SUFFIXES, *POINT_SUFFIXES)),
+    "--columns": ("columns", POINT_SUFFIXES),
+    "--noise": ("noise_mm", POINT_SUFFIXES),
     "--closed": ("closed", POINT_SUFFIXES),
     "--block-delete": ("block_delete", GCODE_SUFFIXES),
     "--skip-optional-stops": ("skip_optional_stops", GCODE_SUFFIXES),
@@ -77,6 +86,16 @@ def is_gcode(file: Path) -> bool:
     A Message of G-code is for the operator. A Message of another file reports what the reader left out.
     """
     return file.suffix.lower() in GCODE_SUFFIXES or str(file) == STANDARD_INPUT
+
+
+def replaced_feed_mm_s(file: Path, options: ReadOptions) -> float | None:
+    """The feed that replaces those of a file; None: they stay. Contours of a drawing have got theirs by the options."""
+    return None if file.suffix.lower() in DRAWING_SUFFIXES else options.feed_mm_s
+
+
+def asked_tolerance_mm(tolerance_mm: float, options: ReadOptions) -> float:
+    """The tolerance of a toolpath: that of the user, or the noise of points where this is more."""
+    return max(tolerance_mm, options.noise_mm or 0.0)
 
 
 def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
@@ -119,6 +138,7 @@ def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
     }
     return DrawingOptions(
         options.feed_mm_s,
+        feeds=dict(options.feeds),
         unit_mm=options.unit_mm,
         layers=options.layers,
         ids=options.ids,
@@ -160,5 +180,7 @@ def _point_options(options: ReadOptions) -> PointOptions:
         feed_mm_s=options.feed_mm_s,
         unit_mm=1.0 if options.unit_mm is None else options.unit_mm,
         scale=1.0 if options.scale is None else options.scale,
+        columns=options.columns,
+        noise_mm=0.0 if options.noise_mm is None else options.noise_mm,
         closed=options.closed,
     )

@@ -62,6 +62,8 @@ def imported(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, objec
         (("d.svg", "--feed", "20", "--id", "l", "--scale", "2"), 28.0),
         (("d.dxf", "--feed", "20", "--unit", "mm", "--layer", "cut"), 10.0),
         (("d.dxf", "--feed", "20", "--unit", "in"), 254.0),
+        (("p.txt", "--feed", "20", "--columns=-,x"), 5.0),
+        (("p.csv", "--feed", "20", "--columns", "z, -"), 20.0),
         (("G.NGC",), 10.0),
         (("no_f.nc", "--feed", "20"), 10.0),
     ],
@@ -70,6 +72,25 @@ def test_every_kind_is_read_with_its_options(
     capsys: pytest.CaptureFixture[str], words: tuple[str, ...], length_mm: float
 ) -> None:
     assert imported(capsys, *words)["length_mm"] == pytest.approx(length_mm, abs=0.05)
+
+
+@pytest.mark.parametrize("name", ["cut", "0"])
+def test_layers_of_a_drawing_have_feeds(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    """Two lines of 10 mm, on two layers; the path between them is the same."""
+    second = DXF.partition("0\nLINE")[2].partition("0\nENDSEC")[0].replace("8\ncut", "8\n0")
+    second = second.replace("\nA1\n", "\nA2\n").replace("11\n8", "11\n-8")
+    Path("two.dxf").write_text(DXF.replace("0\nENDSEC", f"0\nLINE{second}0\nENDSEC"))
+    words = ("two.dxf", "--unit", "mm", "--feed", "20")
+    before, after = imported(capsys, *words), imported(capsys, *words, "--feed-of", f"{name}=2")
+    more_s = float(str(after["duration_s"])) - float(str(before["duration_s"]))
+    assert more_s == pytest.approx(10.0 / 2.0 - 10.0 / 20.0, rel=0.05)
+
+
+def test_noise_of_points_is_their_tolerance(capsys: pytest.CaptureFixture[str]) -> None:
+    rough = imported(capsys, "p.csv", "--feed", "20", "--noise", "0.2")
+    assert 10.0 < float(str(rough["deviation_bound_um"])) < 200.0
+    exact = imported(capsys, "p.csv", "--feed", "20", "--noise", "0.002", "--tolerance", "0.2")
+    assert float(str(exact["deviation_bound_um"])) < 2.0
 
 
 def test_switches_of_the_operator(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -116,6 +137,12 @@ def test_standard_input_is_gcode() -> None:
         ("simulate d.dxf --feed 20 --unit ell", '"ell" is no unit'),
         ("simulate d.svg --feed 20 --layer x", 'no layer "x"'),
         ("simulate d.svg --feed 20 --closed", "--closed is for .csv, .txt"),
+        ("simulate d.svg --feed 20 --feed-of x=2", 'a feed for "x"'),
+        ("simulate d.svg --feed 20 --feed-of 2", '"2" is not NAME=MM/S'),
+        ("simulate p.txt --feed 20 --feed-of x=2", "--feed-of is for .dxf, .svg"),
+        ("simulate p.txt --feed 20 --columns x,q", 'columns: "q" is not one of x, y'),
+        ("simulate d.svg --feed 20 --noise 1", "--noise is for .csv, .txt"),
+        ("simulate p.txt --feed 20 --noise -1", "noise: -1 mm is not"),
         ("simulate G.NGC --gap 1", "--gap is for .dxf, .svg"),
         (
             "simulate p.csv --feed 20 --skip-optional-stops",
