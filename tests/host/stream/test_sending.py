@@ -355,10 +355,10 @@ def test_without_a_place_for_the_journal_the_message_says_what_to_name(
     monkeypatch.setattr(Path, "home", no_home)
     monkeypatch.delenv("XDG_STATE_HOME", raising=False)
     with pytest.raises(InputError, match=r"no home folder: name another with .* --journal FILE"):
-        journal_file(Namespace())
+        journal_file(Namespace(journal=None))
     assert journal_file(Namespace(journal=tmp_path / "own.json")) == tmp_path / "own.json"
     monkeypatch.setenv("XDG_STATE_HOME", "/state")
-    assert journal_file(Namespace()) == Path("/state/hodograph/stream.json")
+    assert journal_file(Namespace(journal=None)) == Path("/state/hodograph/stream.json")
 
 
 def test_a_journal_has_one_writer(tmp_path: Path) -> None:
