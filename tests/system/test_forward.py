@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """tools/with-vcan --forward: a server beside the bus is reached from outside. All tests share one bus. Run by pytest;
-starts tools/with-vcan.
+starts tools/with-vcan and Python, and writes to temporary folders.
 """
 
 from __future__ import annotations
