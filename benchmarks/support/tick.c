@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Repeats the motion part of the tick, so that benchmarks/kernels.py can count its instructions.
- * Usage: tick FILE KERNEL RUNS [LOW HIGH]; KERNEL is a number. Prints the number of ticks.
+ * Usage: tick FILE KERNEL RUNS [LOW HIGH]; KERNEL is a number. Compiled by benchmarks/kernels.py, which runs it under
+ * callgrind. Reads FILE, a compiled program, and prints the number of ticks of all runs; writes no file.
  *
  * The coefficient records are made once, before the first run. If LOW and HIGH differ, the override changes between
  * them, in per cent, every 40 ticks.

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A board that ends in the middle of a motion: by a signal, it stops the axes first; without power, the drives stop."""
+"""A board that ends in the middle of a motion: by a signal, it stops the axes first; without power, the drives stop.
+Run by pytest; starts an emulated board and drives on a local bus.
+"""
 
 from __future__ import annotations
 

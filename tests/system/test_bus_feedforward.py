@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Feedforward on a bus: remapped PDOs, offsets, and still the same bits as without a bus."""
+"""Feedforward on a bus: remapped PDOs, offsets, and still the same bits as without a bus. Run by pytest; starts a
+controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph run` on a bus: the same bits as `hodograph simulate`, and the same frames at every run."""
+"""`hodograph run` on a bus: the same bits as `hodograph simulate`, and the same frames at every run. Run by pytest;
+starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

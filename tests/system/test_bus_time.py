@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A recorded run: its load lies between the model's bounds, and cantools reads its frames with our DBC."""
+"""A recorded run: its load lies between the model's bounds, and cantools reads its frames with our DBC. Run by pytest;
+starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drives that slept, as the processes of a suspended computer do: the recovery."""
+"""Drives that slept, as the processes of a suspended computer do: the recovery. Run by pytest; starts a controller and
+drives on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A fault in a run without a bus is the fault that a simulated drive has on the bus: the same tick, the same bits."""
+"""A fault in a run without a bus is the fault that a simulated drive has on the bus: the same tick, the same bits. Run
+by pytest; starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Random frames while a program runs: setpoints and encoders stay those of the simulation."""
+"""Random frames while a program runs: setpoints and encoders stay those of the simulation. Run by pytest; starts a
+controller and drives on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""NMT, heartbeat, EMCY, SYNC and refusals, with python canopen as the master."""
+"""NMT, heartbeat, EMCY, SYNC and refusals, with python canopen as the master. Run by pytest; starts controllers and
+drives, each on a local bus.
+"""
 
 from __future__ import annotations
 

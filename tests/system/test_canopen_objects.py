@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Each object of both EDS files on the bus: type, access, default, limits; and objects that do not exist."""
+"""Each object of both EDS files on the bus: type, access, default, limits; and objects that do not exist. Run by
+pytest; starts controllers and drives, each on a local bus.
+"""
 
 from __future__ import annotations
 

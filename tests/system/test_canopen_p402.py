@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""canopen's profile of CiA 402 drives one of our drives by itself: states, faults, modes, homing, targets with SYNC."""
+"""canopen's profile of CiA 402 drives one of our drives by itself: states, faults, modes, homing, targets with SYNC.
+Run by pytest; starts a drive on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""PDOs of a drive, read, remapped and used through python canopen; and remaps that must be refused."""
+"""PDOs of a drive, read, remapped and used through python canopen; and remaps that must be refused. Run by pytest;
+starts a drive on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""SDO on the bus: python canopen's transfers of all kinds, and faults of a client made by hand."""
+"""SDO on the bus: python canopen's transfers of all kinds, and faults of a client made by hand. Run by pytest; starts
+controllers and drives, each on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Half a minute of bus time with programs: no unexpected frame on the bus (`make soak`: an hour)."""
+"""Half a minute of bus time with programs: no unexpected frame on the bus (`make soak`: an hour). Run by pytest; starts
+tools/soak.py, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

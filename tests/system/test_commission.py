@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`hodograph scan` and `hodograph check` with the simulated drives, and with devices of another stack (python canopen's
-LocalNode) that are described by EDS files as vendors write them.
+LocalNode) that are described by EDS files as vendors write them. Run by pytest; starts a controller and drives on a
+local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

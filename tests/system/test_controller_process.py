@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph-controller as a process, with simulated drives: command line, a whole run, a lost drive, its end."""
+"""hodograph-controller as a process, with simulated drives: command line, a whole run, a lost drive, its end. Run by
+pytest; starts controllers and drives on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Machines of one, three and six drives: the plane moves as with two, the others hold, one drive takes no program."""
+"""Machines of one, three and six drives: the plane moves as with two, the others hold, one drive takes no program. Run
+by pytest; starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph-drive as a process: its command line, its objects seen by python canopen, its end."""
+"""hodograph-drive as a process: its command line, its objects seen by python canopen, its end. Run by pytest; starts
+drives on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Images for microcontrollers have the same bytes from the same tree, wherever they are built."""
+"""Images for microcontrollers have the same bytes from the same tree, wherever they are built. Run by pytest; starts
+`make`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""tools/with-vcan --forward: a server beside the bus is reached from outside. All tests share one bus."""
+"""tools/with-vcan --forward: a server beside the bus is reached from outside. All tests share one bus. Run by pytest;
+starts tools/with-vcan and Python, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The gateway passes on a signal to end to the board, which then stops the axes, and waits for it."""
+"""The gateway passes on a signal to end to the board, which then stops the axes, and waits for it. Run by pytest;
+starts `hodograph-bridge` on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`hodograph stream` killed repeatedly at random instants: the machine comes to rest on its path, and the job
-continues.
+continues. Run by pytest; starts a controller, drives and `hodograph` on a local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A bus of hodograph-hub, without any CAN of the kernel: the same bits on all boards, also over SLCAN in real time."""
+"""A bus of hodograph-hub, without any CAN of the kernel: the same bits on all boards, also over SLCAN in real time. Run
+by pytest; starts emulated boards, `hodograph-hub` and `hodograph`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Lost answers of the controller to writes and commands: what may be repeated is, and of a start or a resume the state
-tells whether it has been executed. A start that names its program is refused if another one is loaded.
+tells whether it has been executed. A start that names its program is refused if another one is loaded. Run by pytest;
+starts a controller and drives on a local bus.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The live page of a job of five axes with outputs, also one that is opened in mid-run."""
+"""The live page of a job of five axes with outputs, also one that is opened in mid-run. Run by pytest; starts a browser
+and a machine on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph monitor --replay` in a browser; the command's own errors."""
+"""`hodograph monitor --replay` in a browser; the command's own errors. Run by pytest; starts `hodograph` and a browser,
+and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

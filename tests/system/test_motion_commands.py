@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Hold, resume, override and start from a position, by the command on the bus."""
+"""Hold, resume, override and start from a position, by the command on the bus. Run by pytest; starts a controller and
+drives on a local bus.
+"""
 
 from __future__ import annotations
 

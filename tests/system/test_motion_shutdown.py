@@ -3,7 +3,7 @@
 host.
 
 The frames on the bus are the evidence: setpoints come to rest within the bound of the stop, or the drives get a quick
-stop. A drive whose axis moves is never switched off.
+stop. A drive whose axis moves is never switched off. Run by pytest; starts a controller and drives on a local bus.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A day of an operator by commands only: from upload to a fault, its text, its reset, and further programs."""
+"""A day of an operator by commands only: from upload to a fault, its text, its reset, and further programs. Run by
+pytest; starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

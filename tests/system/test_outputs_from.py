@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs after `start --from`: at the place of an event, and one count before and after it."""
+"""Outputs after `start --from`: at the place of an event, and one count before and after it. Run by pytest; starts a
+controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

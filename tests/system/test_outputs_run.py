@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Outputs on a bus: they reach the I/O module with the same setpoint as in the simulation, and a replay gives them
-too.
+"""Outputs on a bus: they reach the I/O module with the same setpoint as in the simulation, and a replay gives them too.
+Run by pytest; starts a controller and drives on a local bus, and writes to temporary folders.
 """
 
 import json

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Power cycles of the controller, of the drives, of both: what is restored, what has to be homed, what is refused."""
+"""Power cycles of the controller, of the drives, of both: what is restored, what has to be homed, what is refused. Run
+by pytest; starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

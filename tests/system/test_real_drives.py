@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drives with a vendor in 0x1018: checks that simulated drives do not need."""
+"""Drives with a vendor in 0x1018: checks that simulated drives do not need. Run by pytest; starts a controller and
+drives on a local bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The recorder on a local bus: every frame, in order, with the time of its last bit."""
+"""The recorder on a local bus: every frame, in order, with the time of its last bit. Run by pytest; serves a local bus,
+and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`make site`: every page is there, nothing is fetched from outside, and it works in a browser from the disk."""
+"""`make site`: every page is there, nothing is fetched from outside, and it works in a browser from the disk. Run by
+pytest; starts `make` and a browser, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Six axes whose plan uses velocity, acceleration and jerk of each in turn: on the bus, with commands at any instant,
-every tick keeps the limits and the axes stay together.
+every tick keeps the limits and the axes stay together. Run by pytest; starts a controller and drives on a local bus,
+and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Programs in space on the bus: the controller leads all path axes, the others hold their position."""
+"""Programs in space on the bus: the controller leads all path axes, the others hold their position. Run by pytest;
+starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

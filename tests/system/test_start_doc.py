@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""docs/start/first-path.md, followed to the letter: its file, its commands, its numbers."""
+"""docs/start/first-path.md, followed to the letter: its file, its commands, its numbers. Run by pytest; starts
+`hodograph` as a process, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

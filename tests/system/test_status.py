@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph status`: once, watching, as JSON; its messages on faults."""
+"""`hodograph status`: once, watching, as JSON; its messages on faults. Run by pytest; starts a controller, drives and
+`hodograph` on a local bus.
+"""
 
 from __future__ import annotations
 

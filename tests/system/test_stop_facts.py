@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""compile, inspect, feed and status give the same longest stops of a program."""
+"""compile, inspect, feed and status give the same longest stops of a program. Run by pytest; starts a controller and
+drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

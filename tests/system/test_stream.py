@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Jobs in chunks on a bus: the controller process, drives, and a client that sends chunks by block download."""
+"""Jobs in chunks on a bus: the controller process, drives, and a client that sends chunks by block download. Run by
+pytest; starts a controller and drives on a local bus.
+"""
 
 from __future__ import annotations
 

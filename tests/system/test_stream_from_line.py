@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph stream --from-line` and `--from`: the axes have to stand there."""
+"""`hodograph stream --from-line` and `--from`: the axes have to stand there. Run by pytest; starts a controller and
+drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sections as one job on a bus: program stops, the recording, and `run` that streams what does not fit."""
+"""Sections as one job on a bus: program stops, the recording, and `run` that streams what does not fit. Run by pytest;
+starts a controller and drives on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

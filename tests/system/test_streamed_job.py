@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph stream` on a bus: to the end, stopped, killed and continued."""
+"""`hodograph stream` on a bus: to the end, stopped, killed and continued. Run by pytest; starts a controller, drives
+and `hodograph` on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of a streamed job at the I/O module of a bus: those of the simulation, also when the job goes on."""
+"""Outputs of a streamed job at the I/O module of a bus: those of the simulation, also when the job goes on. Run by
+pytest; starts a controller, drives and `hodograph` on a local bus, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

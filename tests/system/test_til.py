@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Target in the loop: the controller on an emulated board, on a bus in virtual time, against the simulated drives.
 
-Starts the emulator, the gateway and the drives as processes. Uses local buses only, no kernel CAN.
+Starts the emulator, the gateway and the drives as processes. Uses local buses only, no kernel CAN. Run by pytest;
+writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The view in the report of a toolpath, in a browser: it draws, and names the source line under the cursor."""
+"""The view in the report of a toolpath, in a browser: it draws, and names the source line under the cursor. Run by
+pytest; starts a browser, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The commands of docs/guides/candump.md are run with Debian's can-utils, and their output is compared with the
-page.
+"""The commands of docs/guides/candump.md are run with Debian's can-utils, and their output is compared with the page.
+Run by pytest on vcan0; starts a controller, drives and can-utils, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The nodes on the CAN of the kernel, in real time: their sockets, its filters, and python canopen's own thread."""
+"""The nodes on the CAN of the kernel, in real time: their sockets, its filters, and python canopen's own thread. Run by
+pytest on vcan0; starts controllers and drives.
+"""
 
 from __future__ import annotations
 

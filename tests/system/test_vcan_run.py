@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Commands on SocketCAN, in real time: the same bits at both paces, the load by the kernel's time stamps, Ctrl-C.
 
-What they do in all other respects is tested in virtual time: test_bus_run.py, test_bus_commands.py, test_status.py.
+What they do in all other respects is tested in virtual time: test_bus_run.py, test_bus_commands.py, test_status.py. Run
+by pytest on vcan0; starts a controller, drives and `hodograph`, and writes to temporary folders.
 """
 
 from __future__ import annotations

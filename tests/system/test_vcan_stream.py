@@ -2,7 +2,8 @@
 """Real faults during `hodograph stream` on the CAN of the kernel: the host killed, the host stopped for a while, the
 interface down. The machine rests on its path, and `--continue` finishes the job.
 
-Times are real and at the fast pace, so nothing here is judged by them.
+Times are real and at the fast pace, so nothing here is judged by them. Run by pytest on vcan0; starts a controller,
+drives and `hodograph`, sets vcan0 down and up, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`make wheels`: the wheels of both platforms; programs and Python module of the one for aarch64 under QEMU."""
+"""`make wheels`: the wheels of both platforms; programs and Python module of the one for aarch64 under QEMU. Run by
+pytest; starts `make`, QEMU and `hodograph`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 """tools/with-vcan: a command on a user-mode bus behaves as one run here, and nothing is left behind.
 
 A bus is a kernel that boots: most tests share one, and those that end one in their own way use it for all there is to
-see. Each wait has a limit below that of pytest (pyproject.toml), and says what did not come.
+see. Each wait has a limit below that of pytest (pyproject.toml), and says what did not come. Run by pytest; starts
+tools/with-vcan, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Goals of `make bench` beside figures."""
+"""Goals of `make bench` beside figures. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The observer of the bus: content with a bus as it should be, and finds each thing that should not be there."""
+"""The observer of the bus: content with a bus as it should be, and finds each thing that should not be there. Run by
+pytest; reads machine files.
+"""
 
 from __future__ import annotations
 

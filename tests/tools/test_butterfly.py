@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The butterfly of `make butterfly`: the data are whole, and our reader of drawings gets the same curve."""
+"""The butterfly of `make butterfly`: the data are whole, and our reader of drawings gets the same curve. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

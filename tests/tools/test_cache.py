@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Stamps: what is damaged, made for something else or refused is absent, and never a finding."""
+"""Stamps: what is damaged, made for something else or refused is absent, and never a finding. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

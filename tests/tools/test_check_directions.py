@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The checker of directions: each kind of breach is found in a small tree, at its line."""
+"""The checker of directions: each kind of breach is found in a small tree, at its line. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The checker of EDS files: passes ours, and finds each fault that is put into one."""
+"""The checker of EDS files: passes ours, and finds each fault that is put into one. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The check of linked images finds each class of what it forbids, and its stacks are those of the compiler."""
+"""The check of linked images finds each class of what it forbids, and its stacks are those of the compiler. Run by
+pytest; starts compilers and `make`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Deviations from MISRA C: what they cover, and that they go when nothing needs them."""
+"""Deviations from MISRA C: what they cover, and that they go when nothing needs them. Run by pytest; reads the list of
+deviations and its page.
+"""
 
 import re
 import sys

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The register constants of the NUCLEO-G474RE port are those of crate stm32-metapac, and any other would be found."""
+"""The register constants of the NUCLEO-G474RE port are those of crate stm32-metapac, and any other would be found. Run
+by pytest; starts `cargo` if its crate is not in the cache, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

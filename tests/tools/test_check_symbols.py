@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Names that two libraries define are found; those of the hardware contract may be."""
+"""Names that two libraries define are found; those of the hardware contract may be. Run by pytest; starts `gcc` and
+`ar`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The check of names in tests: each kind of breach is found in a small tree, and none in this one."""
+"""The check of names in tests: each kind of breach is found in a small tree, and none in this one. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The checker of users and effects: right lists pass, each kind of wrong list is found at its line, and so is each file
-that does not name its users or its effects.
+that does not name its users or its effects. Run by pytest; writes to temporary folders.
 """
 
 from __future__ import annotations

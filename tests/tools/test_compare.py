@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What `make compare` measures: processor time and memory of a process, and the figure of a corner."""
+"""What `make compare` measures: processor time and memory of a process, and the figure of a corner. Run by pytest;
+starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

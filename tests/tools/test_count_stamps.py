@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A core is not counted again as long as its images, the programs and the tools are the same."""
+"""A core is not counted again as long as its images, the programs and the tools are the same. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

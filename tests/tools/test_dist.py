@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The source distribution and the wheel: complete, the same bytes twice, and enough to run a program."""
+"""The source distribution and the wheel: complete, the same bytes twice, and enough to run a program. Run by pytest;
+starts `pip` and Python, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

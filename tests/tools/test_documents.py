@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Pages are whole: links lead to files that are there, and no merge has left its marks."""
+"""Pages are whole: links lead to files that are there, and no merge has left its marks. Run by pytest; reads the pages,
+and starts the generators of pages and `git`.
+"""
 
 from __future__ import annotations
 

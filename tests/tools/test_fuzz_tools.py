@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The Python half of `make fuzz`: documents are written as they are meant, and a planted mistake is found."""
+"""The Python half of `make fuzz`: documents are written as they are meant, and a planted mistake is found. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Groups of Python tests, run in a small tree of their own: marks, records, hanging tests, and what check chooses."""
+"""Groups of Python tests, run in a small tree of their own: marks, records, hanging tests, and what check chooses. Run
+by pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

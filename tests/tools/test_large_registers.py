@@ -2,6 +2,7 @@
 """tools/vcan/large_registers.c: a tracer that knows a part of the registers can restore them.
 
 This is what user-mode Linux 6.1 does on a processor with AMX. Here the part is so small that every processor has more.
+Run by pytest; compiles a library into a temporary folder, and starts Python with it.
 """
 
 from __future__ import annotations

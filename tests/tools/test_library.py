@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""libhodograph as others use it: the example built from the installed files, the promised interface, modules."""
+"""libhodograph as others use it: the example built from the installed files, the promised interface, modules. Run by
+pytest; starts `hodograph` and built programs, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

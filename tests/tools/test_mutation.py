@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Planted mistakes: each kind is found in a small source, at its line, and a known outcome is kept."""
+"""Planted mistakes: each kind is found in a small source, at its line, and a known outcome is kept. Run by pytest;
+writes to temporary folders.
+"""
 
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""What packages are made of: locked requirements of the host tools, list of components, manifests of the modules."""
+"""What packages are made of: locked requirements of the host tools, list of components, manifests of the modules. Run
+by pytest; starts `make` and Python, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Which test files a change reaches: in a small tree of its own, with all that a test can depend on."""
+"""Which test files a change reaches: in a small tree of its own, with all that a test can depend on. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

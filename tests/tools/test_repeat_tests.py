@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Runs of the tests over and over: another verdict in one of them is seen, and each mode is what it says."""
+"""Runs of the tests over and over: another verdict in one of them is seen, and each mode is what it says. Run by
+pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The parts of continuous integration: a part that fails, or loses its count, is a failure in the last line."""
+"""The parts of continuous integration: a part that fails, or loses its count, is a failure in the last line. Run by
+pytest; starts processes.
+"""
 
 from __future__ import annotations
 

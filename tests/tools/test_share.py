@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Man page and shell completion, as `make share` writes them: shells complete by them, mandoc has nothing to say."""
+"""Man page and shell completion, as `make share` writes them: shells complete by them, mandoc has nothing to say. Run
+by pytest; starts tools/make_share.py and `mandoc`, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""C tests run again when their binary or their data has changed, and not else."""
+"""C tests run again when their binary or their data has changed, and not else. Run by pytest; starts scripts, and
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The counter of tests: nothing that went wrong may look like a success."""
+"""The counter of tests: nothing that went wrong may look like a success. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,6 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: MIT
 # First program inside user-mode Linux: the file systems a command expects, the bus, then the agent.
+# Started by the kernel of the guest, whose command line user_mode.py makes. Mounts /proc, /sys, /dev/pts, /dev/shm and
+# /run/lock, makes links in /dev, sets the name of the host and the limits of socket buffers, loads the modules of CAN,
+# and creates vcan0 and vcan1. Switches the guest off when the agent has ended.
 # $0 lies in the folder of the bus, where `boot` sets PYTHON, AGENT, MODULES and HOST.
 PATH=/usr/sbin:/usr/bin:/sbin:/bin
 # shellcheck source=/dev/null

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The public Python API: the same programs as the commands, arrays of the promised shapes, quick to import."""
+"""The public Python API: the same programs as the commands, arrays of the promised shapes, quick to import. Run by
+pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Messages about a bus that cannot be opened: the remedy for a real interface differs from that for a virtual one."""
+"""Messages about a bus that cannot be opened: the remedy for a real interface differs from that for a virtual one. Run
+by pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

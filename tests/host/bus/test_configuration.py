@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Objects of the controller from a machine file: in the dictionary, in range, with the requested values."""
+"""Objects of the controller from a machine file: in the dictionary, in range, with the requested values. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""From frames to ticks: late answers are found, lost and doubled frames are never accepted."""
+"""From frames to ticks: late answers are found, lost and doubled frames are never accepted. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

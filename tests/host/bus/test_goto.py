@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Straight moves: from count to count exactly, inside the machine's limits, however short or long."""
+"""Straight moves: from count to count exactly, inside the machine's limits, however short or long. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The measured load of a bus: bits over time, sorted by COB-ID."""
+"""The measured load of a bus: bits over time, sorted by COB-ID. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Recordings as files: what is written comes back; what is broken is reported, with its place."""
+"""Recordings as files: what is written comes back; what is broken is reported, with its place. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

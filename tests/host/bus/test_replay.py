@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A recording made of a simulated run, read again: hashes and figures are those of the simulation."""
+"""A recording made of a simulated run, read again: hashes and figures are those of the simulation. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

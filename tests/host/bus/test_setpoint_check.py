@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The setpoint step check: jumps are found, and motion within the limits is not reported as one."""
+"""The setpoint step check: jumps are found, and motion within the limits is not reported as one. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Jumps are found in a stream that comes in pieces, wherever the pieces are cut."""
+"""Jumps are found in a stream that comes in pieces, wherever the pieces are cut. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

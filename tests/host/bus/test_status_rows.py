@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Output of `hodograph status` for a snapshot, as text and as JSON."""
+"""Output of `hodograph status` for a snapshot, as text and as JSON. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Diagnostics texts: the numbers are those of the firmware's headers, and each has a text."""
+"""Diagnostics texts: the numbers are those of the firmware's headers, and each has a text. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The SDO channel lock: clients wait for it in turn, for a bounded time."""
+"""The SDO channel lock: clients wait for it in turn, for a bounded time. Run by pytest; writes the files of locks."""
 
 import os
 import queue

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The DBC of the examples, as cantools reads it."""
+"""The DBC of the examples, as cantools reads it. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Lengths of frames against an encoder and a receiver that work bit by bit, as a CAN controller does."""
+"""Lengths of frames against an encoder and a receiver that work bit by bit, as a CAN controller does. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The bounds of the model against a bus that arbitrates frame by frame, with all senders at their worst case."""
+"""The bounds of the model against a bus that arbitrates frame by frame, with all senders at their worst case. Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Campaigns by Dask: on the cores of this computer, killed and continued, and on a cluster, which may lose workers."""
+"""Campaigns by Dask: on the cores of this computer, killed and continued, and on a cluster, which may lose workers. Run
+by pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph campaign on one core: the table, errors, and continuation after any interruption."""
+"""hodograph campaign on one core: the table, errors, and continuation after any interruption. Run by pytest; starts
+processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fault rules in a run without a bus."""
+"""Fault rules in a run without a bus. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Campaign files: every mistake gets one line that names file, key and remedy."""
+"""Campaign files: every mistake gets one line that names file, key and remedy. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Draws: reproducible, distributed as requested, and independent."""
+"""Draws: reproducible, distributed as requested, and independent. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

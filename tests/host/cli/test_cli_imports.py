@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that only need a controller load no numeric modules: an operator's `hold` must not wait for these."""
+"""Commands that only need a controller load no numeric modules: an operator's `hold` must not wait for these. Run by
+pytest; starts processes.
+"""
 
 from __future__ import annotations
 

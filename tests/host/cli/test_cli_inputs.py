@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Bad input on the command line: documented exit status, one line on stderr, nothing on stdout."""
+"""Bad input on the command line: documented exit status, one line on stderr, nothing on stdout. Run by pytest; starts
+processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""--json: exactly the promised keys, and values that agree with each other."""
+"""--json: exactly the promised keys, and values that agree with each other. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""hodograph verify: keys, exit statuses, and inputs."""
+"""hodograph verify: keys, exit statuses, and inputs. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands without a bus run where Python lacks what only Linux has (docs/guides/windows-macos.md)."""
+"""Commands without a bus run where Python lacks what only Linux has (docs/guides/windows-macos.md). Run by pytest;
+starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""`status --watch` while the controller is away."""
+"""`status --watch` while the controller is away. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph check` reads the objects that the controller writes, and `hodograph scan` writes files that can be
-read.
+"""`hodograph check` reads the objects that the controller writes, and `hodograph scan` writes files that can be read.
+Run by pytest; writes to temporary folders.
 """
 
 from __future__ import annotations

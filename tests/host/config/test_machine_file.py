@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Machine and drive files: the shipped ones, and every mistake in one line."""
+"""Machine and drive files: the shipped ones, and every mistake in one line. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

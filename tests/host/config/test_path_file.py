@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Path files: what they mean, and that every mistake gets one line naming file, key and remedy."""
+"""Path files: what they mean, and that every mistake gets one line naming file, key and remedy. Run by pytest; writes
+to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The JSON schemas of the input files agree with the readers: keys, ranges, words, required keys."""
+"""The JSON schemas of the input files agree with the readers: keys, ranges, words, required keys. Run by pytest; writes
+to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Path files on which rotary axes move alone: the program moves these axes only, and mistakes get one line."""
+"""Path files on which rotary axes move alone: the program moves these axes only, and mistakes get one line. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The example of the core's manual (firmware/core/hodograph.h): it compiles as it stands, and gives the setpoints."""
+"""The example of the core's manual (firmware/core/hodograph.h): it compiles as it stands, and gives the setpoints. Run
+by pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The kernels give the same bits from every compiler and optimisation; firmware/core.
 
-Fixed must by its nature; float and double because they use IEEE + - * / only, without contraction.
+Fixed must by its nature; float and double because they use IEEE + - * / only, without contraction. Run by pytest;
+starts processes, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The kernels in space against 40-digit arithmetic, within the bounds of docs/theory/numerics.md sections 9 to 12."""
+"""The kernels in space against 40-digit arithmetic, within the bounds of docs/theory/numerics.md sections 9 to 12. Run
+by pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

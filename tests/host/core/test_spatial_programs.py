@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Spatial programs as the controller reads, checks and runs them."""
+"""Spatial programs as the controller reads, checks and runs them. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The EDS files as python canopen reads them, against docs/reference/protocol.md."""
+"""The EDS files as python canopen reads them, against docs/reference/protocol.md. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The generator of the C tables: its output, and its messages about a faulty EDS."""
+"""The generator of the C tables: its output, and its messages about a faulty EDS. Run by pytest; starts processes, and
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

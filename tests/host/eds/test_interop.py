@@ -2,7 +2,7 @@
 """python canopen, an implementation that is not ours, as the client of firmware/canopen.
 
 The node is C, compiled into a shared library. Frames go from call to call and can be lost on the way; time is what the
-client waits for.
+client waits for. Run by pytest; starts processes, and writes to temporary folders.
 """
 
 from __future__ import annotations

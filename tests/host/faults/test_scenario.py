@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Scenario files: read, drawn from by seed, and refused in one line where they are wrong."""
+"""Scenario files: read, drawn from by seed, and refused in one line where they are wrong. Run by pytest; starts
+processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

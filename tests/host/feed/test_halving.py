@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces in halves are the same feed."""
+"""Feed pieces in halves are the same feed. Run by pytest; starts and writes nothing."""
 
 from pathlib import Path
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Limits that have no effect are reported, and only those."""
+"""Limits that have no effect are reported, and only those. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Infeasible limits of profile `optimal`: the message names limit and place, and the value that it proposes is
-feasible.
+feasible. Run by pytest; starts and writes nothing.
 """
 
 from __future__ import annotations

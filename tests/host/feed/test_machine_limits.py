@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Each plan keeps the limits of a machine's axes, also if the path file has higher ones."""
+"""Each plan keeps the limits of a machine's axes, also if the path file has higher ones. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

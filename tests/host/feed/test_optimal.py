@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Profile `optimal`: inside all limits on any path, fast, equal in several windows and in one, with clear messages if
-no feed exists.
+no feed exists. Run by pytest; starts and writes nothing.
 """
 
 from __future__ import annotations

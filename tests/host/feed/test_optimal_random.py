@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Profile `optimal` on random paths, limits, plants and controllers: planned, compiled, and nothing above a limit."""
+"""Profile `optimal` on random paths, limits, plants and controllers: planned, compiled, and nothing above a limit. Run
+by pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Profile `optimal` on the examples, from the path file to a program that the controller takes."""
+"""Profile `optimal` on the examples, from the path file to a program that the controller takes. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

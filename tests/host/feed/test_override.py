@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The override bounds: docs/theory/feed.md section 7, its inequality at random instants."""
+"""The override bounds: docs/theory/feed.md section 7, its inequality at random instants. Run by pytest; starts and
+writes nothing.
+"""
 
 import numpy as np
 from hypothesis import given, settings

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Limits along a path: kept by every profile, and by the controller's own program time under any commands."""
+"""Limits along a path: kept by every profile, and by the controller's own program time under any commands. Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The headroom of a changing override in C against the same formulas in numpy, on random samples. No I/O."""
+"""The headroom of a changing override in C against the same formulas in numpy, on random samples. No I/O. Run by
+pytest; starts and writes nothing.
+"""
 
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Feed pieces against the exact profile in 50 digits, and against the rules of docs/reference/protocol.md 1.3."""
+"""Feed pieces against the exact profile in 50 digits, and against the rules of docs/reference/protocol.md 1.3. Run by
+pytest; starts and writes nothing.
+"""
 
 from fractions import Fraction
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Planning: what lowers the feed, what is reported, what is refused; and the pattern search."""
+"""Planning: what lowers the feed, what is reported, what is refused; and the pattern search. Run by pytest; starts and
+writes nothing.
+"""
 
 from itertools import pairwise
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ramps against their definitions, evaluated anew in 50 digits."""
+"""The ramps against their definitions, evaluated anew in 50 digits. Run by pytest; starts and writes nothing."""
 
 import mpmath
 import numpy as np

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The solver of quadratic programs: solutions keep every bound and meet the conditions of an optimum, whose multipliers
-another solver finds (least squares that are not negative).
+another solver finds (least squares that are not negative). Run by pytest; starts processes, and writes to temporary
+folders.
 """
 
 from __future__ import annotations

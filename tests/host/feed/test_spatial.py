@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Feeds along curves in space: the frames, and that plans keep the limits of three axes."""
+"""Feeds along curves in space: the frames, and that plans keep the limits of three axes. Run by pytest; starts and
+writes nothing.
+"""
 
 import numpy as np
 import pytest

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Answers that come after the next SYNC, as on a host that other work keeps busy; and answers that are lost."""
+"""Answers that come after the next SYNC, as on a host that other work keeps busy; and answers that are lost. Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The plant from a recorded run with noise: within one per cent, and within the confidence intervals of the fit."""
+"""The plant from a recorded run with noise: within one per cent, and within the confidence intervals of the fit. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

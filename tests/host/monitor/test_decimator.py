@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Decimation loses no peak and bounds what is sent."""
+"""Decimation loses no peak and bounds what is sent. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The decoder: the samples do not depend on the parts of the stream, and missing frames do not stop it."""
+"""The decoder: the samples do not depend on the parts of the stream, and missing frames do not stop it. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The figures of the plots agree with those of `simulate`."""
+"""The figures of the plots agree with those of `simulate`. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A storm of emergency frames is reported in a few lines, the same ones however the frames come in."""
+"""A storm of emergency frames is reported in a few lines, the same ones however the frames come in. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

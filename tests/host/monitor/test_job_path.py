@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The contour error of a streamed job, from its chunks."""
+"""The contour error of a streamed job, from its chunks. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

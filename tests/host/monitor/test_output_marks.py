@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs on the live page: places on the path, and the times at which setpoints passed them, poll by poll."""
+"""Outputs on the live page: places on the path, and the times at which setpoints passed them, poll by poll. Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The Python check and the controller's own (through cffi) give the same verdict on the same bytes.
 
-Fixed examples: at the very edge of a tolerance the two may round differently (seen in 1 of 5000 images with
-numbers moved by powers of two), which must not make a test fail now and then.
+Fixed examples: at the very edge of a tolerance the two may round differently (seen in 1 of 5000 images with numbers
+moved by powers of two), which must not make a test fail now and then. Run by pytest; starts and writes nothing.
 """
 
 from pathlib import Path

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Images with compact records: the same program in fewer bytes, where its numbers fit (protocol.md 1.7.1)."""
+"""Images with compact records: the same program in fewer bytes, where its numbers fit (protocol.md 1.7.1). Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A feed piece that runs back below the feed that counts as rounding, and returns faster than the pieces beside it
-allow: both checks refuse it.
+allow: both checks refuse it. Run by pytest; starts and writes nothing.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Events of a program: bytes, both checks, names in machine and path files, and what a simulated run makes of them."""
+"""Events of a program: bytes, both checks, names in machine and path files, and what a simulated run makes of them. Run
+by pytest; writes to temporary folders.
+"""
 
 import json
 from dataclasses import replace

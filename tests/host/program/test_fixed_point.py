@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Lengths in steps of 2^-40 mm: rounding of arrays, single lengths and fractions."""
+"""Lengths in steps of 2^-40 mm: rounding of arrays, single lengths and fractions. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A path whose fault stops would come too late is planned again, and refused only where no plan helps."""
+"""A path whose fault stops would come too late is planned again, and refused only where no plan helps. Run by pytest;
+writes to temporary folders.
+"""
 
 import json
 from collections.abc import Callable

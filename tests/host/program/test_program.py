@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compiling: exact chaining, drift, limits, and what is refused."""
+"""Compiling: exact chaining, drift, limits, and what is refused. Run by pytest; starts and writes nothing."""
 
 import time
 

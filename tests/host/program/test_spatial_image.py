@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Programs of three axes: exact joints, images there and back, and the same verdict of both checks."""
+"""Programs of three axes: exact joints, images there and back, and the same verdict of both checks. Run by pytest;
+starts and writes nothing.
+"""
 
 from dataclasses import replace
 from functools import cache

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Stops are planned where a program is hard to stop: narrow bends, and paths of micrometres."""
+"""Stops are planned where a program is hard to stop: narrow bends, and paths of micrometres. Run by pytest; writes to
+temporary folders.
+"""
 
 from dataclasses import replace
 from math import inf

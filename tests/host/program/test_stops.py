@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The stop table: codes, bounds by both checks, and what compile makes of them."""
+"""The stop table: codes, bounds by both checks, and what compile makes of them. Run by pytest; writes to temporary
+folders.
+"""
 
 from dataclasses import replace
 from pathlib import Path

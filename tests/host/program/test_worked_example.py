@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The worked example of the manual: its path file compiles to the bytes that the page prints."""
+"""The worked example of the manual: its path file compiles to the bytes that the page prints. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The contour error: known distances from the curve, crossings, joints and ends."""
+"""The contour error: known distances from the curve, crossings, joints and ends. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

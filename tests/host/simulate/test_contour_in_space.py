@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Contour error in space: the distance of a point from the exact curve, whatever it is beside."""
+"""Contour error in space: the distance of a point from the exact curve, whatever it is beside. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

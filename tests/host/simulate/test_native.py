@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The native module: what is said where it is missing, the layout of its rows, counts."""
+"""The native module: what is said where it is missing, the layout of its rows, counts. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

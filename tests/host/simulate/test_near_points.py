@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Points that nearly repeat on a path of six axes: a plan in few intervals, which the controller accepts."""
+"""Points that nearly repeat on a path of six axes: a plan in few intervals, which the controller accepts. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

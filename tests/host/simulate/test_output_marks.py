@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Marks of outputs in figures: their places on the curve, and the times at which they switched in a run."""
+"""Marks of outputs in figures: their places on the curve, and the times at which they switched in a run. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

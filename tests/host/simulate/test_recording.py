@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A recording gives the motion of the simulation, and differences are named."""
+"""A recording gives the motion of the simulation, and differences are named. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

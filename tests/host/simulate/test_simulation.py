@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A run without a bus: hashes, settling, refusals, and every kernel."""
+"""A run without a bus: hashes, settling, refusals, and every kernel. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Paths on a machine whose path has three axes: from the file to the trace."""
+"""Paths on a machine whose path has three axes: from the file to the trace. Run by pytest; writes to temporary
+folders.
+"""
 
 from pathlib import Path
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Stops without a bus: at rest within the bound, inside the limits, on the path; random commands as well."""
+"""Stops without a bus: at rest within the bound, inside the limits, on the path; random commands as well. Run by
+pytest; writes to temporary folders.
+"""
 
 import json
 from pathlib import Path

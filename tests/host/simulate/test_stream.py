@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A job in chunks through the controller's code, without a bus. tests/unit/test_stream_cuts.c cuts it at random."""
+"""A job in chunks through the controller's code, without a bus. tests/unit/test_stream_cuts.c cuts it at random. Run by
+pytest; starts processes.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Degenerate points in space, as users type them: each gives a good curve, or one message with its place."""
+"""Degenerate points in space, as users type them: each gives a good curve, or one message with its place. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

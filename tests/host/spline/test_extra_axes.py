@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Extra axes of a path in space: C2 by arc length, exact at the points, without wild overshoot."""
+"""Extra axes of a path in space: C2 by arc length, exact at the points, without wild overshoot. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Public functions: the paper's curves, random polygons, through points, refusals, linear time."""
+"""Public functions: the paper's curves, random polygons, through points, refusals, linear time. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

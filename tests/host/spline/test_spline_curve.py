@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Evaluation: C2 joints, exact arc length and its inverse, greatest curvature, splitting."""
+"""Evaluation: C2 joints, exact arc length and its inverse, greatest curvature, splitting. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

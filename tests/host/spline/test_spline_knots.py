@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Knots of planar paths through points: C2 whatever the knots, uneven points, the whole chain to a program."""
+"""Knots of planar paths through points: C2 whatever the knots, uneven points, the whole chain to a program. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

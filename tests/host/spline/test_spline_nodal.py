@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Nodal points and the guide's hodograph against scipy's B-splines; what input is refused."""
+"""Nodal points and the guide's hodograph against scipy's B-splines; what input is refused. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

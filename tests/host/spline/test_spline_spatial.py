@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Splines in space: C2, interpolation, rotations, planar and straight data, degenerate input, accuracy, linear time."""
+"""Splines in space: C2, interpolation, rotations, planar and straight data, degenerate input, accuracy, linear time.
+Run by pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The linear solvers, the system (13) with its Jacobian, Newton and continuation."""
+"""The linear solvers, the system (13) with its Jacobian, Newton and continuation. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Chunks from the frames of a bus: whole ones, with lost segments that come again, refused ones; and their drawing."""
+"""Chunks from the frames of a bus: whole ones, with lost segments that come again, refused ones; and their drawing. Run
+by pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

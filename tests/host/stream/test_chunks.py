@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sections as chains of chunks: every chunk is accepted, shares what it says, and together they are one program."""
+"""Sections as chains of chunks: every chunk is accepted, shares what it says, and together they are one program. Run by
+pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

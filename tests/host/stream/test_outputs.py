@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of streamed jobs: the events of the whole in the same ticks, and none that the machine lacks."""
+"""Outputs of streamed jobs: the events of the whole in the same ticks, and none that the machine lacks. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Path files with several paths: what they may say, and the job that they become."""
+"""Path files with several paths: what they may say, and the job that they become. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

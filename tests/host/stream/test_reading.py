@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Notes of a streamed toolpath on commands that the machine does not execute."""
+"""Notes of a streamed toolpath on commands that the machine does not execute. Run by pytest; writes to temporary
+folders.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A job that is read by another process: the same chunks and errors, and no process that stays."""
+"""A job that is read by another process: the same chunks and errors, and no process that stays. Run by pytest; starts
+processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sections with rests between them as one job: dwells in ticks, program stops, starts at the end of the one before."""
+"""Sections with rests between them as one job: dwells in ticks, program stops, starts at the end of the one before. Run
+by pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

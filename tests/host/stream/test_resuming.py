@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The place at which a job goes on that the controller has lost: on its path, nearest to the axes. Places of lines and
-arc lengths.
+arc lengths. Run by pytest; writes to temporary folders.
 """
 
 from __future__ import annotations

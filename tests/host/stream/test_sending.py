@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sending chunks to a scripted controller: lost answers, wrong bytes, no room, refusals; and the journal."""
+"""Sending chunks to a scripted controller: lost answers, wrong bytes, no room, refusals; and the journal. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

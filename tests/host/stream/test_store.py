@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Planned chunks on the disk: bounded, given back as they are read, and what happens when the disk is full."""
+"""Planned chunks on the disk: bounded, given back as they are read, and what happens when the disk is full. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Streamed toolpaths with rotary axes that move with x, y and z: in windows, as chunks, continued in the middle."""
+"""Streamed toolpaths with rotary axes that move with x, y and z: in windows, as chunks, continued in the middle. Run by
+pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

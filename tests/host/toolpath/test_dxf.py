@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Drawings in DXF: entities, blocks, layers, units, what is left out, and what is refused."""
+"""Drawings in DXF: entities, blocks, layers, units, what is left out, and what is refused. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Equal sections of a job share curve, plan and program: nothing but the place of their points may depend on that."""
+"""Equal sections of a job share curve, plan and program: nothing but the place of their points may depend on that. Run
+by pytest; writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The toolpaths of examples/toolpaths: what their script writes, and read from end to end."""
+"""The toolpaths of examples/toolpaths: what their script writes, and read from end to end. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Toolpath files of every kind on the command line: the right reader, options that fit it, and clear messages."""
+"""Toolpath files of every kind on the command line: the right reader, options that fit it, and clear messages. Run by
+pytest; starts processes, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Curves of toolpaths: continuity, the certificate compared with sampled distances, times, and effects of noise."""
+"""Curves of toolpaths: continuity, the certificate compared with sampled distances, times, and effects of noise. Run by
+pytest; starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Blocks of G-code: words, modes, coordinates and machine commands."""
+"""Blocks of G-code: words, modes, coordinates and machine commands. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

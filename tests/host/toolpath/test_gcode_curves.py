@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Arcs, splines and canned cycles of G-code."""
+"""Arcs, splines and canned cycles of G-code. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

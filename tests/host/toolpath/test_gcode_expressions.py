@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Numbers, parameters and expressions of G-code."""
+"""Numbers, parameters and expressions of G-code. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

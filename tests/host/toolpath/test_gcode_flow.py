@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""O-words: subroutines, conditions and loops."""
+"""O-words: subroutines, conditions and loops. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The reader of G-code compared with LinuxCNC's own interpreter, on its programs and on generated ones."""
+"""The reader of G-code compared with LinuxCNC's own interpreter, on its programs and on generated ones. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Long programs of G-code: the short path for plain lines, memory, and input that is broken in any way."""
+"""Long programs of G-code: the short path for plain lines, memory, and input that is broken in any way. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

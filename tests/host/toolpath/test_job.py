@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Jobs: sections of a toolpath, what happens between them, their run, and messages."""
+"""Jobs: sections of a toolpath, what happens between them, their run, and messages. Run by pytest; writes to temporary
+folders.
+"""
 
 from __future__ import annotations
 

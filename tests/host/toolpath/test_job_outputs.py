@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of G-code become events of the sections' programs."""
+"""Outputs of G-code become events of the sections' programs. Run by pytest; writes to temporary folders."""
 
 import re
 from dataclasses import replace

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Toolpath files that are broken anywhere: moves, or one clear message with its place.
 
-Mutated programs of G-code that are read are compared with LinuxCNC in test_gcode_linuxcnc.py.
+Mutated programs of G-code that are read are compared with LinuxCNC in test_gcode_linuxcnc.py. Run by pytest; writes to
+temporary folders.
 """
 
 from __future__ import annotations

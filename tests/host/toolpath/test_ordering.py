@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Contours joined to chains, and their order for short rapid moves."""
+"""Contours joined to chains, and their order for short rapid moves. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Points as toolpaths: columns, separators, headers, repeated points, and what is refused."""
+"""Points as toolpaths: columns, separators, headers, repeated points, and what is refused. Run by pytest; starts and
+writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Points moved sideways within bounds: the search in C finds the minimum, and keeps the bounds."""
+"""Points moved sideways within bounds: the search in C finds the minimum, and keeps the bounds. Run by pytest; starts
+and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The report and `verify` of a toolpath: their figures and texts are those of the file and the run."""
+"""The report and `verify` of a toolpath: their figures and texts are those of the file and the run. Run by pytest;
+writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Rotary axes that move with a toolpath: smooth, within the tolerance, and run on a machine."""
+"""Rotary axes that move with a toolpath: smooth, within the tolerance, and run on a machine. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

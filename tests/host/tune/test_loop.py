@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The linear model compared with the simulated drive, and margins with the behaviour at their ends."""
+"""The linear model compared with the simulated drive, and margins with the behaviour at their ends. Run by pytest;
+starts and writes nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""`hodograph tune`: goals are met, requested properties, files without loss, refusals."""
+"""`hodograph tune`: goals are met, requested properties, files without loss, refusals. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 """The proof that path stops keep the limits of the axes (firmware/core/brake_check.h) compared with random stops.
 
 The truth beside it are setpoints of the controller's own stops (sim/offline/stop_trial), at random instants, overrides
-and sequences of commands. HODOGRAPH_BRAKE_CASES changes the number of mutated images.
+and sequences of commands. HODOGRAPH_BRAKE_CASES changes the number of mutated images. Run by pytest; starts and writes
+nothing.
 """
 
 from __future__ import annotations

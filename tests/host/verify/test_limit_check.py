@@ -2,7 +2,8 @@
 """The controller's proof of the axis limits (firmware/core/limit_check.h) against dense samples.
 
 The truth beside it is `motion_at` of hodograph.verify at many instants: doubles, no bounds. HODOGRAPH_LIMIT_CASES
-changes the number of mutated images; `make test-all` takes three times as many. HODOGRAPH_LIMIT_SEED gives others.
+changes the number of mutated images; `make test-all` takes three times as many. HODOGRAPH_LIMIT_SEED gives others. Run
+by pytest; starts and writes nothing.
 """
 
 from __future__ import annotations

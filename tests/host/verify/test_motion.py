@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The chain rule of the verifier against the program's own curve differentiated in 60 digits."""
+"""The chain rule of the verifier against the program's own curve differentiated in 60 digits. Run by pytest; starts and
+writes nothing.
+"""
 
 import mpmath
 import numpy as np

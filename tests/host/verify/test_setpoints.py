@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Differences of setpoints: by hand, in stretches, and beside the true derivatives."""
+"""Differences of setpoints: by hand, in stretches, and beside the true derivatives. Run by pytest; starts and writes
+nothing.
+"""
 
 from pathlib import Path
 

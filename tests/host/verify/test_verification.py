@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Peaks against dense samples, limits kept and passed, steps, zones, volts."""
+"""Peaks against dense samples, limits kept and passed, steps, zones, volts. Run by pytest; starts and writes
+nothing.
+"""
 
 from dataclasses import replace
 from pathlib import Path
