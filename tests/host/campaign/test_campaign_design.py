@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""From a run's number to its settings. Run by pytest; starts and writes nothing."""
+"""From a run's number to its settings. Run by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Campaign files: every mistake gets one line that names file, key and remedy. Run by pytest; starts and writes
-nothing.
+"""Campaign files: every mistake gets one line that names file, key and remedy. Run by pytest; writes to
+temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The headroom of a changing override in C against the same formulas in numpy, on random samples. No I/O. Run by
-pytest; starts and writes nothing.
+"""The headroom of a changing override in C against the same formulas in numpy, on random samples. Run by pytest;
+no I/O.
 """
 
 import numpy as np
