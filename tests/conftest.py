@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """What holds for every test: the same examples in every run, no deadline for each, Ctrl-C as processes know it, and
-folders of its own for what commands keep for their user.
+folders of its own for what commands keep for their user. Loaded by pytest; changes XDG_STATE_HOME and
+XDG_RUNTIME_DIR of the process, and makes a temporary folder.
 """
 
 import os

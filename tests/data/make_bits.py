@@ -4,8 +4,8 @@
     .venv/bin/python tests/data/make_bits.py
 
 They are kept, not made by each test: the tools plan in floating point, whose last bit may be another on the next
-machine, and the hashes of golden.txt (`make golden`) are compared bit by bit. Run this again only when the format
-changes.
+machine, and the hashes of golden.txt (`make golden`) are compared bit by bit. Run by hand, only when the
+format changes; replaces the files in the folder.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ Good images hold the alpha, the heart, the star and lines with all profiles. Bro
 docs/reference/protocol.md: the table gives the code that C and Python must both answer, with its segment or piece. All
 are to be checked against LIMITS (repeated in the table).
 
-The files are committed. Run this again when the format or the planning of stops changes:
+The files are committed. Run by hand when the format or the planning of stops changes:
 tests/host/program/test_golden.py compares the files with what this module makes.
 """
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fuzz.h (see there): support of the fuzz harnesses. */
+/* Implements fuzz.h (see there): support of the fuzz harnesses. Part of each fuzz harness; ends the process when a
+ * check fails. */
 #include "fuzz.h"
 
 #include <stdio.h>

@@ -4,7 +4,8 @@
  * encoded and decoded again, is the same frame. A request is replied to after fewer than ROUNDS_MAX waits, each longer
  * than 0.
  *
- * Input: requests (one byte each selects the kind), then characters.
+ * Input: requests (one byte each selects the kind), then characters. Run by `make fuzz`, and on its corpus by
+ * `make unit`; no other I/O.
  */
 #include <string.h>
 

@@ -6,7 +6,7 @@
  * longer than its deadline.
  *
  * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk
- * is there, then changes.
+ * is there, then changes. Run by `make fuzz`, and on its corpus by `make unit`; reads files of tests/data.
  */
 #include <math.h>
 #include <stdlib.h>

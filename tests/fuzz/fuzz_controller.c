@@ -6,7 +6,7 @@
  * transfer has brought, or taken, is the one that was sent, whatever came between its frames; and where the
  * configuration is still the first one, a sound bus and a reset lead out of everything.
  *
- * Input: one byte selects what happens next.
+ * Input: one byte selects what happens next. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
  */
 #include <stdlib.h>
 #include <string.h>

@@ -4,7 +4,8 @@
  * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and
  * with drives that were switched on anew, it ends.
  *
- * Input: writes to the configuration, then what becomes of each frame.
+ * Input: writes to the configuration, then what becomes of each frame. Run by `make fuzz`, and on its corpus by
+ * `make unit`; no other I/O.
  */
 #include <string.h>
 

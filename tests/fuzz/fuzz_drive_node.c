@@ -2,7 +2,7 @@
 /*
  * A simulated drive with any frames at any time: what it sends are frames, and after a reset its SDO server answers.
  *
- * Input: one byte selects what happens next.
+ * Input: one byte selects what happens next. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
  */
 #include <string.h>
 

@@ -3,7 +3,8 @@
  * Fault rules: any text to their parser, and what the injector and the drives do by the rules that it takes. A refusal
  * has one line; all frames that come out are frames; time that is due comes.
  *
- * Input: text up to the first byte 0, then frames and time.
+ * Input: text up to the first byte 0, then frames and time. Run by `make fuzz`, and on its corpus by `make unit`; no
+ * other I/O.
  */
 #include <string.h>
 

@@ -4,7 +4,8 @@
  * gets one reply, of frames of the bus; only frames and filters go to the bus; a request that is none ends the service.
  *
  * Input: how many frames wait on the bus, and these; then requests. The FIFOs are a pair of sockets that keep the
- * pieces apart, so all of them can be written before the gateway reads.
+ * pieces apart, so all of them can be written before the gateway reads. Run by `make fuzz`, and on its corpus by
+ * `make unit`; opens pairs of sockets.
  */
 #define _GNU_SOURCE
 #include <string.h>

@@ -3,7 +3,7 @@
  * The hub with processes that send anything: members, participants and others connect, send packets and leave, in real
  * and in virtual time. It closes connections that send what it does not understand, and serves the next one.
  *
- * Input: the kind of time, then who does what.
+ * Input: the kind of time, then who does what. Run by `make fuzz`, and on its corpus by `make unit`; opens sockets.
  */
 #define _GNU_SOURCE
 #include <stdio.h>

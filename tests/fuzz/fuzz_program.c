@@ -4,7 +4,8 @@
  * accepts for axes with limits runs to its end, or to the end of a stop, under holds, resumes, overrides and stops at
  * any tick: the setpoints keep the limits of each axis at every tick and stay within travel.
  *
- * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes.
+ * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes. Run by `make fuzz`,
+ * and on its corpus by `make unit`; reads files of tests/data.
  */
 #include <math.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
  * small_od.c), leaves constants alone, and serves the next honest client.
  *
  * Input: one byte selects what happens next: time, refusals, what an honest client would send next, the beginning of a
- * transfer, or any frame.
+ * transfer, or any frame. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
  */
 #include <string.h>
 

@@ -4,7 +4,8 @@
  * a loss of power at any operation leaves. With a store that it wrote itself the controller has the parameters from
  * before a save or those of the save, and nothing else.
  *
- * Input: what is in the banks; then values to save, and when the power goes.
+ * Input: what is in the banks; then values to save, and when the power goes. Run by `make fuzz`, and on its corpus by
+ * `make unit`; no other I/O.
  */
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * main() of a harness without libFuzzer: runs the files that it is given, or those of its corpus, tests/data/fuzz/NAME
- * for a program fuzz_NAME, in the root of the tree; and on the empty input. Each run may abort.
+ * for a program fuzz_NAME, in the root of the tree; and on the empty input. Each run may abort. Run by `make unit`;
+ * reads the files.
  */
 #define _GNU_SOURCE
 #include <dirent.h>

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A brake goes one way (docs/theory/proofs.md section 15.6). From every state that a falling tick can find,
- * whatever the products are that it compares: once the acceleration is not above 0 it stays so, and the speed does not
- * rise; the remainder is a state of the same kind,
- * or one from which the release phase takes two ticks or more (cbmc_settle.c).
+ * A brake goes one way (docs/theory/proofs.md section 15.6). From every state that a falling tick can find, whatever
+ * the products are that it compares: once the acceleration is not above 0 it stays so, and the speed does not rise; the
+ * remainder is a state of the same kind, or one from which the release phase takes two ticks or more (cbmc_settle.c).
+ * Analysed by CBMC in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --signed-overflow-check

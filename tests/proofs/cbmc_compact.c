@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins where
- * it has its whole length before the end of an image of up to 8 KiB that program_open accepts.
+ * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins
+ * where it has its whole length before the end of an image of up to 8 KiB that program_open accepts. Analysed by CBMC
+ * in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --unwind 40

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A constant override: a tick that searches a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
- * reset.
+ * reset. Analysed by CBMC in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The numbers of core/real.h, from any normal ones or 0: nothing overflows, every shift is in range, and what comes out is
- * normal or 0, with an exponent as real_contracts.h says. Quotients of mantissas are left open; none is by 0.
+ * The numbers of core/real.h, from any normal ones or 0: nothing overflows, every shift is in range, and what comes out
+ * is normal or 0, with an exponent as real_contracts.h says. Quotients of mantissas are left open; none is by 0.
+ * Analysed by CBMC in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --unwind 4

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of an
- * image of up to 16 KiB that program_open accepts, and its readers stay inside the record.
- * (For any size: h + s i + s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.)
+ * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of
+ * an image of up to 16 KiB that program_open accepts, and its readers stay inside the record. (For any size: h + s i +
+ * s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.) Analysed by CBMC in `make proofs`; never
+ * executed.
  *
  * prover: cbmc
  * options: --unwind 40

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The release phase of a brake (docs/theory/proofs.md section 15.6): as long as the jerks are not negative the speed does not rise
- * in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
+ * The release phase of a brake (docs/theory/proofs.md section 15.6): as long as the jerks are not negative the speed
+ * does not rise in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
+ * Analysed by CBMC in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --unwind 11 --unwinding-assertions --signed-overflow-check

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What check_speed lets through of a planar program is bounded as segment_bounds.h says: the five coefficients of sigma are positive, the
- * greatest is at most twice the least and a fifteenth of their sum at most 32, so each of them is at most 3 * 64. The
- * products stand for what eva_product.c shows of them.
+ * What check_speed lets through of a planar program is bounded as segment_bounds.h says: the five coefficients of sigma
+ * are positive, the greatest is at most twice the least and a fifteenth of their sum at most 32, so each of them is at
+ * most 3 * 64. The products stand for what eva_product.c shows of them. Analysed by CBMC in `make proofs`; never
+ * executed.
  *
  * prover: cbmc
  * options: --unwind 10

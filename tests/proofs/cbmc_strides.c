@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Segments, pieces, stops and events follow each other, with and without compact records: each begins where
- * cbmc_record.c and cbmc_compact.c say. Shown of the first ones, since a place is linear in the number of its record and in the
- * counts. The reader of stops stays inside its record: the last one, in an image that ends with it.
+ * cbmc_record.c and cbmc_compact.c say. Shown of the first ones, since a place is linear in the number of its record
+ * and in the counts. The reader of stops stays inside its record: the last one, in an image that ends with it. Analysed
+ * by CBMC in `make proofs`; never executed.
  *
  * prover: cbmc
  * options: --unwind 40

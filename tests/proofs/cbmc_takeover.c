@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The takeover of the next chunk (docs/theory/proofs.md section 15.7): whatever the state of the motion, after any tick,
- * command, takeover or other records the program under way is one of the two, at one of its pieces, with what its end means
- * and, where the plan goes on, with the record of that piece. A stop and a hold are never lost, a job that goes on never
- * counts as ended, a takeover in motion keeps time and piece, and other records change nothing else.
+ * The takeover of the next chunk (docs/theory/proofs.md section 15.7): whatever the state of the motion, after any
+ * tick, command, takeover or other records the program under way is one of the two, at one of its pieces, with what
+ * its end means and, where the plan goes on, with the record of that piece. A stop and a hold are never lost, a job
+ * that goes on never counts as ended, a takeover in motion keeps time and piece, and other records change nothing
+ * else.
  *
- * The functions that the motion calls do anything that their headers allow.
+ * The functions that the motion calls do anything that their headers allow. Analysed by CBMC in `make proofs`; never
+ * executed.
  *
  * prover: cbmc
  * options: --unwind 4 --unwinding-assertions --signed-overflow-check

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What proofs take for granted of qmath_clz64, which is the compiler's own; alone, for proofs that have the other functions of qmath. */
+/* What proofs take for granted of qmath_clz64, which is the compiler's own; alone, for proofs that have the other
+ * functions of qmath. Included by proofs of this folder; never executed. */
 #ifndef HODOGRAPH_CLZ_CONTRACT_H
 #define HODOGRAPH_CLZ_CONTRACT_H
 

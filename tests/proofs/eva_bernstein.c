@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The Bernstein form: halving any coefficients of any degree, and reading them, keeps inside the arrays and overflows
- * nowhere. Its search through the halves: docs/theory/proofs.md section 15.2.
+ * nowhere. Its search through the halves: docs/theory/proofs.md section 15.2. Analysed by Eva in `make proofs`; never
+ * executed.
  *
  * prover: eva
  * shows: bernstein_within bernstein_halve

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * feed_bounds and what it stands on, for every piece whose coefficients and duration are in range and for any bounds:
- * nothing overflows, every index and shift is in range, and the results are as piece_bounds.h says.
+ * nothing overflows, every index and shift is in range, and the results are as piece_bounds.h says. Analysed by Eva in
+ * `make proofs`; never executed.
  *
  * prover: eva
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A tick of the program clock and of the plan of its override, for any program of three pieces, wherever its
- * time is and after any command: nothing overflows, no window needs a piece after the last one. What the
- * plan decides: cbmc_plan.c. Which piece the clock is in: cbmc_ends.c.
+ * A tick of the program clock and of the plan of its override, for any program of three pieces, wherever its time is
+ * and after any command: nothing overflows, no window needs a piece after the last one. What the plan decides:
+ * cbmc_plan.c. Which piece the clock is in: cbmc_ends.c. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 10

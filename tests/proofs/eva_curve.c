@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The bound of one brake, from any start and with any codes: nothing overflows, also no unsigned number, so that no bound
- * is shortened by a wrap; no division by 0. What intervals do not follow: docs/theory/proofs.md section 15.2.
+ * The bound of one brake, from any start and with any codes: nothing overflows, also no unsigned number, so that no
+ * bound is shortened by a wrap; no division by 0. What intervals do not follow: docs/theory/proofs.md section 15.2.
+ * Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 100 -warn-unsigned-overflow

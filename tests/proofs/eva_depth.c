@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * How deep a tick of a brake may go, for any jerk of the stop table and any speed that is above two ticks of it and below
- * 2^31 of them: no number wraps or overflows, no shift is out of range, no division by 0, the root is above 3/2, and what
- * comes out is at most 2^62. By octaves. Rough numbers have 31 bits.
+ * How deep a tick of a brake may go, for any jerk of the stop table and any speed that is above two ticks of it and
+ * below 2^31 of them: no number wraps or overflows, no shift is out of range, no division by 0, the root is above 3/2,
+ * and what comes out is at most 2^62. By octaves. Rough numbers have 31 bits. Analysed by Eva in `make proofs`; never
+ * executed.
  *
  * prover: eva
  * options: -eva-slevel 20000 -warn-unsigned-overflow

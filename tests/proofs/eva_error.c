@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The text of any code: found inside the table, and never none.
+ * The text of any code: found inside the table, and never none. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * shows: program_error_text

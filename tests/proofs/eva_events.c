@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The rules of events, for up to twenty of them of any contents: no event is read that the image does not have.
+ * Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000

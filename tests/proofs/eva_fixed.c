@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The fixed kernel on any segment that passes the checks, at any arc length on it or 2^-33 mm outside: nothing overflows,
- * no conversion changes a number, no division by 0. A segment is given by the power of four above its sigma, of which all
- * 22 are gone through, and the least Bernstein coefficient, in seven ranges; the greatest is at most twice that.
+ * The fixed kernel on any segment that passes the checks, at any arc length on it or 2^-33 mm outside: nothing
+ * overflows, no conversion changes a number, no division by 0. A segment is given by the power of four above its sigma,
+ * of which all 22 are gone through, and the least Bernstein coefficient, in seven ranges; the greatest is at most twice
+ * that. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The first guess of z, as eva_fixed.c takes it: it has the sign of the arc length, is not 0 far outside, and nothing
- * overflows, for any slopes of the cubic that a speed ratio of 2 leaves, in 6 x 6 ranges, and 16 of t.
+ * overflows, for any slopes of the cubic that a speed ratio of 2 leaves, in 6 x 6 ranges, and 16 of t. Analysed by Eva
+ * in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 10

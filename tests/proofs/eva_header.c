@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * program_check and the rules of the header, for every header: no read outside of it, and what the checks of segments and
- * pieces start from.
+ * program_check and the rules of the header, for every header: no read outside of it, and what the checks of segments
+ * and pieces start from. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to six
- * path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record is requested that there is not, nothing overflows.
+ * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to
+ * six path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record
+ * is requested that there is not, nothing overflows. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 60

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * How much a product adds to a sum, as cbmc_speed.c takes it: a square is not negative, to rounding, and is large where its factor is,
- * and a product of small factors is small. The sum is 0 here; qwide_add_product only adds to it.
+ * How much a product adds to a sum, as cbmc_speed.c takes it: a square is not negative, to rounding, and is large where
+ * its factor is, and a product of small factors is small. The sum is 0 here; qwide_add_product only adds to it.
+ * Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * shows: qwide_add_product

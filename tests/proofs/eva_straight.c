@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The fixed kernel on a segment below all resolution, whose arc length is replaced, in the plane and in space: as
- * eva_fixed.c, with nothing taken for granted.
+ * eva_fixed.c, with nothing taken for granted. Analysed by Eva in `make proofs`; never executed.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the fixed kernel's functions promise each other beyond what intervals show: consequences of the positive Bernstein
- * coefficients of sigma (docs/theory/proofs.md section 15.3). Eva takes them for granted in eva_fixed.c, and
- * tests/unit/test_kernel_ranges.c holds the functions themselves to them at the corners.
+ * What the fixed kernel's functions promise each other beyond what intervals show: consequences of the positive
+ * Bernstein coefficients of sigma (docs/theory/proofs.md section 15.3). Eva takes them for granted in eva_fixed.c, and
+ * tests/unit/test_kernel_ranges.c holds the functions themselves to them at the corners. Included by eva_fixed.c and
+ * eva_guess.c; never executed.
  */
 #ifndef HODOGRAPH_KERNEL_BOUNDS_H
 #define HODOGRAPH_KERNEL_BOUNDS_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c,
- * eva_segment_length.c and eva_stops.c rely on it.
+ * eva_segment_length.c and eva_stops.c rely on it. Included by eva_bounds.c, eva_piece.c, eva_segment_length.c and
+ * eva_stops.c; never executed.
  */
 #ifndef HODOGRAPH_PIECE_BOUNDS_H
 #define HODOGRAPH_PIECE_BOUNDS_H

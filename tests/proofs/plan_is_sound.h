@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What holds of the plan of the override before and after every tick, `is_sound`: the override is in [0, 2], so is where a
- * ramp ends, no slope is greater than a change, and a ramp that is searched or about to begin is possible. cbmc_plan.c shows it for ticks at
- * rest, with every command, and from the first tick on; docs/theory/proofs.md section 15.4 argues it for ticks of a ramp.
+ * What holds of the plan of the override before and after every tick, `is_sound`: the override is in [0, 2], so is
+ * where a ramp ends, no slope is greater than a change, and a ramp that is searched or about to begin is possible.
+ * cbmc_plan.c shows it for ticks at rest, with every command, and from the first tick on; docs/theory/proofs.md
+ * section 15.4 argues it for ticks of a ramp.
  *
- * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut would
- * raise the override by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e (f + r) more:
- * three numbers of their own here.
+ * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut
+ * would raise the override by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e
+ * (f + r) more: three numbers of their own here. Included by cbmc_plan.c; never executed.
  */
 #ifndef HODOGRAPH_PLAN_IS_SOUND_H
 #define HODOGRAPH_PLAN_IS_SOUND_H

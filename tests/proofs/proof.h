@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What a proof is written with; the same words for both provers. tools/analysis/prove.py runs the proofs, and
- * docs/theory/proofs.md section 15 says what they show.
+ * docs/theory/proofs.md section 15 says what they show. Included by proofs of this folder; never executed.
  */
 #ifndef HODOGRAPH_PROOF_H
 #define HODOGRAPH_PROOF_H

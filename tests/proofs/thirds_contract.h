@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What proofs take for granted of the divisions of qmath by 3 and 5 (docs/theory/proofs.md section 15.2); alone, likewise. */
+/* What proofs take for granted of the divisions of qmath by 3 and 5 (docs/theory/proofs.md section 15.2); alone,
+ * likewise. Included by eva_brake.c, eva_fixed.c and qmath_contracts.h; never executed. */
 #ifndef HODOGRAPH_THIRDS_CONTRACT_H
 #define HODOGRAPH_THIRDS_CONTRACT_H
 

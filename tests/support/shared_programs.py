@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Programs that are computed once for all tests of a process.
+"""Programs that are computed once for all tests of a process. Used by conftest.py of several folders; keeps results in
+memory, no I/O.
 
 Most tests of a program's motion compile one of a few example files, which costs more processor time than the rest of
 the test. Commands in other processes compile as always.

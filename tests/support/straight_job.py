@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Chunks of a job that needs no planner: straight along x from the origin, to 16 mm/s in 0.5 s (4 mm), then pieces of
-1/32 s (0.5 mm) at 16 mm/s; each chunk ends in 0.5 s (4 mm). Segments of 4 mm. Every number is exact.
+"""Chunks of a job that needs no planner.
+
+The path is straight along x from the origin, to 16 mm/s in 0.5 s (4 mm), then pieces of 1/32 s (0.5 mm) at 16 mm/s;
+each chunk ends in 0.5 s (4 mm). Segments of 4 mm. Every number is exact. Used by tests of streaming and of the live
+page; no I/O.
 """
 
 from __future__ import annotations

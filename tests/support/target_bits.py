@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The programs of tests/data/bits, the runs that are made of them, and their golden hashes.
+"""The programs of tests/data/bits, the runs that are made of them, and their golden hashes. Used by test_target_bits.py
+and started by `make golden`; reads tests/data/bits, starts emulators and processes.
 
     python tests/support/target_bits.py      (make golden) writes golden.txt anew from the host's build
 

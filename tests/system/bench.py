@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A simulated machine on the bus, and paths of files; fixtures that make one are in conftest.py."""
+"""A simulated machine on the bus, and paths of files; fixtures that make one are in conftest.py. Used by the tests in
+this folder; one function writes to a folder that it is given.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Parts of the tests with python canopen as client: devices on a local bus in virtual time, a client of them, and
-frames made by hand.
+frames made by hand. Used by the tests in this folder; starts processes of the devices.
 """
 
 from __future__ import annotations

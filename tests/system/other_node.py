@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Another node on the bus that sends unexpected frames, drives that report a vendor, and checks of the machine
-afterwards.
+afterwards. Used by the tests in this folder; starts controllers and drives, and sends frames.
 """
 
 from __future__ import annotations

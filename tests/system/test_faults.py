@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Some scenarios of `make faults`, one seed each: what is injected is detected or survived, without a violation."""
+"""Some scenarios of `make faults`, one seed each: what is injected is detected or survived, without a violation. Run by
+pytest; starts controllers, drives and injectors on local buses, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""No tick that was ever counted is longer than the longest path through the instructions of its image."""
+"""No tick that was ever counted is longer than the longest path through the instructions of its image. Run by pytest;
+reads the images of `make firmware`, and runs one on an emulated board.
+"""
 
 from __future__ import annotations
 

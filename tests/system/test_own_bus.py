@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands without --bus: the local bus of this user if the Linux kernel has no vcan0; and `hodograph demo`."""
+"""Commands without --bus: the local bus of this user if the Linux kernel has no vcan0; and `hodograph demo`. Run by
+pytest; starts `hodograph` and hubs, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

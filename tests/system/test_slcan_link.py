@@ -2,7 +2,7 @@
 """An emulated board in real time, with SLCAN on its UART: no frame is lost in 10 000 ticks, either way.
 
 Its pace is printed, beside how late this computer itself was, and not judged: a tick that the host keeps the board from
-is left out, and no frame is lost by that.
+is left out, and no frame is lost by that. Run by pytest; starts an emulator, and opens a TCP port of this computer.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Streamed jobs that are cut at random instants, and continued: a few seeds of tools/stream_cuts.py."""
+"""Streamed jobs that are cut at random instants, and continued: a few seeds of tools/stream_cuts.py. Run by pytest;
+starts simulated machines and `hodograph` on local buses, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The same bits: what every target and every compiler makes of 203 programs, against the golden hashes.
 
-The emulators run the images of `make firmware`, this machine those of `make target-hosts`.
+The emulators run the images of `make firmware`, this machine those of `make target-hosts`. Run by pytest; starts
+emulators and processes, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The counter of instructions agrees with the clock of the core that is counted; the counts are the committed ones."""
+"""The counter of instructions agrees with the clock of the core that is counted; the counts are the committed ones. Run
+by pytest; starts emulators, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

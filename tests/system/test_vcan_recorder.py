@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The recorder on the CAN of the kernel: frames of a socket in batches, with the times that the kernel gives them."""
+"""The recorder on the CAN of the kernel: frames of a socket in batches, with the times that the kernel gives them. Run
+by pytest on vcan0; sends frames there.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: MIT */
+/* Implements checked.h (see there): the program in the store, and limits to check it against. Part of the images
+ * checker and stop_checker; reads the store. */
 #include "checked.h"
 
 #include <stdint.h>

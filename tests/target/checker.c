@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The check of a program, to count what it costs. Exit status 0: accepted. */
+/* An image that checks the program in the store, to count what the check costs. Exit status 0: accepted. Run on an
+ * emulated board by `make bench` (tools/analysis/checking.py); reads the store. */
 #include "checked.h"
 
 enum { STATUS_REFUSED = 1, STATUS_FILE = 5 };

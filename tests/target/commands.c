@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements commands.h (see there): commands to a motion, read from a file. */
+/* Implements commands.h (see there): commands to a motion, read from a file. Part of the
+ * images setpoints and isr; reads the file by semihosting. */
 #include "commands.h"
 
 #include "port/semihost/semihost.h"

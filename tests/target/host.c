@@ -4,7 +4,9 @@
  *
  *   PROGRAM STORE [WORD ...]
  *
- * STORE is a file with what the emulator would load into the store; the words are the command line of the image.
+ * STORE is a file with what the emulator would load into the store; the words are the command line of the image. Part
+ * of the programs of `make target-hosts`, which tests/system/test_target_bits.py runs; reads and writes the files of
+ * its command line.
  */
 #include <stdint.h>
 #include <stdio.h>

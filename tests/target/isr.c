@@ -6,6 +6,9 @@
  * took by the core's own clock (clock.h). The store holds one program image or several. A FILE of a name that trouble.h
  * has is not written: it makes the drives misbehave, in every program.
  *
+ * Run on emulated boards by `make count` and by the tests of the counts; reads and writes files of the host by
+ * semihosting.
+ *
  * What a real port adds: its own handler, and writing a frame into the controller's registers instead of memory.
  */
 #include <stdbool.h>

@@ -7,7 +7,8 @@
  *
  * COMMANDS is a file (commands.h) that each of the programs is run with. A hold that nothing ends lasts until the last
  * command; then the run of that program is over. COMMANDS is - for none. TIMES gets a u32 for each tick: what it took
- * by the core's own clock (clock.h).
+ * by the core's own clock (clock.h). Run on emulated boards and as a process by tests/system/test_target_bits.py and by
+ * `make count`; reads and writes files of the host by semihosting.
  */
 #include <stdbool.h>
 #include <stdint.h>

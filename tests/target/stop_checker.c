@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The proof of the stops of a program (core/brake_check.h), to count what it costs: piece by piece, hold and fault
- * stop, with the stop parameters that the program has. Exit status 0, whether or not they are proved.
+ * stop, with the stop parameters that the program has. Exit status 0, whether or not they are proved. Run on an
+ * emulated board by `make bench` (tools/analysis/checking.py); reads the store.
  */
 #include <stdint.h>
 

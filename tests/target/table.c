@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements table.h (see there): the place after the programs in the store where coefficient records go. */
+/* Implements table.h (see there): the place after the programs in the store where coefficient records go. Part of the
+ * images setpoints and isr; on one board it erases and writes flash pages. */
 #include "table.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements trouble.h (see there): what the drives of isr.c do wrong, by a word of the command line. */
+/* Implements trouble.h (see there): what the drives of isr.c do wrong, by a word of the command line. Part of the image
+ * isr; no I/O. */
 #include "trouble.h"
 
 #include <string.h>

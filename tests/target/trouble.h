@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * trouble: what the drives of isr.c do wrong, by a word of the command line.
+ * trouble: what the drives of isr.c do wrong, by a word of the command line. Used by isr.c; no I/O.
  *
  *   silent   both leave every third SYNC unanswered, which 0x2004 sub 9 (1) tolerates
  *   lost:K   the second answers no more from tick K on, which ends the program by a quick stop

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Makes the modules of tools/ importable."""
+"""Makes the modules of tools/ importable. Loaded by pytest; changes sys.path."""
 
 import sys
 from pathlib import Path

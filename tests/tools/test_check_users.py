@@ -145,7 +145,7 @@ def test_the_list_of_a_source_is_that_of_its_header(tmp_path: Path) -> None:
         ("tools/soak.py", '"""Long runs. Run by `make soak`. Starts processes."""\n', ()),
         ("tools/soak.py", '"""Long runs. Starts processes."""\n', ("users",)),
         ("tools/soak.py", "\n" * 40 + '"""Long. Used by x. No I/O."""\n', ("users", "effects")),
-        ("tests/unit/test_counts.c", LICENCE, ()),
+        ("tests/unit/test_counts.c", LICENCE, ("users", "effects")),
     ],
 )
 def test_users_and_effects_in_the_first_screen(

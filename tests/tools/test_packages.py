@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Sets of Debian packages: each one that the tree names is there, and the help of the tool names all."""
+"""Sets of Debian packages: each one that the tree names is there, and the help of the tool names all. Run by pytest;
+reads the files of the tree.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The committed sizes of the images are those of the commit; and the table says what changed."""
+"""The committed sizes of the images are those of the commit; and the table says what changed. Run by pytest; reads the
+images of `make firmware`.
+"""
 
 from __future__ import annotations
 

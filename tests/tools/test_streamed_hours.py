@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A streamed job on the emulated M4F, as tools/stream_soak.py runs it for hours: here a minute of it."""
+"""A streamed job on the emulated M4F, as tools/stream_soak.py runs it for hours: here a minute of it. Run by pytest;
+starts an emulator, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""docs/start/tutorial.md does what it says: its blocks run, print what stands below them, and leave its figures."""
+"""docs/start/tutorial.md does what it says: its blocks run, print what stands below them, and leave its figures. Run by
+pytest; starts the commands of the tutorial, and writes to a temporary folder.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app_bench.h (see there): a whole controller on the fake port, with two fake drives and an SDO client
- * as host, on a bus without delays. */
+/* Implements app_bench.h (see there): a whole controller on the fake port, with two fake drives and an SDO client as
+ * host, on a bus without delays. Part of the C tests; no I/O. */
 #include "app_bench.h"
 
 #include <string.h>

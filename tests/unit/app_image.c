@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app_image.h (see there): a program small enough to be written by hand. */
+/* Implements app_image.h (see there): a program small enough to be written by hand. Part of the C tests; no I/O. */
 #include "app_image.h"
 
 #include <string.h>

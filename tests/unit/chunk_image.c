@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements chunk_image.h (see there): chunks of a job that is small enough to be written by hand. */
+/* Implements chunk_image.h (see there): chunks of a job that is small enough to be written by hand. Part of the C
+ * tests; no I/O. */
 #include "chunk_image.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements chunked.h (see there): a planar program cut into the chunks of a job, for tests. */
+/* Implements chunked.h (see there): a planar program cut into the chunks of a job, for tests. Part of the C tests;
+ * no I/O. */
 #include "chunked.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements compact_image.h (see there): images with compact records, written field by field. */
+/* Implements compact_image.h (see there): images with compact records, written field by field. Part of the C tests;
+ * no I/O. */
 #include "compact_image.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements drive_bench.h (see there): one simulated drive on the bench. */
+/* Implements drive_bench.h (see there): one simulated drive on the bench. Part of the C tests; no I/O. */
 #include "drive_bench.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fake_drive.h (see there): an ideal CiA 402 drive for tests of the controller. */
+/* Implements fake_drive.h (see there): an ideal CiA 402 drive for tests of the controller. Part of the C tests; no
+ * I/O. */
 #include "fake_drive.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fake_port.h (see there): port.h for tests: a bus, a clock and a store in memory. */
+/* Implements fake_port.h (see there): port.h for tests: a bus, a clock and a store in memory. Part of the C tests;
+ * no I/O. */
 #include "fake_port.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fdcan_model.h (see there): a register model of FDCAN1 of an STM32G4. */
+/* Implements fdcan_model.h (see there): a register model of FDCAN1 of an STM32G4. Part of the C tests; no I/O. */
 #include "fdcan_model.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements flash_model.h (see there): a register model of the flash of an STM32G474. */
+/* Implements flash_model.h (see there): a register model of the flash of an STM32G474. Part of the C tests; no I/O. */
 #include "flash_model.h"
 
 #include <string.h>

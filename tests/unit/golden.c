@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements golden.h (see there): golden program images of tests/data for the C tests, which run in the root of
- * the repository. */
+/* Implements golden.h (see there): golden program images of tests/data for the C tests, which run in the root of the
+ * repository. Part of the C tests; reads files of tests/data. */
 #include "golden.h"
 
 #include <stdio.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements hub_thread.h (see there): a hub that runs in a thread of the test. */
+/* Implements hub_thread.h (see there): a hub that runs in a thread of the test. Part of the C tests; starts a
+ * thread, and opens sockets in /tmp. */
 #define _GNU_SOURCE
 #include "hub_thread.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements override_program.h (see there): programs for the override's property test. */
+/* Implements override_program.h (see there): programs for the override's property test. Part of the C tests and fuzz
+ * harnesses; reads files of tests/data. */
 #include "override_program.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements sdo_talk.h (see there): a client made of raw frames, for tests of the SDO server. */
+/* Implements sdo_talk.h (see there): a client made of raw frames, for tests of the SDO server. Part of the C tests;
+ * no I/O. */
 #include "sdo_talk.h"
 
 #include <string.h>

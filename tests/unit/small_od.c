@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements small_od.h (see there): a small object dictionary with recording hooks, for the tests of od and SDO. */
+/* Implements small_od.h (see there): a small object dictionary with recording hooks, for the tests of od and SDO.
+ * Part of the C tests; no I/O. */
 #include "small_od.h"
 
 #include <string.h>

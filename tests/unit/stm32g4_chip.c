@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements stm32g4_chip.h (see there): a register model of an STM32G474. */
+/* Implements stm32g4_chip.h (see there): a register model of an STM32G474. Part of the C tests; no I/O. */
 #include "stm32g4_chip.h"
 
 #include <stdio.h>

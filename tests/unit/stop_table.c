@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements stop_table.h (see there): the stop table of an image that a test has made, with the bounds that the
- * check requires. */
+ * check requires. Part of the C tests; no I/O. */
 #include "stop_table.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/machine/axis.h: one drive as the tick uses it. */
+/* Tests of app/machine/axis.h: one drive as the tick uses it. Run by `make unit`; no I/O. */
 #include "app/machine/axis.h"
 
 #include "unity.h"

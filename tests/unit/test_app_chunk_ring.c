@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Blocks of the ring lie apart, in the memory, and keep their bytes until they are freed. */
+/* Blocks of the ring lie apart, in the memory, and keep their bytes until they are freed. Run by `make unit`; no
+ * I/O. */
 #include "app/chunk_ring.h"
 
 #include <stddef.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The table "Commands by state" of docs/reference/architecture.md, every cell of it. */
+/* The table "Commands by state" of docs/reference/architecture.md, every cell of it. Run by `make unit`; no I/O. */
 #include "app/commands.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"

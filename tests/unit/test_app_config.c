@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/machine/config.h: the configuration of the host as one value. */
+/* Tests of app/machine/config.h: the configuration of the host as one value. Run by `make unit`; no I/O. */
 #include "app/machine/config.h"
 
 #include <string.h>

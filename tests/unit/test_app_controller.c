@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The whole controller against fake drives: finding them, switching on, running, stopping, faults.
- */
+/* The whole controller against fake drives: finding them, switching on, running, stopping, faults. Run by
+ * `make unit`; no I/O. */
 #include "app/commands.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"

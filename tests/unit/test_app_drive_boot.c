@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Configuration of the drives by SDO: order, what is optional, what is reported when it fails. */
+/* Configuration of the drives by SDO: order, what is optional, what is reported when it fails. Run by `make unit`;
+ * no I/O. */
 #include "app/drives/drive_boot.h"
 
 #include "canopen/pdo.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The reaction of the controller to drives, bus or operator that interrupt the program. Numbers of ticks are
- * those of docs/reference/architecture.md. */
+/* The reaction of the controller to drives, bus or operator that interrupt the program. Numbers of ticks are those
+ * of docs/reference/architecture.md. Run by `make unit`; no I/O. */
 #include <string.h>
 
 #include "app/commands.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The offsets of feedforward on the bus: in the right frames, in motion only. */
+/* The offsets of feedforward on the bus: in the right frames, in motion only. Run by `make unit`; no I/O. */
 #include "app/commands.h"
 #include "canopen/sdo_abort.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* When a homed axis counts as homed, what ends it, and that nothing runs along a program without it. */
+/* When a homed axis counts as homed, what ends it, and that nothing runs along a program without it. Run by
+ * `make unit`; no I/O. */
 #include "app/commands.h"
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"

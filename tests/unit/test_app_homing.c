@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/drives/homing.h: command 10, which homes one axis after the other. */
+/* Tests of app/drives/homing.h: command 10, which homes one axis after the other. Run by `make unit`; no I/O. */
 #include "app/drives/homing.h"
 
 #include "app/commands.h"

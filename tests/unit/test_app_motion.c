@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Hold, resume, override and start from a position, through the dictionary, on a bus without delays. */
+/* Hold, resume, override and start from a position, through the dictionary, on a bus without delays. Run by
+ * `make unit`; no I/O. */
 #include "app/commands.h"
 #include "app_bench.h"
 #include "app_image.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The table of handlers against the dictionary: a value with a handler is computed for every entry of the row. */
+/* The table of handlers against the dictionary: a value with a handler is computed for every entry of the row. Run
+ * by `make unit`; no I/O. */
 #include "app/objects.h"
 #include "canopen/sdo_abort.h"
 

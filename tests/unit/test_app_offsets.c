@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/machine/offsets.h: what feedforward adds to the setpoints of a motion, by axis of the path. */
+/* Tests of app/machine/offsets.h: what feedforward adds to the setpoints of a motion, by axis of the path. Run by
+ * `make unit`; no I/O. */
 #include "app/machine/offsets.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Outputs of the path at an I/O module: through the dictionary, compared with the positions of ideal drives, on a bus
- * without delays. */
+/* Outputs of the path at an I/O module: through the dictionary, compared with the positions of ideal drives, on a
+ * bus without delays. Run by `make unit`; no I/O. */
 #include <string.h>
 
 #include "app/commands.h"

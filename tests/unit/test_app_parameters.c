@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What a controller has after power-on: configuration, node number and program, wherever the power went before. */
+/* What a controller has after power-on: configuration, node number and program, wherever the power went before. Run
+ * by `make unit`; no I/O. */
 #include "app/parameter_store.h"
 
 #include <string.h>

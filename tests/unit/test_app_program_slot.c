@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Uploads that break off, are refused or do not fit leave the active program whole. */
+/* Uploads that break off, are refused or do not fit leave the active program whole. Run by `make unit`; no I/O. */
 #include "app/program_slot.h"
 
 #include <string.h>

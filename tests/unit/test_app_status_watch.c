@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/machine/statusword_monitor.h: bits of a drive's statusword in addition to those of the state, while it
- * is in Operation enabled. */
+/* Tests of app/machine/statusword_monitor.h: bits of a drive's statusword in addition to those of the state, while
+ * it is in Operation enabled. Run by `make unit`; no I/O. */
 #include "app/machine/statusword_monitor.h"
 
 #include "app/machine/fault.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* A job that comes in chunks, through the dictionary, on a bus without delays. */
+/* A job that comes in chunks, through the dictionary, on a bus without delays. Run by `make unit`; no I/O. */
 #include "app/stream.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Outputs of a job in chunks at an I/O module: each event of the job acts once, at its place, whenever the chunks
- * come. */
+ * come. Run by `make unit`; no I/O. */
 #include "app/commands.h"
 #include "app/stream.h"
 #include "app_bench.h"

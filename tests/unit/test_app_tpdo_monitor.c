@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of app/machine/tpdo_monitor.h: missed and late answers of a drive. */
+/* Tests of app/machine/tpdo_monitor.h: missed and late answers of a drive. Run by `make unit`; no I/O. */
 #include "app/machine/tpdo_monitor.h"
 
 #include "unity.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of node/axis_motion.h: the simulated axis of a drive node. */
+/* Tests of node/axis_motion.h: the simulated axis of a drive node. Run by `make unit`; no I/O. */
 #include "node/axis_motion.h"
 
 #include <stdlib.h>

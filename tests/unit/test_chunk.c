@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Chunks of a job: their check, and the takeover of the next one by the motion (core/chunk.h, core/feed_override.h).
- * The chunks are cut from golden programs (chunked.h), so that the whole program gives the right setpoints.
+ * The chunks are cut from golden programs (chunked.h), so that the whole program gives the right setpoints. Run by
+ * `make unit`; reads files of tests/data.
  */
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Both sides of the CiA 402 state machine, each against the standard's tables and against each other. */
+/* Both sides of the CiA 402 state machine, each against the standard's tables and against each other. Run by
+ * `make unit`; no I/O. */
 #include "canopen/cia402.h"
 
 #include "canopen/cia402_device.h"

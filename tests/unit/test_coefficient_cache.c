@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* A motion with a cache of records has the setpoints that it has with all of them, whatever the size of the cache; and
- * where the main loop makes none, the tick is refused and nothing else is read. */
+/* A motion with a cache of records has the setpoints that it has with all of them, whatever the size of the cache;
+ * and where the main loop makes none, the tick is refused and nothing else is read. Run by `make unit`; reads files
+ * of tests/data. */
 #include "core/coefficient_cache.h"
 
 #include <stdlib.h>

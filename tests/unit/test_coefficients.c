@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Coefficient records give the bits that the image gives expanded at the place, in any order of times. */
+/* Coefficient records give the bits that the image gives expanded at the place, in any order of times. Run by
+ * `make unit`; reads files of tests/data. */
 #include "core/coefficients.h"
 
 #include <stdlib.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of offline/contour.h: contour error. */
+/* Tests of offline/contour.h: contour error. Run by `make unit`; no I/O. */
 #include "offline/contour.h"
 
 #include <math.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of injector/delay_queue.h: frames that go out later. */
+/* Tests of injector/delay_queue.h: frames that go out later. Run by `make unit`; no I/O. */
 #include "injector/delay_queue.h"
 
 #include <string.h>

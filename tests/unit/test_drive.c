@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/drive.h: one simulated servo axis in cyclic synchronous position mode. */
+/* Tests of plant/drive.h: one simulated servo axis in cyclic synchronous position mode. Run by `make unit`; no I/O. */
 #include "plant/drive.h"
 
 #include <math.h>

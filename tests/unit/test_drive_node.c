@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of node/drive_node.h: one simulated servo drive on the bus. */
+/* Tests of node/drive_node.h: one simulated servo drive on the bus. Run by `make unit`; no I/O. */
 #include "node/drive_node.h"
 
 #include <string.h>

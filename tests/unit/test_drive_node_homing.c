@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of the homing mode of a simulated drive (sim/node/drive_homing.h). */
+/* Tests of the homing mode of a simulated drive (sim/node/drive_homing.h). Run by `make unit`; no I/O. */
 #include <math.h>
 
 #include "canopen/cia402.h"

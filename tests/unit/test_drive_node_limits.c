@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* What the drive supervises: following error, switches, software limits, overload, supply, encoder,
- * deadlines, short frames; and its objects for scaling, feedforward and actual values. */
+/* What the drive supervises: following error, switches, software limits, overload, supply, encoder, deadlines, short
+ * frames; and its objects for scaling, feedforward and actual values. Run by `make unit`; no I/O. */
 #include "canopen/cob.h"
 #include "canopen/sdo_abort.h"
 #include "drive_bench.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The drive as a whole through the states of CiA 402-2: commands, option codes, stops of the motor. */
+/* The drive as a whole through the states of CiA 402-2: commands, option codes, stops of the motor. Run by
+ * `make unit`; no I/O. */
 #include <math.h>
 
 #include "canopen/cob.h"

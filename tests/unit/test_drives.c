@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The drives of one process on a bus, of which the test is the hub: the other end of a pair of sockets. */
+/* The drives of one process on a bus, of which the test is the hub: the other end of a pair of sockets. Run by
+ * `make unit`; opens pairs of sockets, starts a thread, and writes a temporary file. */
 #define _GNU_SOURCE
 #include "node/drives.h"
 

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/emcy.h: emergency messages, error register 0x1001 and history 0x1003. */
+/* Tests of canopen/emcy.h: emergency messages, error register 0x1001 and history 0x1003. Run by `make unit`; no I/O. */
 #include "canopen/emcy.h"
 
 #include "canopen/cob.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/encoder.h: encoder on the motor shaft. */
+/* Tests of plant/encoder.h: encoder on the motor shaft. Run by `make unit`; no I/O. */
 #include "plant/encoder.h"
 
 #include "unity.h"

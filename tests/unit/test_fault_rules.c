@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of fault rules: their text, and when and how they act (sim/faults). */
+/* Tests of fault rules: their text, and when and how they act (sim/faults). Run by `make unit`; writes temporary
+ * files. */
 #define _POSIX_C_SOURCE 200809L /* mkstemp */
 
 #include <stdio.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Bounds of feed, acceleration and jerk against values sampled in double, for every piece of golden programs. */
+/* Bounds of feed, acceleration and jerk against values sampled in double, for every piece of golden programs. Run by
+ * `make unit`; reads files of tests/data. */
 #include "core/bernstein.h"
 #include "core/feed_bounds.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* When a hold may begin at once: far from the end of the program, by the worst stops of its header, or where it fits
- * before the end of the path. */
+ * before the end of the path. Run by `make unit`; reads files of tests/data. */
 #include "core/feed_override.h"
 
 #include "golden.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/feedforward.h: velocity and torque offsets (0x60B1, 0x60B2) that go with the setpoints of one
- * axis. */
+/* Tests of core/feedforward.h: velocity and torque offsets (0x60B1, 0x60B2) that go with the setpoints of one axis.
+ * Run by `make unit`; no I/O. */
 #include "core/feedforward.h"
 
 #include "unity.h"

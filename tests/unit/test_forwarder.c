@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Tests of injector/forwarder.h: passes every frame between the controller's bus and the drives', and injects the
- * faults of the fault rules. */
+ * faults of the fault rules. Run by `make unit`; no I/O. */
 #include "injector/forwarder.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The length of frames: figures of host_tools/hodograph/bustime/frame_bits.py, which was written apart from this
- * one. */
+ * one. Run by `make unit`; no I/O. */
 #include "hub/frame_bits.h"
 #include "unity.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The signals of the gateway: each of them asks the board to end, SIGHUP also if it comes twice. */
+/* The signals of the gateway: each of them asks the board to end, SIGHUP also if it comes twice. Run by `make unit`;
+ * sends signals to its own process. */
 #define _GNU_SOURCE
 #include "gateway/bus.h"
 

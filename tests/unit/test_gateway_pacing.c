@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Tests of gateway/pacing.h: when a request of the emulated board is answered, so that its ticks come as those of
- * the Linux port do (port/linux/schedule.h). */
+ * the Linux port do (port/linux/schedule.h). Run by `make unit`; opens a pair of sockets. */
 #include "gateway/pacing.h"
 
 #include <string.h>

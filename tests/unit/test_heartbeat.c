@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/heartbeat.h: producer (0x1017) and consumer (0x1016). */
+/* Tests of canopen/heartbeat.h: producer (0x1017) and consumer (0x1016). Run by `make unit`; no I/O. */
 #include "canopen/heartbeat.h"
 
 #include "canopen/cob.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* A local bus in real time: frames from each member to all others, in order; members come and go. */
+/* A local bus in real time: frames from each member to all others, in order; members come and go. Run by
+ * `make unit`; starts a hub in a thread, and opens sockets in /tmp. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <poll.h>
@@ -170,7 +171,9 @@ static void test_nobody_serves(void)
 static void test_the_path_is_taken(void)
 {
     static struct hub second;
-    const char *paths[2] = {"/tmp/hodograph-test-hub-free", hub_thread_paths[0]};
+    char unused[64]; /* of this process, since two runs of the tests may meet */
+    (void)snprintf(unused, sizeof unused, "/tmp/hodograph-test-hub-%ld-free", (long)getpid());
+    const char *paths[2] = {unused, hub_thread_paths[0]};
     size_t failed = 0;
     TEST_ASSERT_EQUAL(-EADDRINUSE, hub_open(&second, paths, 2, (struct hub_options){0}, &failed));
     TEST_ASSERT_EQUAL_size_t(1, failed);

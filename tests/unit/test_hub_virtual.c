@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests the hub in virtual time. One participant uses clock.h; the others send protocol messages directly. */
+/* Tests the hub in virtual time. One participant uses clock.h; the others send protocol messages directly. Run by
+ * `make unit`; starts a hub in a thread, and opens sockets in /tmp. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <signal.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/influence.h: what acts on an axis in addition to its setpoints. */
+/* Tests of plant/influence.h: what acts on an axis in addition to its setpoints. Run by `make unit`; no I/O. */
 #include "plant/influence.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/interpolator.h: program time in, point on the path out. */
+/* Tests of core/interpolator.h: program time in, point on the path out. Run by `make unit`; reads files of
+ * tests/data. */
 #include "core/interpolator.h"
 
 #include "core/override_plan.h"

@@ -4,7 +4,7 @@
  * sanitizers: nothing overflows. Corners are segments at the ratio of 2, straight ones, both along an axis and turned,
  * as large as their power of four allows and just larger, from 32 mm down to where arc length is replaced. There too
  * its own functions are held to what the provers take for granted of them (tests/proofs/kernel_bounds.h), which is why
- * it is included whole.
+ * it is included whole. Run by `make unit`; no I/O.
  */
 #include <math.h>
 #include <string.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The kernels on random segments that reach the limit of the speed ratio, from 32 mm to 1e-10 mm long: the bounds of
- * docs/theory/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.)
+ * docs/theory/numerics.md sections 9 to 12. (Against 50-digit arithmetic: benchmarks/kernels.py.) Run by `make unit`;
+ * no I/O.
  */
 #include <string.h>
 

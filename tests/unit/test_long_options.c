@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Tests of port/linux/long_options.h: reads the command line of a program, one option after the other, by
- * getopt_long. */
+ * getopt_long. Run by `make unit`; no I/O. */
 #include "port/linux/long_options.h"
 
 #include <stdint.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/motor.h: motor and ball screw. */
+/* Tests of plant/motor.h: motor and ball screw. Run by `make unit`; no I/O. */
 #include "plant/motor.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Tests of port/mps2/command_line.h: the words that the emulator hands on, in place of a board's straps and
- * switches. */
+ * switches. Run by `make unit`; no I/O. */
 #include "port/mps2/command_line.h"
 
 #include <stdio.h>

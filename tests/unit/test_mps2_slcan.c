@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* SLCAN on the UART of an emulated board: when the frames of a tick have left. The UART is a model; the core's
- * registers are stood in for here. */
+ * registers are stood in for here. Run by `make unit`; no I/O. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/nmt.h: the NMT slave's state machine and the master's commands. */
+/* Tests of canopen/nmt.h: the NMT slave's state machine and the master's commands. Run by `make unit`; no I/O. */
 #include "canopen/nmt.h"
 
 #include "canopen/cob.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of node/node_faults.h: faults injected into simulated drives. */
+/* Tests of node/node_faults.h: faults injected into simulated drives. Run by `make unit`; no I/O. */
 #include "node/node_faults.h"
 
 #include <string.h>

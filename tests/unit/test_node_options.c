@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of node/node_options.h: the command line of hodograph-drive. */
+/* Tests of node/node_options.h: the command line of hodograph-drive. Run by `make unit`; no I/O. */
 #include "node/node_options.h"
 
 #include <errno.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of offline/offline.h: the whole chain in one process, without a bus. */
+/* Tests of offline/offline.h: the whole chain in one process, without a bus. Run by `make unit`; no I/O. */
 #include "offline/offline.h"
 
 #include <math.h>

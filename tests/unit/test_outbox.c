@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The bus is the other end of a pair of sockets. */
+/* The bus is the other end of a pair of sockets. Run by `make unit`; opens a pair of sockets. */
 #define _GNU_SOURCE
 #include "injector/outbox.h"
 

@@ -6,7 +6,7 @@
  * differences of the setpoints), setpoints on the curve, brakes inside their numbers, stops inside their bounds,
  * states, end.
  *
- * HODOGRAPH_CASES: how many; HODOGRAPH_SEED: another sequence.
+ * HODOGRAPH_CASES: how many; HODOGRAPH_SEED: another sequence. Run by `make unit`; reads files of tests/data.
  */
 #include <math.h>
 #include <stdio.h>

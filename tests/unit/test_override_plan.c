@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/override_plan.h: which override ramp comes next towards the commanded override, and a tick
- * of it. */
+/* Tests of core/override_plan.h: which override ramp comes next towards the commanded override, and a tick of it.
+ * Run by `make unit`; reads files of tests/data. */
 #include "core/override_plan.h"
 
 #include <string.h>

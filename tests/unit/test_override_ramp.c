@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/override_ramp.h: ramps of the feed override from one constant value to another. */
+/* Tests of core/override_ramp.h: ramps of the feed override from one constant value to another. Run by `make unit`;
+ * no I/O. */
 #include "core/override_ramp.h"
 
 #include <math.h>

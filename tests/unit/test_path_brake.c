@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/path_brake.h: a path stop: an S-curve of path speed, decided anew in each tick. */
+/* Tests of core/path_brake.h: a path stop: an S-curve of path speed, decided anew in each tick. Run by `make unit`;
+ * no I/O. */
 #include "core/path_brake.h"
 
 #include <math.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Events of a program: what the check refuses, and what a tick makes of them. */
+/* Events of a program: what the check refuses, and what a tick makes of them. Run by `make unit`; reads files of
+ * tests/data. */
 #include "core/path_outputs.h"
 
 #include <stdlib.h>

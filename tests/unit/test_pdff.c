@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of plant/pdff.h: PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time. */
+/* Tests of plant/pdff.h: PDFF servo loop (pseudo-derivative feedback with feedforward), one sample at a time. Run by
+ * `make unit`; no I/O. */
 #include "plant/pdff.h"
 
 #include "unity.h"

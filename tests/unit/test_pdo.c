@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/pdo.h: the fixed process data of the bus. */
+/* Tests of canopen/pdo.h: the fixed process data of the bus. Run by `make unit`; no I/O. */
 #include "canopen/pdo.h"
 
 #include "canopen/cob.h"

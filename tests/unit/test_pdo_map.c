@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/pdo_map.h: one remappable PDO of a device. */
+/* Tests of canopen/pdo_map.h: one remappable PDO of a device. Run by `make unit`; no I/O. */
 #include "canopen/pdo_map.h"
 
 #include "canopen/cob.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* The Linux port on SocketCAN: when the frames of a tick have been sent. The kernel, the clock and the interrupts are
- * stood in for here; every test is linked with fake_port, so the functions of port.h are compiled under other names. */
+/* The Linux port on SocketCAN: when the frames of a tick have been sent. The kernel, the clock and the interrupts
+ * are stood in for here; every test is linked with fake_port, so the functions of port.h are compiled under other
+ * names. Run by `make unit`; no I/O. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <stdbool.h>

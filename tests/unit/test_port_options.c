@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The messages go to stderr and are checked in tests/system. */
+/* The messages go to stderr and are checked in tests/system. Run by `make unit`; prints to stderr. */
 #include "port/linux/options.h"
 
 #include "unity.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of port/linux/schedule.h: when the next tick is due. */
+/* Tests of port/linux/schedule.h: when the next tick is due. Run by `make unit`; no I/O. */
 #include "port/linux/schedule.h"
 
 #include "unity.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The store of the Linux port (port/linux/store.c) in a file: what is written stays, and a disk that takes no more
- * gives an error. */
+ * gives an error. Run by `make unit`; writes a temporary file. */
 #define _GNU_SOURCE
 #include <signal.h>
 #include <stdio.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/program.h: reading header, segments, feed pieces and stops of a program image. */
+/* Tests of core/program.h: reading header, segments, feed pieces and stops of a program image. Run by `make unit`;
+ * reads files of tests/data. */
 #include "core/program.h"
 
 #include <stdlib.h>

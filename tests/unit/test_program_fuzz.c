@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Seeded mutations of golden programs, with a right CRC so that they reach the checks. Whatever happens, nothing
- * is read beyond the image and nothing is undefined (the sanitizers watch); and what is accepted runs: every kernel, at
+ * Seeded mutations of golden programs, with a right CRC so that they reach the checks. Whatever happens, nothing is
+ * read beyond the image and nothing is undefined (the sanitizers watch); and what is accepted runs: every kernel, at
  * two periods a tick, without a jump and without leaving the travel limits; and where the axes have limits, its
- * setpoints keep them. HODOGRAPH_FUZZ_CASES changes the number.
+ * setpoints keep them. HODOGRAPH_FUZZ_CASES changes the number. Run by `make unit`; reads files of tests/data.
  */
 #include <math.h>
 #include <stdlib.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of core/program_time.h: the program time at which a program comes to an arc length. */
+/* Tests of core/program_time.h: the program time at which a program comes to an arc length. Run by `make unit`;
+ * reads files of tests/data. */
 #include "core/program_time.h"
 
 #include "core/interpolator.h"

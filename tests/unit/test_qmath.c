@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The integer helpers against plain 128-bit-free identities and small cases that can be computed by hand. */
+/* The integer helpers against plain 128-bit-free identities and small cases that can be computed by hand. Run by
+ * `make unit`; no I/O. */
 #include "core/qmath.h"
 
 #include "core/bernstein.h"

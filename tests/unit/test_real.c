@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* real: against double, over the range that checks use. */
+/* real: against double, over the range that checks use. Run by `make unit`; no I/O. */
 #include <math.h>
 
 #include "core/real.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Random and half-right frames. The SDO server must keep to the rules of its hooks (checked in small_od.c), touch no
- * byte that is not its own (sanitizers), leave constants alone, and serve the next honest client. */
+ * byte that is not its own (sanitizers), leave constants alone, and serve the next honest client. Run by
+ * `make unit`; no I/O. */
 #include "canopen/sdo_client.h"
 #include "canopen/sdo_server.h"
 

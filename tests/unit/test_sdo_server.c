@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Expedited and segmented transfers. Frames are written as CiA 301 draws them. */
+/* Expedited and segmented transfers. Frames are written as CiA 301 draws them. Run by `make unit`; no I/O. */
 #include "canopen/sdo_server.h"
 
 #include <string.h>

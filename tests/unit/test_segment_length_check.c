@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Which pieces count for a stretch of two segments: those that reach into it, with the slack of a piece's ends. */
+/* Which pieces count for a stretch of two segments: those that reach into it, with the slack of a piece's ends. Run
+ * by `make unit`; reads files of tests/data. */
 #include "core/segment_length_check.h"
 
 #include "canopen/cob.h"

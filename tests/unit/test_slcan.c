@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of can/slcan.h: CAN frames as lines of text, as LAWICEL's adapters and their many descendants have them. */
+/* Tests of can/slcan.h: CAN frames as lines of text, as LAWICEL's adapters and their many descendants have them. Run
+ * by `make unit`; no I/O. */
 #include "can/slcan.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Ticks, interrupts, watchdog, clocks, pins and console of the NUCLEO-G474RE port on a model of the chip. */
+/* Ticks, interrupts, watchdog, clocks, pins and console of the NUCLEO-G474RE port on a model of the chip. Run by
+ * `make unit`; no I/O. */
 #include <string.h>
 
 #include "fdcan_model.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The driver of FDCAN1 on a model of its registers: timing, filters, both directions, bus-off. */
+/* The driver of FDCAN1 on a model of its registers: timing, filters, both directions, bus-off. Run by `make unit`;
+ * no I/O. */
 #include "port/stm32g4/fdcan.h"
 
 #include <string.h>

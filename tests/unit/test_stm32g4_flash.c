@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The program store on a model of the flash: every rule of the chip kept, and the power cut at every operation. */
+/* The program store on a model of the flash: every rule of the chip kept, and the power cut at every operation. Run
+ * by `make unit`; reads files of tests/data. */
 #include "port/stm32g4/flash_store.h"
 
 #include <stdlib.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The functions of port.h as the board has them, on a model of the chip: every test is linked with fake_port, so they
- * are compiled here under other names. */
+/* The functions of port.h as the board has them, on a model of the chip: every test is linked with fake_port, so
+ * they are compiled here under other names. Run by `make unit`; no I/O. */
 #define port_begin          board_begin
 #define port_end            board_end
 #define port_stop_requested board_stop_requested

@@ -8,7 +8,8 @@
  * varies from the smallest that works to one that holds whole chunks. With a large cache the main loop is sometimes one
  * tick late.
  *
- * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on.
+ * HODOGRAPH_CASES: how many cuts; HODOGRAPH_SEED: another sequence; HODOGRAPH_FIRST: only those from this one on. Run
+ * by `make unit`; reads files of tests/data.
  */
 #include <math.h>
 #include <stdio.h>

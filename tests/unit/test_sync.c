@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of canopen/sync.h: SYNC with counter, producer and consumer. */
+/* Tests of canopen/sync.h: SYNC with counter, producer and consumer. Run by `make unit`; no I/O. */
 #include "canopen/sync.h"
 
 #include "canopen/cob.h"

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Tests of node/sync_clock.h: the time base of a simulated drive. */
+/* Tests of node/sync_clock.h: the time base of a simulated drive. Run by `make unit`; no I/O. */
 #include "node/sync_clock.h"
 
 #include <string.h>

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Who gets the next grant, and when time advances. */
+/* Who gets the next grant, and when time advances. Run by `make unit`; no I/O. */
 #include "hub/virtual_time.h"
 #include "unity.h"
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Answers of a controller that are lost, or that come to a transfer which it has ended meanwhile."""
+"""Answers of a controller that are lost, or that come to a transfer which it has ended meanwhile. Run by pytest; the
+node is a class, and nothing is opened or started.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Straight moves: from count to count exactly, inside the machine's limits, however short or long. Run by pytest;
-uses a virtual bus of python-can in this process.
+opens a virtual bus of python-can in this process.
 """
 
 from __future__ import annotations

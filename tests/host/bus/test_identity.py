@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A node that differs from the EDS is refused before any command is sent to it."""
+"""A node that differs from the EDS is refused before any command is sent to it. Run by pytest; the node is a class, and
+temporary files are written.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Campaign files in a temporary folder, over a short path."""
+"""Campaign files in a temporary folder, over a short path. Loaded by pytest; writes to temporary folders."""
 
 from __future__ import annotations
 

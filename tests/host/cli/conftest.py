@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Programs of the same motion share their stops in these tests."""
+"""Programs of the same motion share their stops in these tests. Loaded by pytest; no I/O."""
 
 import pytest
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Output of commands besides their results: notes, progress, numbers as text."""
+"""Output of commands besides their results: notes, progress, numbers as text. Run by pytest; starts `hodograph` and
+opens pseudo terminals, and writes to temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph init and schema: initial files that work without changes, and schemas for editors."""
+"""hodograph init and schema: initial files that work without changes, and schemas for editors. Run by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

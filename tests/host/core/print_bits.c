@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* print_bits FILE KERNEL: prints the CRC-32 of all points of a program, with a hold near its end. Built and run by
- * test_same_bits.py. */
+/* print_bits FILE KERNEL: prints the CRC-32 of all points of a program, with a hold near its end. Run by
+ * test_same_bits.py, which builds it; reads FILE. */
 #include <stdio.h>
 #include <stdlib.h>
 

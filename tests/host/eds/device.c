@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* device: one CANopen node made of firmware/canopen, as a shared library for test_interop.py
- * (ctypes). */
+/* device: one CANopen node made of firmware/canopen, as a shared library. Loaded by test_interop.py (ctypes). Frames
+ * go to and from memory; no I/O. */
 #include <string.h>
 
 #include "canopen/emcy.h"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Lateness of ticks from the times of SYNC frames, and the command that measures it."""
+"""Lateness of ticks from the times of SYNC frames, and the command that measures it. Run by pytest; starts a bus."""
 
 from __future__ import annotations
 

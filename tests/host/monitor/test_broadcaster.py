@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Queues to the browsers are bounded, and nothing that matters is lost from them."""
+"""Queues to the browsers are bounded, and nothing that matters is lost from them. Run by pytest; starts and writes
+nothing.
+"""
 
 from __future__ import annotations
 

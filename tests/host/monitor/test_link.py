@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Commands of browsers interrupt the reading of the program, and stops wait for nobody; a program is read again after a
-failure.
+failure. Run by pytest; bus and controller are classes, and nothing is opened or started.
 """
 
 from __future__ import annotations

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The page shows no values of a bus that is silent or lost as if they were present ones."""
+"""The page shows no values of a bus that is silent or lost as if they were present ones. Run by pytest; starts threads,
+and opens no bus.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Permissions of the live page: who may see it, who may command."""
+"""Permissions of the live page: who may see it, who may command. Run by pytest; starts and writes nothing."""
 
 from __future__ import annotations
 

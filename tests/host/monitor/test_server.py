@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The server of the live page, with requests of browsers and of other clients."""
+"""The server of the live page, with requests of browsers and of other clients. Run by pytest; starts the server on a
+free port of this computer.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fixtures of these tests."""
+"""Makes `stops_planned_once` of tests/support/shared_programs.py a fixture of these tests. Loaded by pytest; no I/O."""
 
 from shared_programs import stops_planned_once
 

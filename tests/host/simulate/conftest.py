@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Examples as images, drives, splines and simulated runs, for the tests of the simulation."""
+"""Examples as images, drives, splines and simulated runs, for the tests of the simulation. Loaded by pytest; reads the
+examples.
+"""
 
 from __future__ import annotations
 

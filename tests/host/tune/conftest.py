@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The machine of the alpha and its drives, for the tests of `hodograph tune`."""
+"""The machine of the alpha and its drives, for the tests of `hodograph tune`. Loaded by pytest; reads the examples."""
 
 from __future__ import annotations
 
