@@ -9,7 +9,7 @@ them. `stream` makes its sections by `SectionMaker` too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -39,9 +39,11 @@ from .toolpath.moves import (
     DigitalOutput,
     Dwell,
     Message,
+    Position,
     Spindle,
     ToolChange,
     ToolOffset,
+    WorkFrame,
 )
 
 Real = NDArray[np.float64]
@@ -256,8 +258,8 @@ def load_job(
             f"--tolerance {tolerance_mm:g}: must be from 0 to {GREATEST_TOLERANCE_MM:g} mm"
         )
     reading, notes = reading or ReadOptions(), list[str]()
-    commands = toolpath_commands(file, reading, notes)
-    path = divided(commands, tolerance_mm, str(file), laser_mode=in_laser_mode(machine))
+    commands, start = toolpath_commands(file, machine, reading, notes), work_frame(machine).start
+    path = divided(commands, tolerance_mm, str(file), start, laser_mode=in_laser_mode(machine))
     if not path.sections:
         raise InputError(f"{file}: moves nothing: a job needs a move of 2 um at least")
     maker = SectionMaker(file, machine, replaced_feed_mm_s(file, reading), notes, EqualSections())
@@ -267,9 +269,24 @@ def load_job(
     return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
 
 
-def toolpath_commands(file: Path, reading: ReadOptions, notes: list[str]) -> Iterator[Command]:
+def work_frame(machine: Machine) -> WorkFrame:
+    """Where a toolpath lies in a machine, and where it starts."""
+    letters = [*AXES[:3], *(axis.name.lower() for axis in machine.path_axes[3:])]
+    offset = dict(zip(letters, machine.offset_mm, strict=False))
+    start = dict(zip(letters, machine.start_mm, strict=False))
+    return WorkFrame(_position(offset), _position(start))
+
+
+def _position(by_letter: Mapping[str, float]) -> Position:
+    x, y, z, a, b, c = (by_letter.get(letter, 0.0) for letter in AXES)
+    return (x, y, z, a, b, c)
+
+
+def toolpath_commands(
+    file: Path, machine: Machine, reading: ReadOptions, notes: list[str]
+) -> Iterator[Command]:
     """The commands of a file; notes of the reader of a drawing or of points are added to `notes`. Raises InputError."""
-    for command in read_toolpath(file, reading):
+    for command in read_toolpath(file, reading, work_frame(machine)):
         if isinstance(command, Message) and not is_gcode(file):
             place = f"{file}:{command.line}" if command.line else str(file)
             notes.append(f"{place}: {command.text}")

@@ -152,7 +152,10 @@ def test_a_job_does_not_go_on_on_a_changed_machine(
     machine.write_text(text.replace(was, now, 1))
     done = run_command(clock, "stream", "--continue", "--journal", str(tmp_path / "stream.json"))
     assert done.returncode == 2, (bench.controller.targets(3), done.stderr)
-    assert f"{machine}: its work offset, axes, limits or outputs have been changed" in done.stderr
+    assert (
+        f"{machine}: its work offset, start, axes, limits or outputs have been changed"
+        in done.stderr
+    )
     assert bench.controller.targets(3) == rests
     machine.write_text(text)
     _continued(clock, tmp_path)

@@ -159,6 +159,9 @@ def _process_data(reader: NodeReader, machine: Machine) -> Iterator[Finding]:
         )
         for index, text in objects:
             yield from _must(reader, index, 0, f"{text}, in {name}")
+    text = "event timer of RPDO1; the controller writes it"
+    without = "the drive stops late without setpoints: at the loss of SYNC or heartbeat"
+    yield from _may(reader, 0x1400, 5, text, without)
     if machine.torque_feedforward:
         text, without = "torque offset, in RPDO1", "this axis gets no torque feedforward"
         yield from _may(reader, 0x60B2, 0, text, without)

@@ -37,7 +37,8 @@ class Machine:
     """The contents of a machine file. The limits are the controller's own and always apply.
 
     stop_time_ms  a program whose fault stop may take longer is refused
-    offset_mm     one number for each axis of the path
+    offset_mm     machine position of position 0 of a path: one number for each axis of the path
+    start_mm      where a toolpath starts, without offset_mm: one number for each axis of the path
     axes          first those that follow the path, in its order; then those that hold their position, as in the file
     path_count    how many of them follow the path
     """
@@ -54,6 +55,7 @@ class Machine:
     stop_time_ms: int
     start_tolerance_mm: float
     offset_mm: tuple[float, ...]
+    start_mm: tuple[float, ...]
     supervision: Supervision
     axes: tuple[Axis, ...]
     path_count: int
@@ -118,6 +120,7 @@ class Machine:
             first_axis=first,
             path_count=self.path_count - first,
             offset_mm=self.offset_mm[first:],
+            start_mm=self.start_mm[first:],
         )
 
     @property
@@ -200,7 +203,7 @@ def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
     root = Table(file, "", contents, _SECTIONS)
     bus = root.table("bus", ("bitrate", "period_us"), required=False)
     controller = root.table("controller", _CONTROLLER)
-    work = root.table("work", ("offset_mm",), required=False)
+    work = root.table("work", ("offset_mm", "start_mm"), required=False)
     node = controller.integer("node", 1, low=1, high=127)
     acceleration_mm_s2 = controller.number("acceleration_mm_s2", low=0.1, high=4e6)
     given = read_axes(root, node, acceleration_mm_s2)
@@ -217,7 +220,8 @@ def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
         reserve=controller.number("reserve", 0.1, low=0, high=0.9),
         stop_time_ms=controller.integer("stop_time_ms", 250, low=1, high=60_000),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
-        offset_mm=_offset(work, max(len(path), PLANE_AXES)),
+        offset_mm=_place(work, "offset_mm", max(len(path), PLANE_AXES)),
+        start_mm=_place(work, "start_mm", max(len(path), PLANE_AXES)),
         supervision=_supervision(root),
         axes=path + tuple(axis for axis in given if axis not in path),
         path_count=len(path),
@@ -257,10 +261,10 @@ def _drawn(file: Path, path: tuple[Axis, ...]) -> tuple[Axis, ...]:
     return path
 
 
-def _offset(work: Table, count: int) -> tuple[float, ...]:
-    if not work.has("offset_mm"):
+def _place(work: Table, key: str, count: int) -> tuple[float, ...]:
+    if not work.has(key):
         return (0.0,) * count
-    return work.vector("offset_mm", count, low=-4096, high=4096)
+    return work.vector(key, count, low=-4096, high=4096)
 
 
 def _period(bus: Table) -> int:

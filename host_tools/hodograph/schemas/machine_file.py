@@ -51,7 +51,7 @@ def machine_file() -> Schema:
                 },
             ),
             "work": parts.table(
-                "Work offset",
+                "Where a path lies in the machine",
                 {
                     "offset_mm": parts.vector(
                         "Added to every point of a path; one number for each of its axes",
@@ -59,7 +59,14 @@ def machine_file() -> Schema:
                         MAX_AXES,
                         -4096,
                         4096,
-                    )
+                    ),
+                    "start_mm": parts.vector(
+                        "Where a toolpath starts, in its own coordinates; one number for each of its axes",
+                        2,
+                        MAX_AXES,
+                        -4096,
+                        4096,
+                    ),
                 },
             ),
             "outputs": outputs(),

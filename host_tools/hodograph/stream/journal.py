@@ -91,8 +91,8 @@ def mark(file: Path) -> FileMark:
 
 
 def machine_mark(machine: Machine) -> str:
-    """SHA-256 of what decides where a job's path is and how its curves run: work offset, outputs, the limits of the
-    motion, and of each path axis counts, homing, drive scaling and limits.
+    """SHA-256 of what decides where a job's path is and how its curves run: work offset, start, outputs, the limits of
+    the motion, and of each path axis counts, homing, drive scaling and limits.
     """
     axes = tuple(
         (
@@ -108,7 +108,7 @@ def machine_mark(machine: Machine) -> str:
         for axis in machine.path_axes
     )
     motion = (machine.feed_mm_s, machine.acceleration_mm_s2, machine.jerk_mm_s3)
-    text = repr((machine.offset_mm, machine.outputs, motion, axes))
+    text = repr((machine.offset_mm, machine.start_mm, machine.outputs, motion, axes))
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -116,8 +116,8 @@ def require_same_machine(entry: Entry, machine: Machine) -> None:
     """Raises InputError: the rest of the job would be cut at another place, or on another curve."""
     if machine_mark(machine) != entry.machine_sha256:
         raise InputError(
-            f"{entry.machine}: its work offset, axes, limits or outputs have been changed since the job was streamed: "
-            "change them back, or stream the job from its start"
+            f"{entry.machine}: its work offset, start, axes, limits or outputs have been changed since the job was "
+            "streamed: change them back, or stream the job from its start"
         )
 
 

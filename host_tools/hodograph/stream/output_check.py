@@ -51,7 +51,7 @@ def _read(file: Path, machine: Machine, reading: ReadOptions) -> None:
     """Reads all commands. Raises InputError."""
     outputs, missing = machine.outputs, missing_axes(machine)
     maker = None if outputs is None else EventMaker(outputs, file)
-    for command in toolpath_commands(file, reading, []):
+    for command in toolpath_commands(file, machine, reading, []):
         if isinstance(command, Move):
             turned = [name for name in missing if command.end[AXES.index(name)] != 0.0]
             if turned:

@@ -28,6 +28,7 @@ from ..job import (
     in_laser_mode,
     section_commands,
     toolpath_commands,
+    work_frame,
 )
 from ..job_outputs import EventMaker, without_effect
 from ..spline.spatial import sliced
@@ -35,7 +36,7 @@ from ..toolpath.files import ReadOptions, replaced_feed_mm_s
 from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import SHORTEST_MM, turns
-from ..toolpath.moves import ORIGIN, Command, Move
+from ..toolpath.moves import Command, Move
 from .geometry import Block, with_joints
 
 WINDOW_CHORDS = 1500
@@ -206,8 +207,9 @@ class StreamReader:
         commands at rest after it are known, when the next one begins.
         """
         sag = SAG_SHARE * (self.tolerance_mm or EXACT_MM)
+        start = work_frame(self.machine).start
         divider = _Windows(
-            str(self.file), self.tolerance_mm, ReferenceBuilder(ORIGIN, sag), window=FIRST_CHORDS
+            str(self.file), self.tolerance_mm, ReferenceBuilder(start, sag), window=FIRST_CHORDS
         )
         divider.tolerance_mm = self.tolerance_mm
         divider.laser_mode = in_laser_mode(self.machine)
@@ -238,7 +240,7 @@ class StreamReader:
     def _commands(self) -> Iterator[Command]:
         """The commands of the file. The first one of each kind that the machine does not execute is noted."""
         noted: set[str] = set()
-        for command in toolpath_commands(self.file, self.reading, self.notes):
+        for command in toolpath_commands(self.file, self.machine, self.reading, self.notes):
             kind = ignored_kind(command, self.machine.outputs)
             if kind is not None and kind not in noted:
                 noted.add(kind)

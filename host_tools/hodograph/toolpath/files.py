@@ -21,7 +21,7 @@ from ..names import (
     POINT_SUFFIXES,
     STANDARD_INPUT,
 )
-from .moves import Command
+from .moves import Command, WorkFrame
 
 # A reader is imported when a file of its kind is read, since the readers load modules that other commands do not need.
 if TYPE_CHECKING:
@@ -98,24 +98,29 @@ def asked_tolerance_mm(tolerance_mm: float, options: ReadOptions) -> float:
     return max(tolerance_mm, options.noise_mm or 0.0)
 
 
-def read_toolpath(file: Path, options: ReadOptions) -> Iterator[Command]:
+def read_toolpath(
+    file: Path, options: ReadOptions, frame: WorkFrame | None = None
+) -> Iterator[Command]:
     """The commands of a file; the last one is ProgramEnd. A file with an unknown ending is read as points.
+
+    frame  where the toolpath lies in the machine; None: at machine position 0, and starts there
 
     The iterator raises all errors, the call raises none. InputError: the file cannot be read, a drawing has no feed, or
     files of this kind do not accept an option. ToolpathError: the reader cannot read the file further.
     """
     _check_options(file, options)
+    frame = frame or WorkFrame()
     suffix = file.suffix.lower()
     if suffix == ".dxf":
         from .dxf import read_dxf
 
-        yield from read_dxf(file, _drawing_options(file, options))
+        yield from read_dxf(file, _drawing_options(file, options, frame))
     elif suffix in DRAWING_SUFFIXES:
         from .svg import read_svg
 
-        yield from read_svg(file, _drawing_options(file, options))
+        yield from read_svg(file, _drawing_options(file, options, frame))
     else:
-        yield from _read_lines(file, options)
+        yield from _read_lines(file, options, frame)
 
 
 def _check_options(file: Path, options: ReadOptions) -> None:
@@ -126,7 +131,7 @@ def _check_options(file: Path, options: ReadOptions) -> None:
             raise InputError(f"{file}: {option} is for {', '.join(suffixes)}: leave it out")
 
 
-def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
+def _drawing_options(file: Path, options: ReadOptions, frame: WorkFrame) -> DrawingOptions:
     from .drawing import DrawingOptions
 
     if options.feed_mm_s is None:
@@ -142,11 +147,12 @@ def _drawing_options(file: Path, options: ReadOptions) -> DrawingOptions:
         unit_mm=options.unit_mm,
         layers=options.layers,
         ids=options.ids,
+        start=frame.start,
         **given,
     )
 
 
-def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
+def _read_lines(file: Path, options: ReadOptions, frame: WorkFrame) -> Iterator[Command]:
     """The commands of G-code or points, read line by line from a file or from stdin."""
     from_input = str(file) == STANDARD_INPUT
     place: Path | int = 0 if from_input else file
@@ -158,6 +164,8 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
                 from .gcode import Options, read_gcode
 
                 own = Options(
+                    work=frame.offset,
+                    start=frame.start,
                     feed_mm_s=options.feed_mm_s,
                     block_delete=options.block_delete,
                     optional_stops=not options.skip_optional_stops,
@@ -166,14 +174,14 @@ def _read_lines(file: Path, options: ReadOptions) -> Iterator[Command]:
             else:
                 from .points import read_points
 
-                yield from read_points(lines, str(file), _point_options(options))
+                yield from read_points(lines, str(file), _point_options(options, frame))
     except FileNotFoundError:
         raise InputError(f"{file}: no such file") from None
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from None
 
 
-def _point_options(options: ReadOptions) -> PointOptions:
+def _point_options(options: ReadOptions, frame: WorkFrame) -> PointOptions:
     from .points import PointOptions
 
     return PointOptions(
@@ -183,4 +191,5 @@ def _point_options(options: ReadOptions) -> PointOptions:
         columns=options.columns,
         noise_mm=0.0 if options.noise_mm is None else options.noise_mm,
         closed=options.closed,
+        start=frame.start,
     )

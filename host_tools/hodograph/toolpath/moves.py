@@ -5,10 +5,11 @@ toolpath readers, jobs, streaming. No I/O.
 A toolpath is a sequence of the classes below (`Command`). All are frozen. Each carries `line`, the number of the source
 line that it comes from (1-based; 0 if the source has no lines).
 
-Positions are machine positions of the controlled point: tuples of six numbers (x, y, z in mm; a, b, c in degrees).
-They contain all offsets: a point of a program is the same number here only while every offset is 0. An axis that a
-program does not name keeps its number of the start position. A move starts where the one before it ends; the first one
-starts at the start position given to its reader.
+Positions are path positions of the controlled point: tuples of six numbers (x, y, z in mm; a, b, c in degrees). They
+contain all offsets of the program: a point of a program is the same number here only while every offset is 0. They do
+not contain the work offset of the machine file (`WorkFrame`). An axis that a program does not name keeps its number of
+the start position. A move starts where the one before it ends; the first one starts at the start position given to its
+reader.
 
 Speeds are in mm/s, times in s, rotational speeds in rev/min.
 """
@@ -25,6 +26,18 @@ Position = tuple[float, float, float, float, float, float]
 """x, y, z in mm; a, b, c in degrees."""
 
 ORIGIN: Position = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class WorkFrame:
+    """Where a toolpath lies in the machine.
+
+    offset  machine position of path position 0: `[work] offset_mm` of the machine file
+    start   path position at which the toolpath starts: `[work] start_mm`
+    """
+
+    offset: Position = ORIGIN
+    start: Position = ORIGIN
 
 
 class Plane(enum.Enum):

@@ -87,7 +87,7 @@ class PointOptions:
     scale       factor on x, y and z
     closed      whether the path returns to the first point
     noise_mm    greatest distance of points from the curve that they sample; 0: the tolerance alone counts
-    start       position at which the toolpath starts
+    start       position at which the toolpath starts; a coordinate without a column is 0 in all points
     Raises InputError: a number or name out of its range.
     """
 
@@ -258,7 +258,7 @@ class _Reader:
             return None
         if table.shape != (len(lines), layout.count):
             return None
-        columns: list[Iterable[float]] = [repeat(each) for each in self._options.start]
+        columns: list[Iterable[float]] = [repeat(0.0) for _ in ORIGIN]
         for column, axis, factor in layout.axes:
             values = table[:, column] * factor
             if not (np.abs(values) < MOST_MM).all():
@@ -280,7 +280,7 @@ class _Reader:
                 number, f"{len(fields)} columns, where the first line has {layout.count}"
             )
         places = _places(line, fields)
-        position = list(self._options.start)
+        position = list(ORIGIN)
         for column, axis, factor in layout.axes:
             value = self._value(number, fields[column], places[column], layout) * factor
             if not abs(value) < MOST_MM:

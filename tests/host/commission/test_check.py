@@ -70,6 +70,7 @@ def complete() -> dict[Place, int | bytes]:
     for index in (0x1400, 0x1401, 0x1800):
         objects |= {(index, 1): 0x200, (index, 2): 1, (index + 0x200, 0): 2}
     objects |= {(index, 0): 0 for index in (0x6040, 0x607A, 0x60B1, 0x60B2, 0x6041, 0x60FD)}
+    objects[0x1400, 5] = 0
     identity = X.identity
     objects |= {(0x1018, 1): identity.vendor, (0x1018, 2): identity.product}
     return objects | {
@@ -114,6 +115,15 @@ def test_what_the_controller_may_do_without_is_none(place: Place) -> None:
     objects = complete()
     del objects[place]
     assert [one for one in check(objects) if one.verdict == FAULT] == []
+
+
+def test_a_drive_without_event_timer_stops_late() -> None:
+    """Then only the loss of SYNC or heartbeat stops it, after other times than setpoint_timeout_ms."""
+    objects = complete()
+    del objects[0x1400, 5]
+    (found,) = [one for one in check(objects) if one.verdict != OK]
+    assert (found.index, found.sub, found.verdict) == (0x1400, 5, NOTE)
+    assert "stops late" in found.text
 
 
 @pytest.mark.parametrize("index", [0x1400, 0x1600, 0x1800, 0x1A00, 0x6040, 0x607A, 0x6041, 0x6064])

@@ -108,7 +108,7 @@ MACHINE: Document = {
         "program_bytes": 129_008,
     },
     "supervision": {"answer_wait_ms": 2, "missed_max": 1, "setpoint_timeout_ms": 50},
-    "work": {"offset_mm": [1, 2]},
+    "work": {"offset_mm": [1, 2], "start_mm": [3, 4]},
     "outputs": {
         "node": 16,
         "delay_ticks": 2,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hodograph.config import load_machine
+from hodograph.config import Machine, load_machine
 from hodograph.job import toolpath_commands
 from hodograph.stream import reading
 from hodograph.stream.reading import StreamReader
@@ -52,8 +52,10 @@ def test_a_section_waits_for_what_is_at_rest_after_it(
     found = reader(tmp_path, machine, "G1 X10\nM65 P0\nG4 P1\nG1 X10.0001\nM62 P0\nG1 X20")
     read_moves: list[Move] = []
 
-    def counted(file: Path, options: ReadOptions, notes: list[str]) -> Iterator[Command]:
-        for command in toolpath_commands(file, options, notes):
+    def counted(
+        file: Path, machine: Machine, options: ReadOptions, notes: list[str]
+    ) -> Iterator[Command]:
+        for command in toolpath_commands(file, machine, options, notes):
             if isinstance(command, Move):
                 read_moves.append(command)
             yield command

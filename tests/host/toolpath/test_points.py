@@ -48,7 +48,13 @@ def test_a_rapid_move_to_the_first_point_and_straight_moves_at_feed() -> None:
 
 def test_the_start_is_not_approached_where_the_path_begins_there() -> None:
     assert ends_of("0,0\n1,0\n") == [(1.0, 0.0, 0.0)]
-    assert ends_of("5,5\n1,0\n", start=(5.0, 5.0, 2.0, 0.0, 0.0, 0.0)) == [(1.0, 0.0, 2.0)]
+    assert ends_of("5,5\n1,0\n", start=(5.0, 5.0, 0.0, 0.0, 0.0, 0.0)) == [(1.0, 0.0, 0.0)]
+
+
+def test_points_without_z_are_at_0_wherever_the_path_starts() -> None:
+    """The start may be above the work."""
+    ends = ends_of("5,5\n1,0\n", start=(5.0, 5.0, 20.0, 0.0, 0.0, 0.0))
+    assert ends == [(5.0, 5.0, 0.0), (1.0, 0.0, 0.0)]
 
 
 @pytest.mark.parametrize(

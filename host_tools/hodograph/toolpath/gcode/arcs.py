@@ -37,7 +37,7 @@ Point = tuple[float, float]
 def arc(
     block: Block, modes: Modes, where: Coordinates, motion: int, end: Position, feed: Feed
 ) -> ArcMove:
-    """The move of a block with G2 (motion 20) or G3 (30) to machine position `end`.
+    """The move of a block with G2 (motion 20) or G3 (30) to path position `end`.
 
     Raises ToolpathError: the words for the centre are missing or contradict each other, or no such arc exists.
     """
@@ -57,12 +57,12 @@ def arc(
     turns = block.integer("p", "P of an arc", 1, MOST_TURNS) if "p" in block.values else 1
     at_centre = list(there_all)
     at_centre[first], at_centre[second] = centre
-    machine = where.to_machine(position_of(at_centre))
+    centre_path = where.to_path(position_of(at_centre))
     return ArcMove(
         block.line.number,
         end,
         modes.plane,
-        (machine[first], machine[second]),
+        (centre_path[first], centre_path[second]),
         turns if motion == COUNTERCLOCKWISE else -turns,
         feed,
     )

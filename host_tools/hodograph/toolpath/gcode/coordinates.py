@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Coordinate systems: from the numbers of a program to machine positions and back. Used by toolpath/gcode. No I/O;
-changes its own object and the parameters that it was given.
+"""Coordinate systems: from the numbers of a program to path positions and back. Used by toolpath/gcode. No I/O; changes
+its own object and the parameters that it was given.
 
-    machine position = R (program position + G92 offset) + origin of the coordinate system + tool offset
+    path position    = R (program position + G92 offset) + origin of the coordinate system + tool offset
+    machine position = path position + work offset of the machine file
 
-R turns x and y about z by the rotation of the coordinate system (G10 L2 R). Everything here is in mm and degrees; the
-interpreter converts units. The tables are in parameters with the numbers of RS274/NGC, so that a program can
-read them:
+Only G53, G28, G30 and their parameters have machine positions; `reference` and `store_reference` convert them. R turns
+x and y about z by the rotation of the coordinate system (G10 L2 R). Everything here is in mm and degrees; the
+interpreter converts units. The tables are in parameters with the numbers of RS274/NGC, so that a program can read them:
 
-    5161 to 5166                    reference point of G28
-    5181 to 5186                    reference point of G30
+    5161 to 5166                    reference point of G28, a machine position
+    5181 to 5186                    reference point of G30, a machine position
     5210                            whether the G92 offset is active
     5211 to 5216                    G92 offset
     5220                            number n of the active coordinate system, 1 to 9
@@ -56,12 +57,14 @@ def minus(left: Position, right: Position) -> Position:
 class Coordinates:
     """The active coordinate system, the G92 offset and the tool offset.
 
-    `shift` is the sum of all offsets; without a rotation a machine position is a program position plus `shift`.
+    `shift` is the sum of all offsets of the program; without a rotation a path position is a program position plus
+    `shift`. `work` is the work offset of the machine file.
     """
 
-    def __init__(self, parameters: Parameters) -> None:
+    def __init__(self, parameters: Parameters, work: Position = ORIGIN) -> None:
         """System 1 (G54), as the parameters have it; no tool offset."""
         self._parameters = parameters
+        self.work = work
         self.system = 1
         self.origin = ORIGIN
         self.rotation_deg = 0.0
@@ -80,6 +83,14 @@ class Coordinates:
         """Set six parameters from number `first` on."""
         for axis, number in enumerate(position):
             self._parameters.set(first + axis, number)
+
+    def reference(self, first: int) -> Position:
+        """The path position of a reference point, whose parameters begin at number `first`."""
+        return minus(self.stored(first), self.work)
+
+    def store_reference(self, first: int, path: Position) -> None:
+        """Make a path position a reference point."""
+        self.store(first, plus(path, self.work))
 
     def select(self, system: int) -> None:
         """Make a coordinate system the active one, with its origin and rotation."""
@@ -116,18 +127,18 @@ class Coordinates:
         """Use the stored G92 offset."""
         self.set_g92(self.stored(G92_OFFSET))
 
-    def to_machine(self, program: Position) -> Position:
-        """The machine position of a program position."""
+    def to_path(self, program: Position) -> Position:
+        """The path position of a program position."""
         if self.rotation_deg == 0.0:
             return plus(program, self.shift)
         turned = _turned(plus(program, self.g92), self.rotation_deg)
         return plus(plus(turned, self.origin), self.tool)
 
-    def to_program(self, machine: Position) -> Position:
-        """The program position of a machine position."""
+    def to_program(self, path: Position) -> Position:
+        """The program position of a path position."""
         if self.rotation_deg == 0.0:
-            return minus(machine, self.shift)
-        from_origin = minus(minus(machine, self.tool), self.origin)
+            return minus(path, self.shift)
+        from_origin = minus(minus(path, self.tool), self.origin)
         return minus(_turned(from_origin, -self.rotation_deg), self.g92)
 
     def set_origin(self, system: int, change: Callable[[int, float], float]) -> None:
@@ -142,11 +153,11 @@ class Coordinates:
         self._parameters.set(rotation_parameter(system), angle_deg)
         self._reselect(system)
 
-    def set_origin_here(self, system: int, machine: Position, want: dict[int, float]) -> None:
-        """Store the origin with which `machine` has these program coordinates, by axis (G10 L20)."""
+    def set_origin_here(self, system: int, path: Position, want: dict[int, float]) -> None:
+        """Store the origin with which `path` has these program coordinates, by axis (G10 L20)."""
         first = origin_parameter(system)
         angle = self._parameters.number(rotation_parameter(system))
-        from_tool = minus(machine, self.tool)
+        from_tool = minus(path, self.tool)
         turned = _turned(minus(from_tool, self.stored(first)), -angle)
         program = list(minus(turned, self.g92))
         for axis, number in want.items():

@@ -62,7 +62,7 @@ class _Drill:
             return
         for axis, number in targets.items():
             self.here[axis] = number
-        self.end = self._where.to_machine(position_of(self.here))
+        self.end = self._where.to_path(position_of(self.here))
         self.commands.append(StraightMove(self._line, self.end, None if rapid else self._feed))
 
     def dwell(self, duration_s: float) -> None:
@@ -72,7 +72,7 @@ class _Drill:
 def cycle(
     block: Block, modes: Modes, where: Coordinates, motion: int, feed: Feed
 ) -> tuple[list[Command], Position]:
-    """The commands of a block with a canned cycle, and the machine position at its end.
+    """The commands of a block with a canned cycle, and the path position at its end.
 
     Raises ToolpathError: inverse time, a word is missing or out of range, or R is below the bottom.
     """

@@ -78,7 +78,7 @@ class Interpreter:
         self.options = options
         self.parameters = Parameters()
         options.store_tables(self.parameters)
-        self.coordinates = Coordinates(self.parameters)
+        self.coordinates = Coordinates(self.parameters, self.options.work)
         self.modes = Modes(position=options.start)
         self.ended = False
         add_system_parameters(self.parameters, self.modes, self.coordinates)
@@ -254,7 +254,7 @@ class Interpreter:
         elif code in (280, 300):
             self._go_home(block, G28_POINT if code == 280 else G30_POINT, commands)
         elif code in (281, 301):
-            where.store(G28_POINT if code == 281 else G30_POINT, self.modes.position)
+            where.store_reference(G28_POINT if code == 281 else G30_POINT, self.modes.position)
         elif code == 920:
             self._set_g92(block)
         elif code == 53:
@@ -296,7 +296,7 @@ class Interpreter:
         """G28 and G30: by the programmed point, if there is one, to the stored point."""
         self.modes.spline_handle = None
         home, words, where = (
-            self.coordinates.stored(point),
+            self.coordinates.reference(point),
             self._axis_words(block),
             self.coordinates,
         )
@@ -305,7 +305,7 @@ class Interpreter:
             self._rapid(block, between, commands)
             if where.rotation_deg != 0.0:
                 target, old = where.to_program(home), where.to_program(between)
-                home = where.to_machine(_replaced(old, {axis: target[axis] for axis in words}))
+                home = where.to_path(_replaced(old, {axis: target[axis] for axis in words}))
             else:
                 home = _replaced(between, {axis: home[axis] for axis in words})
         self._rapid(block, home, commands)
@@ -318,18 +318,18 @@ class Interpreter:
         return self.coordinates.to_program(self.modes.position)
 
     def _end(self, block: Block) -> Position:
-        """The machine position that the axis words of a block give."""
+        """The path position that the axis words of a block give."""
         modes, where = self.modes, self.coordinates
         words = self._axis_words(block)
         if block.has_any(POLAR_LETTERS):
             return self._polar_end(block, words)
         if block.g.get(Group.NON_MODAL) == 530:
-            return _replaced(modes.position, words)
+            return _replaced(
+                modes.position, {axis: mm - where.work[axis] for axis, mm in words.items()}
+            )
         if where.rotation_deg != 0.0:
             here = where.to_program(modes.position)
-            return where.to_machine(
-                _replaced(here, words) if modes.absolute else _added(here, words)
-            )
+            return where.to_path(_replaced(here, words) if modes.absolute else _added(here, words))
         if not modes.absolute:
             return _added(modes.position, words)
         shifted = {axis: number + where.shift[axis] for axis, number in words.items()}
@@ -339,7 +339,7 @@ class Interpreter:
         here = self._program_position()
         target = polar_target(block, self.modes, here[:2])
         end = _replaced(here, words) if self.modes.absolute else _added(here, words)
-        return self.coordinates.to_machine(end if target is None else (*target, *end[2:]))
+        return self.coordinates.to_path(end if target is None else (*target, *end[2:]))
 
     def _feed(self, block: Block) -> Feed:
         """The feed of the motion of a block. Raises ToolpathError if it has none."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Modal state of the interpreter: settings that stay in force from block to block, and the machine position. Used by
+"""Modal state of the interpreter: settings that stay in force from block to block, and the path position. Used by
 toolpath/gcode. No I/O.
 """
 
@@ -28,7 +28,7 @@ class CycleWords:
 
 @dataclass(slots=True)
 class SplineBuilder:
-    """A NURBS between its first G5.2 and G5.3: control points as machine positions."""
+    """A NURBS between its first G5.2 and G5.3: control points as path positions."""
 
     line: int
     order: int
@@ -40,7 +40,7 @@ class SplineBuilder:
 class Modes:
     """The state after a block. It begins as in LinuxCNC: G17 G21 G40 G49 G54 G64 G80 G90 G91.1 G94 G97 G99.
 
-    `position` is the machine position; `unit_mm` is the length of a program unit. `feed_word` is the last F as it was
+    `position` is the path position; `unit_mm` is the length of a program unit. `feed_word` is the last F as it was
     programmed and `feed_unit_mm` the unit in force then. `spline_handle`: control point from which a G5 without I and J
     continues.
     """

@@ -20,8 +20,9 @@ MOST_JUMPS = 1_000_000
 class Options:
     """Settings of the machine at the start of a program; lengths in mm, angles in degrees.
 
-    start           machine position at which the program starts
-    origins         origins of coordinate systems 1 (G54) to 9 (G59.3); those not given are 0
+    work            machine position of path position 0: the work offset of the machine file
+    start           path position at which the program starts
+    origins         origins of coordinate systems 1 (G54) to 9 (G59.3), as path positions; those not given are 0
     g28, g30        reference points, as machine positions
     tools           offset of each tool by its number. None: every tool has offset 0, so that positions are those of
                     the tool's tip. With a table, a tool that is not in it is refused.
@@ -34,6 +35,7 @@ class Options:
     fast_path       whether plain straight moves are read without the general interpreter. The moves are the same.
     """
 
+    work: Position = ORIGIN
     start: Position = ORIGIN
     origins: Mapping[int, Position] = field(default_factory=dict)
     g28: Position = ORIGIN

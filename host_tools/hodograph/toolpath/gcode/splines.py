@@ -34,7 +34,7 @@ def knots_of(count: int, order: int) -> tuple[float, ...]:
 def bezier(
     block: Block, modes: Modes, where: Coordinates, motion: int, end: Position, feed: Feed
 ) -> SplineMove:
-    """The move of a block with G5 (motion 50) or G5.1 (51) to machine position `end`.
+    """The move of a block with G5 (motion 50) or G5.1 (51) to path position `end`.
 
     Raises ToolpathError: another plane, or words are missing.
     """
@@ -54,7 +54,7 @@ def bezier(
                 raise block.motion_error(f"G5.1 needs {letter.upper()}")
         i, j = block.values["i"] * modes.unit_mm, block.values["j"] * modes.unit_mm
         inner = [_moved(start, i, j)]
-    points = (modes.position, *map(where.to_machine, inner), end)
+    points = (modes.position, *map(where.to_path, inner), end)
     count = len(points)
     return SplineMove(
         block.line.number, points, (1.0,) * count, knots_of(count, count), count - 1, feed
@@ -82,7 +82,7 @@ def _moved(point: Position, x: float, y: float) -> Position:
 
 
 def add_control_point(block: Block, modes: Modes, end: Position) -> None:
-    """Execute a block with G5.2, whose control point is machine position `end`.
+    """Execute a block with G5.2, whose control point is path position `end`.
 
     Raises ToolpathError: another plane, inverse time, steps (G91), or words are missing or out of range.
     """

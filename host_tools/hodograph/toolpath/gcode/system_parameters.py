@@ -43,7 +43,7 @@ def add_system_parameters(parameters: Parameters, modes: Modes, where: Coordinat
     for axis, letter in enumerate(AXES):
         numbers[5401 + axis] = _tool_offset(where, axis)
         numbers[5420 + axis] = names[f"_{letter}"] = _program_coordinate(modes, where, axis)
-        names[f"_abs_{letter}"] = _machine_coordinate(modes, axis)
+        names[f"_abs_{letter}"] = _machine_coordinate(modes, where, axis)
     for name, is_true in _flags(modes).items():
         names[name] = _as_number(is_true)
     names["_call_level"] = lambda: float(parameters.level)
@@ -94,5 +94,5 @@ def _program_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
     return lambda: modes.in_program_units(axis, where.to_program(modes.position)[axis])
 
 
-def _machine_coordinate(modes: Modes, axis: int) -> Getter:
-    return lambda: modes.position[axis]
+def _machine_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
+    return lambda: modes.position[axis] + where.work[axis]
