@@ -79,7 +79,7 @@ def machine_file() -> Schema:
 
 def _controller() -> Schema:
     return parts.table(
-        "The controller, and its own limits along the path, which always bind",
+        "The controller, and its own limits along the path, for every program",
         {
             "node": parts.integer("Node number", 1, 127, 1),
             "kernel": parts.choice("Number kernel", KERNELS, "fixed"),
