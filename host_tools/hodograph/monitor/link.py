@@ -3,8 +3,9 @@
 between.
 
 A command does not wait until a state has been read: it is sent between two objects of it, and it breaks off the
-transfer of a program. A hold, a stop and a quick stop do not wait for other commands either, nor for other clients of
-the controller's SDO channel. In virtual time the thread is a participant, and its waits are counted in that time.
+transfer of a program. So does another client of the SDO channel that waits too long. A hold, a stop and a quick stop do
+not wait for other commands either, nor for other clients of the controller's SDO channel. In virtual time the thread is
+a participant, and its waits are counted in that time.
 
 Used by monitor/session. Reads and writes objects of the controller by SDO; a participant is a process on a bus in
 virtual time.
@@ -63,6 +64,12 @@ _MOVES = ("running", "holding", "held")
 LONGEST_UPLOAD = 256 * 1024
 """A program up to this size is read from the controller and drawn; larger ones would occupy the bus for too long."""
 
+PATIENCE_S = (3.0, 6.0, 12.0, 20.0)
+"""How long another client of the SDO channel waits for the end of the transfer of a program, by attempt. It would give
+up after TURN_WAIT_S, so a later attempt would end its job."""
+_SEGMENTS_UNWATCHED = 64
+"""Segments between two looks whether another client waits."""
+
 Command = Callable[[Controller], None]
 
 
@@ -102,6 +109,8 @@ class Link:
         self._ending = threading.Event()
         self._in_command = self._in_stop = False
         self._program_runs = False
+        self._attempts = (0, 0)
+        """CRC-32 of a program, and how often other clients have broken off its transfer."""
         self._clock: VirtualClock | None = None
         """Clock of the present connection in virtual time."""
         self._thread = threading.Thread(target=self._work, name="monitor-link", daemon=True)
@@ -262,13 +271,26 @@ class Link:
         elif program["size"] > LONGEST_UPLOAD:
             self._show_program(None, "the program is too long to be fetched: give it as --program")
         else:
-            image = None
-            with suppress(RefusedError, BusError):
-                image = _fetch(controller, self._has_other_work)
-            if image is None:
-                self._crc32 = None  # once more at the next poll
-            else:
-                self._show_program(image, "")
+            self._read_program(controller, crc32)
+
+    def _read_program(self, controller: Controller, crc32: int) -> None:
+        """Reads the program in the controller, if other clients leave the time for it."""
+        attempt = self._attempts[1] if self._attempts[0] == crc32 else 0
+        if attempt == len(PATIENCE_S):
+            self._show_program(
+                None, "other commands use the controller: give the program as --program"
+            )
+            return
+        others = _Others(controller, PATIENCE_S[attempt])
+        image = None
+        with suppress(RefusedError, BusError):
+            image = _fetch(controller, lambda: self._has_other_work() or others.wait_too_long())
+        if others.gave_way:
+            self._attempts = (crc32, attempt + 1)
+        if image is None:
+            self._crc32 = None  # once more at the next poll
+        else:
+            self._show_program(image, "")
 
     def _shows_job(self, status: dict[str, Any]) -> bool:
         """Whether the path of a streamed job is the one to show: until the controller has none any more, or runs its
@@ -285,6 +307,32 @@ class Link:
 
     def _has_other_work(self) -> bool:
         return self._ending.is_set() or not (self._commands.empty() and self._stops.empty())
+
+
+class _Others:
+    """Watches whether another client of the SDO channel waits for longer than `patience_s`."""
+
+    def __init__(self, controller: Controller, patience_s: float) -> None:
+        self._controller = controller
+        self._patience_s = patience_s
+        self._unwatched = 0
+        self._since_s: float | None = None
+        self.gave_way = False
+        """Whether `wait_too_long` was true."""
+
+    def wait_too_long(self) -> bool:
+        """Call it at each segment."""
+        self._unwatched += 1
+        if self._unwatched < _SEGMENTS_UNWATCHED:
+            return False
+        self._unwatched = 0
+        now_s = self._controller.clock.now_s()
+        if not self._controller.is_wanted():
+            self._since_s = None
+        elif self._since_s is None:
+            self._since_s = now_s
+        self.gave_way = self._since_s is not None and now_s - self._since_s >= self._patience_s
+        return self.gave_way
 
 
 def _carry_out(command: Command, done: Future[None], controller: Controller) -> None:

@@ -14,10 +14,11 @@ import pytest
 from canopen.sdo.exceptions import SdoCommunicationError
 
 from hodograph.bus.address import BusAddress, parse_address
-from hodograph.bus.sdo.channel_lock import Turns
+from hodograph.bus.sdo.channel_lock import TURN_WAIT_S, Turns
 from hodograph.bus.sdo.stream_channel import ENDED, OPEN
-from hodograph.errors import HodographError
-from hodograph.monitor.link import Link, is_stop
+from hodograph.errors import BusyError, HodographError
+from hodograph.monitor import link as link_module
+from hodograph.monitor.link import PATIENCE_S, Link, is_stop
 from hodograph.monitor.session import _require_alive
 
 IMAGE = bytes(range(200))
@@ -33,7 +34,16 @@ class FakeController:
         self.aborted = 0
         self.given = 0
         self.happens: dict[int, Any] = {}
+        self.wanted = False
+        self.clock = self
         self._left = b""
+
+    def now_s(self) -> float:
+        """Each segment takes a second."""
+        return float(self.given)
+
+    def is_wanted(self) -> bool:
+        return self.wanted
 
     @contextmanager
     def turn(self) -> Iterator[None]:
@@ -98,6 +108,53 @@ def test_a_program_that_could_not_be_fetched_is_fetched_at_the_next_look() -> No
     assert bench.shown == []
     bench.look()
     assert bench.shown == [IMAGE]
+
+
+def test_another_client_that_waits_too_long_breaks_off_the_reading(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The reading of a large program takes longer than other commands wait: it must not end a `run`."""
+    monkeypatch.setattr(link_module, "_SEGMENTS_UNWATCHED", 1)
+    bench = Bench()
+    bench.controller.wanted = True
+    for attempt, patience_s in enumerate(PATIENCE_S, 1):
+        before = bench.controller.given
+        bench.look()
+        assert (bench.shown, bench.controller.aborted) == ([], attempt)
+        assert bench.controller.given - before == 1 + patience_s
+        assert patience_s < TURN_WAIT_S
+    given = bench.controller.given
+    for _ in range(3):
+        bench.look()
+    assert (bench.shown, bench.controller.given) == ([None], given), "said once, not read again"
+
+
+def test_a_client_that_waits_a_little_does_not_break_off_the_reading(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(link_module, "_SEGMENTS_UNWATCHED", 1)
+    bench = Bench()
+    for place in range(0, len(IMAGE), 28):
+        bench.controller.happens[place] = lambda: setattr(bench.controller, "wanted", True)
+        bench.controller.happens[place + 7] = lambda: setattr(bench.controller, "wanted", False)
+    bench.look()
+    assert (bench.shown, bench.controller.aborted) == ([IMAGE], 0)
+
+
+def test_a_lock_that_another_client_waits_for_is_wanted() -> None:
+    bus = BusAddress("virtual", f"link-wanted-{os.getpid()}")
+    mine, other = Turns(bus, 1), Turns(bus, 1)
+    found = []
+    with mine.turn():
+        assert not mine.is_wanted()
+        other.while_waiting = lambda: found.append(mine.is_wanted())
+        with pytest.raises(BusyError), other.turn(0.01):
+            pass
+        assert not mine.is_wanted(), "it has given up"
+    assert found
+    assert all(found)
+    mine.close()
+    other.close()
 
 
 def test_after_a_streamed_job_the_program_is_shown_again() -> None:

@@ -71,6 +71,16 @@ class Turns:
             self._depth -= 1
             unlock_descriptor(self._files[1])
 
+    def is_wanted(self) -> bool:
+        """Whether another client waits for the lock, while this one holds it."""
+        if len(self._files) < 2:
+            return False
+        following = self._files[0]
+        if lock_descriptor(following, blocking=False):
+            unlock_descriptor(following)
+            return False
+        return True
+
     def _take(self, wait_s: float) -> None:
         deadline = self._clock.now_s() + wait_s
         following, turn = self._files

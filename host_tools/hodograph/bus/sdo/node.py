@@ -144,6 +144,10 @@ class Node:
         """Closes the channel lock."""
         self._turns.close()
 
+    def is_wanted(self) -> bool:
+        """Whether another client waits for the channel, which this one holds by `turn`."""
+        return self._turns.is_wanted()
+
     @contextmanager
     def turn(self, wait_s: float | None = None, busy_s: float | None = None) -> Iterator[None]:
         """Holds the channel lock inside the context. Answers to other clients, and late ones, are discarded.
