@@ -171,8 +171,8 @@ def spread_text(figures: Figures) -> str:
     return (
         f"Greatest ratios of a count to the median of the examples: {motion} for a motion part;\n"
         f"{running} for an interrupt while a program runs, with and without unanswered SYNCs;\n"
-        f"{fault} for one that finds a fault. The greatest ratio to the median of scenario *settling*, which is\n"
-        f"a tick without motion, is {settling} in that scenario.\n"
+        f"{fault} for one that finds a fault. The greatest ratio to the median of scenario *settling*,\n"
+        f"which is a tick without motion, is {settling} in that scenario.\n"
     )
 
 
