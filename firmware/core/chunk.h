@@ -35,7 +35,7 @@
 #define CHUNK_REST_OPTIONAL 2u /* an optional one */
 #define CHUNK_REST_TICKS    8u /* the shortest rest before a chunk with flag REST */
 #define CHUNK_TIME_UNKNOWN  UINT32_MAX
-/* So many shared pieces that look-ahead never delays the takeover: the longest window. */
+/* With this number of shared pieces, that of the longest window, look-ahead never delays the takeover. */
 #define CHUNK_SHARED_PIECES 16u
 
 struct chunk {

@@ -98,7 +98,7 @@ static inline const struct coefficients_piece *
 coefficients_piece_at(const struct program *p, const struct kernel *kernel, uint32_t i)
 {
     const void *at = p->coefficients + (size_t)i * coefficients_piece_size(kernel);
-    return (const struct coefficients_piece *)at; /* C++ wants the cast */
+    return (const struct coefficients_piece *)at; /* C++ requires the cast */
 }
 
 static inline const struct coefficients_segment *
@@ -115,7 +115,7 @@ static inline const struct coefficients_piece *
 coefficients_piece_next(const struct coefficients_piece *piece)
 {
     const void *at = (const uint8_t *)piece + piece->next;
-    return (const struct coefficients_piece *)at; /* C++ wants the cast */
+    return (const struct coefficients_piece *)at; /* C++ requires the cast */
 }
 
 static inline const struct coefficients_segment *

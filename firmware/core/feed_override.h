@@ -8,9 +8,10 @@
  * every feed piece that they touch. Hold, stop and fault stop leave the nominal motion: they are path stops
  * (core/path_brake) from the speed and acceleration of the last setpoint, with the stop parameters of the piece. Where
  * a path stop may not begin, the nominal motion continues for another tick. If the program would end before a path stop
- * would, it ends without one. So a stop takes at most the bound of the piece in which it was requested
- * (docs/reference/protocol.md 1.4). A hold or stop that is requested while the override rises first ends the rise. If
- * the program is in another piece by then, the bound of that piece counts from that instant.
+ * would, it ends without one. So at an override of 100 % a stop takes at most the bound of the piece in which it was
+ * requested. docs/reference/protocol.md 1.4 has the exceptions: a lower override, a rising override, the end of the
+ * program. A hold or stop that is requested while the override rises first ends the rise. If the program is in another
+ * piece by then, the bound of that piece counts from that instant.
  *
  * At standstill of a hold the program time of the place is searched, one step in each tick, to 2^-42 s. A resume
  * continues from there.
@@ -47,17 +48,17 @@ struct feed_override {
     struct path_brake brake;
     struct path_brake_numbers numbers; /* of the requested stop, in this piece: */
     uint32_t numbers_piece;
-    uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or the piece has no brake */
+    uint32_t numbers_kind; /* enum program_stop_kind; NO_NUMBERS: none, or no stop begins here */
     struct interpolator_search place; /* of rest */
     struct interpolator_point point;  /* of the last setpoint */
     uint32_t state;                   /* enum feed_state, */
     uint32_t at_end;                  /* and the state that follows at the end of the program */
     uint32_t phase;                   /* where setpoints come from */
     uint32_t kind;                    /* enum program_stop_kind of the requested stop */
-    uint32_t replace; /* 1: a fault stop, whose numbers the brake does not have yet */
-    uint32_t found;   /* 1: `place` has been found */
-    uint32_t goes_on; /* 1: the job continues after the end of the program */
-    int64_t left_q30; /* ticks at override 1 until the deadline */
+    uint32_t replace;                 /* 1: a fault stop, whose numbers `brake` does not have yet */
+    uint32_t found;                   /* 1: `place` has been found */
+    uint32_t goes_on;                 /* 1: the job continues after the end of the program */
+    int64_t left_q30;                 /* ticks at override 1 until the deadline */
 };
 
 /* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42),
@@ -109,9 +110,9 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
 
 /* Takes over: from the next tick on the motion follows the next chunk, which chunk_check has accepted after the one
  * under way. `window` has records of it for the same kernel.
- *   in motion                 If all setpoints up to the joint are those of the program under way, bit for bit. So not
- *                             in a brake, not beyond the joint, not while a ramp is searched, and not on a ramp that
- *                             was decided with pieces after the joint.
+ *   in motion                 Accepted if all setpoints up to the joint are those of the program under way, bit for
+ *                             bit. So refused during a path stop, after the joint, while a ramp is searched, and on a
+ *                             ramp that was decided with pieces after the joint.
  *   at standstill             (held, or at the end of the tail) The motion continues from the same arc length, with the
  *                             override from 0, when it is running and the place is found.
  *   a chunk beginning at rest At the end of its predecessor, while running. The next tick gives its first setpoint.
@@ -125,8 +126,8 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 /* Feed hold: brakes to standstill until resumed. Without effect when stopping, stopped or ended. */
 void feed_override_hold(struct feed_override *f);
 
-/* Resumes: back to the override; a brake under way ends at standstill first. Without effect when not holding or held.
- * */
+/* Resumes: back to the override; a path stop under way ends at standstill first. Without effect when not holding or
+ * held. */
 void feed_override_resume(struct feed_override *f);
 
 /* The commanded override, in per cent; more than 200 counts as 200. Kept while held. */
@@ -135,7 +136,7 @@ void feed_override_set(struct feed_override *f, uint32_t percent);
 /* Controlled stop inside the program's limits: final. A program that ends before the stop does so. */
 void feed_override_stop(struct feed_override *f);
 
-/* The same inside the machine's limits; it also replaces the brake of a hold or a stop at once. */
+/* The same inside the machine's limits; it also replaces the path stop of a hold or a stop at once. */
 void feed_override_fault_stop(struct feed_override *f);
 
 /* --- Tick --- */
@@ -151,8 +152,8 @@ int feed_override_next(struct feed_override *f, struct interpolator *it,
 int feed_override_stop_tick(struct feed_override *f, struct interpolator *it);
 
 /* Part of a tick of a stop: speed and acceleration of the nominal motion at the last setpoint; *turned_q56 is the part
- * of the acceleration that the change of the override makes. Returns 1, or 0 if the feed is above all that a brake can
- * take. */
+ * of the acceleration that the change of the override makes. Returns 1, or 0 if the feed is above all from which a path
+ * stop can begin. */
 int feed_override_motion(const struct feed_override *f, const struct interpolator *it,
                          struct path_state *state, int64_t *turned_q56);
 
@@ -163,18 +164,18 @@ enum feed_state feed_override_state(const struct feed_override *f);
 /* 1 while a hold or a stop is under way that has taken longer than its stop deadline. */
 int feed_override_late(const struct feed_override *f);
 
-/* Program time in 2^-42 s, rounded to nearest. From the first tick of a brake until the place of standstill is found it
- * is that of the last setpoint before the brake. */
+/* Program time in 2^-42 s, rounded to nearest. From the first tick of a path stop until the place of standstill is
+ * found it is that of the last setpoint before the path stop. */
 uint64_t feed_override_time_q42(const struct feed_override *f);
 
 /* The longest time, in us, of a stop that is requested now: the stop time bound of the stop table. If the program ends
- * within twice that time, it is the time to the end, since a brake may not fit before it. */
+ * within twice that time, it is the time to the end, since a path stop may not fit before it. */
 uint32_t feed_override_bound_us(const struct feed_override *f, enum program_stop_kind kind);
 
 /* Feed along the path, 2^-32 mm/s. */
 int64_t feed_override_feed_q32(const struct feed_override *f);
 
-/* The present override, 2^30 = 1; 0 in a brake and at standstill. */
+/* The present override, 2^30 = 1; 0 in a path stop and at standstill. */
 uint32_t feed_override_actual_q30(const struct feed_override *f);
 
 /* 1 at the end of a tail, running or held, until the next chunk is taken over. */

@@ -37,8 +37,8 @@ void feed_piece_set(void *piece, const struct program_piece *from);
  * ones, no division. */
 void feed_piece_at(const void *piece, struct feed_point *out, uint64_t t_q42_s);
 
-/* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the start of a brake (core/feed_override). Within
- * 2^-27 of the greatest F' of the coefficients, divided by the time scale of the piece. */
+/* F'' at local time t, in 2^-40 mm/s^2, held within +-(2^62 - 1): for the start of a path stop (core/feed_override).
+ * Within 2^-27 of the greatest F' of the coefficients, divided by the time scale of the piece. */
 int64_t feed_piece_acceleration(const void *piece, uint64_t t_q42_s);
 
 #endif

@@ -16,11 +16,25 @@
  *   tick        feed_override_next           the next setpoint, as a point in mm
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
- *   of a job in chunks, in place of program_open, program_check and feed_override_begin (core/chunk.h):
- *   main loop   chunk_open                   reads a chunk and the program in it
+ *   of a job in chunks, in place of all calls of the main loop above but kernel_find (core/chunk.h):
+ *   main loop   coefficient_cache_init       memory for the coefficient records near the motion
+ *               chunk_open                   reads a chunk and the program in it
  *               chunk_check                  checks this program, and that the chunk continues its predecessor
- *               feed_override_begin_job      with the first chunk
- *               feed_override_take_over      the next chunk for the program under way; needs the tick held off
+ *               coefficient_cache_fits       has the memory space for the least number of records?
+ *               with the first chunk:
+ *               coefficient_cache_begin      records from its start on
+ *               interpolator_begin_window    the cursor on the curve
+ *               feed_override_begin_job      the motion, at rest
+ *               again and again; those with * need the tick held off:
+ *               feed_override_place *        where the motion needs records
+ *               coefficient_cache_prepare    makes them; NULL: they are there already
+ *               feed_override_use *          1: the motion uses them
+ *               coefficient_cache_used       after this 1
+ *               with the next chunk:
+ *               feed_override_may_take_over *    now? Where does the motion need records of it?
+ *               coefficient_cache_prepare    makes them
+ *               feed_override_take_over *    1: the next chunk is the program under way
+ *               coefficient_cache_used       after this 1
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
  *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us   state at the last setpoint
  *
@@ -34,16 +48,17 @@
  * ## Path axes
  *
  * A planar program moves x and y, a spatial one x, y, z and up to three extra axes (docs/reference/protocol.md section
- * 1). program.header.axis_count is their number; positions, limits and offsets are arrays of PROGRAM_AXES, of which the
- * first axis_count count. A controller with a fixed number of axes sets program_limits.axis_count. program_check then
- * refuses programs with another number, and programs whose first axis is not the machine's first axis
- * (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to evaluate first_axis().
+ * 1). program.header.axis_count is their number; positions, limits and offsets are arrays of PROGRAM_AXES elements, of
+ * which the first axis_count are used. A controller with a fixed number of axes sets program_limits.axis_count.
+ * program_check then refuses programs with another number, and programs whose first axis is not the machine's first
+ * axis (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to evaluate first_axis().
  *
  * ## Limits
  *
  * program_check compares a program with struct program_limits (core/program_rules.h). 0 means no limit for feed,
- * acceleration, jerk, axis count, period and stop time. Travel is always checked: min_q40_mm and max_q40_mm need values
- * for each path axis; for no limit, -4096 and 4096 mm times 2^40.
+ * acceleration and jerk along the path, for velocity, acceleration and jerk of each axis, for axis count, period and
+ * stop time. Travel is always checked: min_q40_mm and max_q40_mm need values for each path axis; for no limit, -4096
+ * and 4096 mm times 2^40.
  *
  * ## Cost
  *
@@ -51,20 +66,23 @@
  *   coefficients_make_in   some 2500 instructions a segment; bytes: coefficients_size
  *   feed_override_begin    linear in the number of pieces
  *   feed_override_next     docs/validation/wcet.md: bounds of instructions for each core and kernel
+ *   code and stack         docs/guides/embed.md section 7
  *   struct interpolator    about 0.2 KiB; struct feed_override about 0.6 KiB
  *
  * ## Errors
  *
  * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and
  * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in:
- * COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next: INTERPOLATOR_ERR_...; with a program that passed
- * program_check a tick never fails. Only program_check validates: what a header demands of the caller is not checked
- * again. Questions with two answers return an int, 1 or 0.
+ * COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next: INTERPOLATOR_ERR_... With a program that passed
+ * program_check and has all its coefficient records a tick never fails. In a job in chunks it fails
+ * (INTERPOLATOR_ERR_JUMP) if the main loop has not made the next records in time (core/coefficient_cache.h). Only
+ * program_check and chunk_check validate: what a header demands of the caller is not checked again. Predicates return
+ * an int, 1 (true) or 0 (false).
  *
  * ## Numbers
  *
- * Units and scales stand in the names; core/qmath.h has the rules. Integers only, but for the kernels float and double:
- * the same program and commands give the same bits on every target.
+ * Units and scales stand in the names; core/qmath.h has the rules. All arithmetic is in integers, except in the kernels
+ * float and double. With the same kernel, the same program and commands give the same bits on every target.
  *
  * ## Example
  *

@@ -18,7 +18,8 @@
 #include "core/program.h"
 
 /* Numbers as in object 0x2004 sub 5. The errors are bounds of x, y and z before they are rounded to counts, on segments
- * longer than 2^-34 mm (docs/theory/numerics.md sections 9 to 11). */
+ * longer than 2^-34 mm (docs/theory/numerics.md sections 9 to 11). That of KERNEL_FIXED uses the largest error of the
+ * first guess that a search found; the bound that needs no search is 2^-31 mm. */
 enum kernel_number {
     KERNEL_FIXED = 0,  /* integers only, the same bits everywhere, within 2^-37 mm */
     KERNEL_FLOAT = 1,  /* single precision and integers, within 1 nm */

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * path_brake: a path stop, the brake along the path by which feed hold, stop and fault stop reach standstill without
- * leaving the curve. Used by core/feed_override, and by sim/offline to search stop parameters.
+ * path_brake: a path stop, by which feed hold, stop and fault stop reach standstill without leaving the curve. Used by
+ * core/feed_override, and by sim/offline to search stop parameters.
  *
  * The path speed follows an S-curve from the present speed and acceleration: the acceleration falls by at most the
  * first jerk to the deceleration, stays there, and rises by at most the last jerk until speed and acceleration are 0 in
  * the same tick. Jerks and deceleration are the stop parameters of the piece, from the program's stop table
  * (core/program.h). Each tick decides from the state alone whether the acceleration still falls or the release phase
  * begins (docs/theory/numerics.md section 12, "Path stop"). So no plan has to be searched, and the stop parameters may
- * change during the brake. This module computes the arc length; interpolator_at_arc_length computes the point on the
- * curve.
+ * change during the path stop. This module computes the arc length; interpolator_at_arc_length computes the point on
+ * the curve.
  *
  * Unit of length: 2^-56 mm. Unit of time: a tick. Integers only, the same on every target. Speed and acceleration are 0
  * exactly at the end. The functions change their struct only; bounded time, any context.
@@ -33,7 +33,7 @@ struct path_state {
     int64_t acceleration_q56;  /* mm a tick squared */
 };
 
-/* What a brake may use; jerks in mm a tick cubed, deceleration in mm a tick squared. At least 2^22, and the
+/* What a path stop may use; jerks in mm a tick cubed, deceleration in mm a tick squared. At least 2^22, and the
  * deceleration below PATH_BRAKE_MOST_TICKS times either jerk: as path_brake_numbers_of makes them. */
 struct path_brake_numbers {
     int64_t jerk_down_q56;
@@ -52,19 +52,19 @@ struct path_brake {
 };
 
 /* The numbers of an entry of the stop table, rounded down. period_us: 1000, 2000, 4000 or 8000. Returns 1, or 0 if the
- * entry has no brake, or one out of range (then *out is unchanged). */
+ * entry has no path stop, or numbers out of range (then *out is unchanged). */
 int path_brake_numbers_of(struct path_brake_numbers *out, const struct program_stop *stop,
                           uint32_t period_us);
 
-/* Begins a brake from a state; also a brake with other numbers from the state of the present one. It acts with the next
+/* Begins a path stop from a state; also one with other numbers from the state of the present one. It acts with the next
  * step. Returns 1, or 0 if none fits (then *brake is unchanged): speed below PATH_BRAKE_NO_SPEED or above
  * PATH_BRAKE_MOST_SPEED; an acceleration so negative that the speed would pass 0; more than PATH_BRAKE_MOST_TICKS. */
 int path_brake_begin(struct path_brake *brake, const struct path_state *from,
                      const struct path_brake_numbers *numbers);
 
-/* Whether a brake that begins here, with or without path_brake_first, ends within a distance. It compares an upper
+/* Whether a path stop that begins here, with or without path_brake_first, ends within a distance. It compares an upper
  * bound of the braking distance, which is larger by the distance of one tick on average. So the result may be 0
- * although the brake would just fit. */
+ * although the path stop would just fit. */
 int path_brake_fits(const struct path_state *from, const struct path_brake_numbers *numbers,
                     int64_t distance_q40_mm);
 

@@ -133,8 +133,8 @@ enum program_stop_kind {
     PROGRAM_STOP_FAULT = 1, /* fault stop: inside the machine's */
 };
 
-/* Stop parameters of a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of them 0: no brake may begin in
- * this piece. */
+/* Stop parameters of a piece, protocol.md 1.4: codes, decoded by core/path_brake. All of them 0: no path stop may begin
+ * in this piece. */
 struct program_stop {
     uint8_t jerk_down;
     uint8_t deceleration;

@@ -28,7 +28,7 @@ enum program_error {
     /* header */
     PROGRAM_ERR_PERIOD = -10,      /* period not 1000, 2000, 4000 or 8000 us */
     PROGRAM_ERR_PERIOD_USED = -11, /* period is not the one configured in the controller */
-    PROGRAM_ERR_FLAGS = -12,       /* unknown flag, or a reserved field of the header is not 0 */
+    PROGRAM_ERR_FLAGS = -12,       /* unknown flag, or one that only a chunk may have */
     PROGRAM_ERR_AXES = -13,        /* axis count not 2 ... 6, or not that of the machine */
     PROGRAM_ERR_DURATION = -14,    /* not the sum of the pieces, or not below 2^22 s */
     PROGRAM_ERR_LENGTH = -15,      /* length not in (0, 2^22) mm */
@@ -75,7 +75,7 @@ enum program_error {
     /* stops: index = the piece */
     /* some codes of a stop are 0 and some are not, or a reserved field is not 0 */
     PROGRAM_ERR_STOP_ENTRY = -60,
-    PROGRAM_ERR_STOP_NUMBERS = -61, /* a brake would be above the limits of the controller */
+    PROGRAM_ERR_STOP_NUMBERS = -61, /* a path stop would be above the limits of the controller */
     PROGRAM_ERR_STOP_BOUND = -62,   /* a stop can take longer than its bound */
     PROGRAM_ERR_STOP_LONG = -63,    /* a fault stop can take longer than the controller allows */
     PROGRAM_ERR_STOP_WORST = -64,   /* the worst stops of the header are not those of the table */
@@ -131,7 +131,7 @@ struct program_limits {
 
 struct program_fault {
     int code;       /* 0 or enum program_error */
-    uint32_t index; /* segment or piece, 0 for the header */
+    uint32_t index; /* segment, piece or event; 0 for the header */
 };
 
 /* Calls `attend`, if there is one. The parts of the check do so at each step of long work. */

@@ -47,7 +47,7 @@ struct stop_walk {
 struct stop_extent {
     uint64_t speed_um;  /* greatest, um/s, */
     uint64_t rising_um; /* and acceleration, um/s^2 */
-    /* the most eighths of the piece in a row in which no brake may fit, */
+    /* the most eighths of the piece in a row in which no path stop may fit, */
     uint32_t waits;
     uint32_t last; /* and those at its end */
 };
@@ -55,10 +55,11 @@ struct stop_extent {
 void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up_q18,
                        struct stop_extent *out);
 
-/* Where a brake begins: the speed at the greatest override, the acceleration at a constant override, and what a
- * changing override adds. Lengths in um, times in s, cut_us in us. An override that still rises is below the greatest one
- * by what it gains until its slope is 0, which takes at least cut_us. So the slope adds to the speed only for the time
- * by which the brake's jerk takes longer than cut_us. */
+/* Where a path stop begins: the speed at the greatest override, the acceleration at a constant override, and slope_um,
+ * the acceleration that a changing override adds. Lengths in um, times in s, cut_us in us. An override that still rises
+ * is below the greatest one by what it gains until its rate is 0, which takes at least cut_us. So slope_um raises the
+ * speed only if the jerk of onset needs longer than cut_us to remove it, and only for the difference of the two
+ * times. */
 struct stop_start {
     uint64_t speed_um;
     uint64_t rising_um;
@@ -73,7 +74,7 @@ void stop_level_start(const struct stop_extent *extent, const struct program_ove
 /* The greatest override rate in a level, 2^-16 /s. */
 uint64_t stop_level_slope_q16(const struct program_override *bounds, uint32_t level);
 
-/* The brake of the table alone: its continuous curve. */
+/* The path stop of the table alone: its continuous curve. */
 struct stop_bound stop_curve(const struct stop_start *from, const struct program_stop *stop);
 
 /* Begins after the last piece of a program whose pieces and segments have passed their checks. */

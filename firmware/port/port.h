@@ -2,8 +2,8 @@
 /*
  * port.h: everything that the controller needs of a machine. Used by firmware/app and the ports.
  *
- * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It
- * includes nothing above this file but the headers of can/. docs/guides/port-to-your-board.md makes one.
+ * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It includes this file,
+ * can/, port/common, port/cortex_m, port/semihost and its own files only. docs/guides/port-to-your-board.md makes one.
  *
  * Three contexts (drawn in docs/reference/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
@@ -14,8 +14,10 @@
  * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
  * `receive`.) On Linux one thread stands for both interrupts.
  *
- * Errors: 0 or a negative PORT_ERR_... No function but port_wait() waits. If its comment states nothing else, a
- * function may be called from any context. Call none before port_begin().
+ * Errors: 0 or a negative PORT_ERR_... Only port_wait() sleeps. port_lock() waits for a handler that runs (Linux).
+ * port_store_erase() and port_store_write() return when the memory has finished, which takes 22 ms for a page of the
+ * STM32G4 that has to be erased. If its comment states nothing else, a function may be called from any context. Call
+ * none before port_begin().
  */
 #ifndef PORT_PORT_H
 #define PORT_PORT_H
@@ -51,8 +53,8 @@ bool port_stop_requested(void);
 /* True when it has been requested a second time: the drives then stop by their own ramps, not along the path. */
 bool port_stop_insisted(void);
 
-/* CANopen node number of this controller, 1 ... 127, from the command line or the board's straps.
- */
+/* CANopen node number of this controller, 1 ... 127: from the command line, a build option or switches of the board. A
+ * stored 0x2054 other than 0 replaces it. */
 uint8_t port_node_id(void);
 
 /* --- CAN, classic frames --- */
@@ -90,15 +92,15 @@ uint32_t port_time_us(void); /* wraps after 71 minutes */
 /* Turns both interrupts on; the first tick comes one period later. Main loop, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* Changes the period: that before the next tick, or, where a timer has loaded it already, that after it. Main loop, in
- * a critical section. */
+/* Changes the period. The new value applies to the interval that ends with the next tick, or to the following one if
+ * the timer has already loaded that interval. Main loop, in a critical section. */
 void port_tick_period(uint32_t period_us);
 
 /* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
  * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler: all drives have
- * answered), for guard_us at most; then it starts late rather than on time. While the host as a whole stalls the guard
- * time does not run. At lock step the tick starts then at once if `hurry`. A board, whose timer knows nothing but the
- * clock, ignores both. */
+ * answered), at the latest until guard_us after the start of the present tick. It is late if this is after its due
+ * time. While the host as a whole stalls the guard time does not run. At fast pace the next tick starts, if `hurry`, as
+ * soon as port_tick_ready() is called. A board, whose timer knows nothing but the clock, ignores both. */
 void port_tick_await(uint32_t guard_us, bool hurry); /* timer */
 void port_tick_ready(void);                          /* receive */
 

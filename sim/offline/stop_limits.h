@@ -21,7 +21,7 @@ struct stop_feed_zone {
     double feed_mm_s;
 };
 
-/* What a brake has to keep; HUGE_VAL: no limit. Its stop parameters never exceed `acceleration` and `jerk`. */
+/* What a path stop has to keep; HUGE_VAL: no limit. Its stop parameters never exceed `acceleration` and `jerk`. */
 struct stop_limits {
     double feed;         /* along the path: mm/s, */
     double acceleration; /* mm/s^2, */
@@ -35,9 +35,9 @@ struct stop_limits {
     double time_constant[PROGRAM_AXES]; /* s */
     const struct stop_feed_zone *zones;
     uint32_t zone_count;
-    /* 1: `reach` counts at override 1 only, because the motion at other overrides may exceed it without a brake */
+    /* 1: `reach` counts at override 1 only, because the motion at other overrides may exceed it without a path stop */
     uint32_t reach_at_rate_1;
-    /* 1: a brake begins only if a rising override adds at most a quarter of its deceleration */
+    /* 1: a path stop begins only if a rising override adds at most a quarter of its deceleration */
     uint32_t rise_is_cut;
     uint32_t quick; /* 1: few codes are tried, about 0.1 ms for each piece, for long programs */
 };

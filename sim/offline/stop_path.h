@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stop_path: the path of a program as a table: rows of its curve at places close to each other. The search of stop
- * parameters follows many brakes along it. Used by offline/stop_search, offline/stop_usage, the other files of this
+ * parameters follows many path stops along it. Used by offline/stop_search, offline/stop_usage, the other files of this
  * search and host tools.
  *
  * Rows: STOP_ROWS for each segment, ascending in arc length, with tangent and curvature (planar programs) or the first

@@ -34,7 +34,7 @@ struct stop_piece {
     uint32_t count;
     double seconds;
     int most[3];               /* greatest codes */
-    int before[3];             /* codes of a brake that this one may replace; 0: none */
+    int before[3];             /* codes of a path stop that this one may replace; 0: none */
     double left_s;             /* duration of the program after the piece */
     struct stop_state fastest; /* at all overrides: greatest speed and acceleration */
     struct stop_state extreme; /* at override 1: greatest speed and acceleration of either sign */
@@ -43,7 +43,7 @@ struct stop_piece {
         second[PROGRAM_LEVELS];              /* bounds up to these overrides */
     uint32_t suspect;                        /* the instant at which a limit was broken last, */
     struct stop_overridden suspect_override; /* and the same at other feed overrides, */
-    struct stop_overridden suspect_before;   /* and where a brake that replaces another broke one */
+    struct stop_overridden suspect_before;   /* and where a stop that replaces another broke one */
     struct stop_piece *close;                /* the same piece with more instants */
 };
 

@@ -4,7 +4,7 @@
  * deceleration and jerk of release (docs/reference/protocol.md 1.4). A path stop with them may begin anywhere in the
  * piece and keeps given limits until standstill. Called by host_tools/hodograph/native.
  *
- * The search simulates brakes from a grid of instants of the piece, in double arithmetic. It reduces the limits by
+ * The search simulates path stops from a grid of instants of the piece, in double arithmetic. It reduces the limits by
  * STOP_MARGIN, as a reserve for the motion between the instants. Derivation: docs/theory/feed.md section 7. No heap:
  * the caller provides all arrays. Any thread; the functions change their arguments only.
  */
@@ -22,8 +22,8 @@
  * the limits or because waiting is better (WAIT_BETTER and WAIT_AS_GOOD in stop_search.c). */
 struct stop_found {
     uint8_t known;     /* 1: `codes` are given, and stay */
-    uint8_t kept;      /* 1: the same, but only if brakes that replace `before` keep the limits */
-    uint8_t before[3]; /* codes of a brake that this one may replace; 0: none */
+    uint8_t kept;      /* 1: the same, but only if stops that replace `before` keep the limits */
+    uint8_t before[3]; /* codes of a path stop that this one may replace; 0: none */
     uint8_t start[3];  /* codes to try first; 0: those of the nearest later piece with codes */
     uint8_t codes[3];  /* jerk of onset, deceleration, jerk of release */
     double worst_s;    /* longest time to standstill from the sampled instants, at override 1 */

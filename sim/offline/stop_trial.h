@@ -31,10 +31,10 @@ struct stop_case {
 struct stop_trial {
     uint64_t seed;
     uint32_t trials;
-    /* program's limits: for everything but fault stops, those along the path for brakes only */
+    /* program's limits: for everything but fault stops, those along the path for path stops only */
     struct stop_limits hold;
     struct stop_limits fault; /* machine's */
-    struct stop_use of_hold;  /* result: in brakes of hold and stop and in all other motion, */
+    struct stop_use of_hold;  /* result: in path stops of hold and stop, and in all other motion, */
     struct stop_use of_fault; /* and in fault stops */
     double of_bound[2];       /* greatest stop time over its bound, by enum program_stop_kind */
     double longest_s[2];

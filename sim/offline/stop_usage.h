@@ -32,7 +32,7 @@ struct stop_axes {
     double velocity[PROGRAM_AXES], acceleration[PROGRAM_AXES], jerk[PROGRAM_AXES];
 };
 
-/* Upper bounds of the motion of a brake, and of the path on its braking distance. */
+/* Upper bounds of the motion of a path stop, and of the path on its braking distance. */
 struct stop_extent {
     double speed, acceleration, jerk;
     struct stop_stretch path;

@@ -169,9 +169,10 @@ def spread_text(figures: Figures) -> str:
         found["settling"].append((most / median, title))
     motion, running, fault, settling = (f"{r:.2f} ({w})" for r, w in map(max, found.values()))
     return (
-        f"Greatest ratios to the median of the examples: of a motion part {motion}; of an interrupt\n"
-        f"while a program runs, drives silent or not, {running}; of one that finds a fault {fault};\n"
-        f"and where axes settle, whose median is a tick without motion, {settling}.\n"
+        f"Greatest ratios of a count to the median of the examples: {motion} for a motion part;\n"
+        f"{running} for an interrupt while a program runs, with and without unanswered SYNCs;\n"
+        f"{fault} for one that finds a fault. The greatest ratio to the median of scenario *settling*,\n"
+        f"which is a tick without motion, is {settling} in that scenario.\n"
     )
 
 

@@ -110,8 +110,8 @@ bool motion_late(const struct motion *motion);
 /* True at the end of the program or of a stop: all further setpoints are equal. */
 bool motion_over(const struct motion *motion);
 
-/* Program time of the last setpoint, to nearest; before the first one that of the start; in a brake that of its start.
- * Under the lock. */
+/* Program time of the last setpoint, to nearest; before the first one that of the start; in a path stop that of its
+ * start. Under the lock. */
 uint64_t motion_time_q32_s(const struct motion *motion);
 
 /* Feed along the path at the last setpoint, in um/s, held at 2^31 - 1 (2147 m/s). Under the lock. */

@@ -9,7 +9,7 @@
 
 enum options_pace {
     OPTIONS_REAL_TIME, /* a tick every period of the wall clock */
-    OPTIONS_FAST,      /* lock step: the next tick as soon as the drives have answered */
+    OPTIONS_FAST,      /* fast pace: the next tick as soon as the drives have answered */
 };
 
 struct options {

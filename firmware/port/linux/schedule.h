@@ -8,7 +8,7 @@
  * than a period the clock of the ticks is set again.
  *
  * A tick may request that the next one waits until all drives are ready (schedule_await), for a guard time at most. The
- * next tick is then late. At lock step a tick may also request the next one as soon as all are ready. The guard time is
+ * next tick is then late. At fast pace a tick may also request the next one as soon as all are ready. The guard time is
  * counted in slices: while it waits, the thread wakes at least every SCHEDULE_SLICE_NS and calls schedule_wait. A slice
  * of more than SCHEDULE_SLICE_MAX_NS counts as SCHEDULE_SLICE_MAX_NS. So a stall of the whole computer, in which no
  * drive can become ready, counts little.
@@ -75,7 +75,7 @@ void schedule_ready(struct schedule *schedule, uint64_t now_ns);
 /* The thread has woken: counts the guard time and sets due_ns again. */
 void schedule_wait(struct schedule *schedule, uint64_t now_ns);
 
-/* A tick starts: returns its lateness in ns; 0 at lock step, where nothing is due by the clock. Clears the requests of
+/* A tick starts: returns its lateness in ns; 0 at fast pace, where nothing is due by the clock. Clears the requests of
  * the last one. */
 uint64_t schedule_start(struct schedule *schedule, uint64_t now_ns);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KB each for two programs, then a page
- * (2 KB) each for two sets of parameters.
+ * flash_store: the banks of port.h's store in the chip's second flash bank: 126 KiB each for two programs, then a page
+ * (2 KiB) each for two sets of parameters.
  *
  * The first bank holds the firmware. Erasing a page of it would stop the core for 22 ms, which is 22 ticks.
  *
