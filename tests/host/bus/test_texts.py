@@ -62,6 +62,16 @@ def test_every_code_has_text_and_remedy(name: str, code: int) -> None:
         assert part.isascii()
 
 
+def test_the_page_about_faults_has_every_code() -> None:
+    """The table of docs/guides/faults.md: codes in rising order, with the texts that `hodograph status` prints."""
+    page = (ROOT / "docs" / "guides" / "faults.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| 0x([0-9A-F]{4}) \| (.*) \| (.*) \|$", page, re.MULTILINE)
+    known = [code for code in range(0x10000) if known_code(code)]
+    assert len(known) > 40
+    words = [(f"{code:04X}", fault_words(code).text, fault_words(code).remedy) for code in known]
+    assert rows == words
+
+
 def test_codes_in_the_drives_have_words() -> None:
     """Codes that the simulated drives give by number."""
     texts = [file.read_text() for file in (ROOT / "sim" / "node").glob("*.c")]
