@@ -5,7 +5,7 @@
  * root, and qmath_root_above is in [2^15, 65602]. For any 64-bit number qmath_root is below 2^32; for numbers of 2^28
  * or more it is at least 2^14 - 1.
  *
- * Analysed by CBMC in `make proofs` (tools/analysis/prove.py); never executed, touches nothing.
+ * Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 70 --unsigned-overflow-check

@@ -5,7 +5,7 @@
  * the cubic in [0.47, 2.06], the range that a speed ratio of at most 2 permits, with room for rounding; in 6 x 6 ranges
  * of the slopes and 16 ranges of t.
  *
- * Analysed by Eva in `make proofs` (tools/analysis/prove.py); never executed, touches nothing.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 10
