@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: MIT
-"""Measures the contour error of simulated drives with the paper's loops and tuned ones, and errors of identification.
+"""Measures contour errors of simulated drives, with the servo loops of the paper and with tuned ones.
 
-Run by `make bench`. Uses no bus; writes the file of --json and temporary path files.
+Also measures the errors of identified plants. Run by `make bench`. Uses no bus; writes the file of --json and temporary
+path files.
 
 Paths: alpha and heart, at the paper's feed and in the least time within all limits. There are three groups of figures:
 
-contour      Contour errors at SYNCs and between them. For those between SYNCs, this file simulates the drives again,
-             one servo sample after the other. It also counts the samples at the voltage limit.
-sensitivity  Contour errors where the plant differs from its model. Optimal feeds are planned for 4.5 V, as in the
-             examples, and for 3.5 V.
+contour      Contour errors at SYNCs and between them. To compute the errors between SYNCs, this script simulates the
+             drives again, one servo sample after the other. It also counts the samples at the voltage limit.
+sensitivity  Contour errors where the plant differs from its model. Time-optimal feeds are planned for motors
+             with 4.5 V, as in the examples, and with 3.5 V.
 identify     Errors of the plant that is identified from noisy positions and voltages.
 
 Loops in the first group:

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Klipper's planner, from a clone of the user's: a batch run of its host program (its docs/Debugging.md). Used by
-peers/compare. Starts make and Klipper in a temporary copy of the clone.
+"""Runs Klipper's planner in batch mode (docs/Debugging.md of Klipper), from a clone of its repository that the user
+names. Used by peers/compare. Starts make and Klipper in a temporary copy of the clone, and git to read the clone's
+version; writes temporary files.
 
-No registry has Klipper. The clone is copied first, so that nothing is written into it. Its host program gets the
-micro-controller's dictionary from its own build for Linux, the program as input, and an extra module that logs each
-planned move. Moves are trapezoids of velocity along straight chords.
+Klipper is in no package registry. The clone is copied first, so that nothing is written into it. The host program gets
+the micro-controller's dictionary from Klipper's own build for Linux, the program as input, and an extra module that
+logs each planned move. Moves are trapezoids of velocity along straight chords.
 """
 
 from __future__ import annotations

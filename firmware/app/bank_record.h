@@ -3,11 +3,12 @@
  * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Used by
  * app/program_slot, app/program_table and app/parameter_store.
  *
- *     sequence u32 | size u32 | tag u32 | CRC-32 of the twelve bytes before u32
+ *     sequence u32 | size u32 | tag u32 | CRC-32 (u32) of the twelve bytes before it
  *
  * little-endian, in the last BANK_RECORD_SIZE bytes. It is written last, when the content has passed every check. A
- * bank without a valid record is ignored: the power failed before the record was complete. Of two banks with valid
- * records the one with the later sequence number (modulo 2^32) has the newer content. Main loop.
+ * bank without a valid record is ignored: it is empty, or writing its content was not completed (power failure,
+ * abandoned or refused upload). Of two banks with valid records for the same kind of content, the one with the later
+ * sequence number (modulo 2^32) has the newer content. Main loop.
  */
 #ifndef APP_BANK_RECORD_H
 #define APP_BANK_RECORD_H
@@ -30,7 +31,7 @@ uint32_t bank_record_room(unsigned bank);
 /* False when the bank has no valid record. */
 bool bank_record_read(unsigned bank, struct bank_record *record);
 
-/* Once after each erase, after everything else. 0 or PORT_ERR_STORE. */
+/* Writes the record. Call it once after each erase, when all content is written. 0 or PORT_ERR_STORE. */
 int bank_record_write(unsigned bank, const struct bank_record *record);
 
 /* Whether the first was written after the second. Pure. */

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/parameter_store.h (see there): parameters of the object dictionary that outlive a loss of power
+/* Implements app/parameter_store.h (see there): parameters of the object dictionary that are kept without power
  * (objects 0x1010 and 0x1011). Called by app/controller.c and app/objects.c. Main loop. */
 #include "app/parameter_store.h"
 

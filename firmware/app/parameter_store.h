@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * parameter_store: parameters of the object dictionary that outlive a loss of power (objects 0x1010 and 0x1011).
+ * parameter_store: parameters of the object dictionary that are kept without power (objects 0x1010 and 0x1011).
  *
  *     parameter_store_find(&store, &od);                 after power-on: finds and checks the stored parameters
  *     parameter_store_restore(&store, &od, 0, 0xFFFF);   into the dictionary
@@ -10,14 +10,14 @@
  * the bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save
  * writes them to the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h). So
  * after a loss of power at any moment the old parameters or the new ones are found, complete. Called by
- * app/controller.c and app/objects.c. Layout of the content:
+ * app/controller.c and app/objects.c. Main loop. Layout of the content:
  *
  *     CRC-32 of (index u16, sub u8, size u8) of each parameter u32 | CRC-32 of the configuration u32 | confirmed u8 |
  *     zero u8 x 3 | values in rising order of (index, sub), little-endian | zeros to a multiple of 8 bytes
  *
- * A content of 0 bytes stands for the defaults (0x1011). Only the content of the newest record is used. If it is
- * damaged, has a value that this firmware refuses, or is of a firmware with other parameters, nothing is restored. Main
- * loop.
+ * parameter_store_forget writes a record with a content of 0 bytes: the defaults are selected (0x1011). Only the
+ * content of the newest record is used. If it is damaged, has a value that this firmware refuses, or is of a firmware
+ * with other parameters, nothing is restored.
  */
 #ifndef APP_PARAMETER_STORE_H
 #define APP_PARAMETER_STORE_H

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Everything that can go wrong, as one tree of exceptions. Used by most modules of host_tools. No I/O.
+"""Everything that can go wrong, as one tree of exceptions. Used by many modules of host_tools. No I/O.
 
 A message is one line: what is wrong, where, and what to do. Only `hodograph.cli.main` turns an
 exception into a line on stderr and an exit status; the table of statuses is docs/reference/cli.md.

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Lengths as the integers of programs and of the controller's objects: multiples of 2^-40 mm (of a rotary axis, 2^-40
-degrees); docs/reference/protocol.md 1.2. Names of such integers end in `_q40`. Used by most modules of host_tools. No
+degrees); docs/reference/protocol.md 1.2. Names of such integers end in `_q40`. Used by many modules of host_tools. No
 I/O.
 """
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Names of kernels, axes, units and kinds of files that the command line, files and the bus share. Imports nothing
-heavy, so that `--help` is quick. Used by most modules of host_tools. No I/O.
+heavy, so that `--help` is quick. Used by many modules of host_tools. No I/O.
 """
 
 from __future__ import annotations

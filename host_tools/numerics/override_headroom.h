@@ -3,8 +3,9 @@
  * override_headroom: what the limits of the axes leave for a changing feed override in each feed piece, from samples of
  * the motion of the axes: docs/theory/feed.md section 7. Called by host_tools/hodograph/native.
  *
- * Samples are in cells, a part of a piece each. With the override at f, its rate R and its acceleration Q, the rows
- * R v + f^2 a <= A and Q v + 3 f R a + f^3 j <= J hold at each sample, and so does the limit of the volts.
+ * Samples are grouped in cells. Each cell is a part of one piece. With the override at f, its rate R and its
+ * acceleration Q, the rows R v + f^2 a <= A and Q v + 3 f R a + f^3 j <= J hold at each sample, and the voltage limit
+ * is kept.
  *
  * Double arithmetic without contraction: the same bits on every computer. No heap. The functions write the caller's
  * arrays only; any thread.
@@ -22,7 +23,7 @@ struct override_samples {
     /* magnitudes of velocity, acceleration and jerk at an override of 1, above 0 */
     const double *velocity, *acceleration, *jerk;
     const double *most_acceleration, *most_jerk; /* HUGE_VAL: no limit */
-    /* of the volts, |v + time_constant a| <= reach: signed motion, [axes] reach and time constant; NULL: no limit */
+    /* of the voltage, |v + time_constant a| <= reach: signed motion, [axes] reach and time constant; NULL: no limit */
     const double *signed_velocity, *signed_acceleration, *reach, *time_constant;
 };
 
@@ -31,8 +32,9 @@ struct override_powers {
     const double *first, *second, *third;
 };
 
-/* Lowers, of each piece that has samples, rest[] to the greatest override rate that accelerations and volts allow at
- * this override, and jerk[] to the one that takes all of what the jerks leave. Below 0: a limit leaves nothing. */
+/* Lowers rest[] and jerk[] of each piece that has samples. rest[]: the greatest override rate that the acceleration and
+ * voltage limits allow at this override. jerk[]: the greatest override rate that the jerk limits allow if the override
+ * acceleration is 0. A negative value: a limit is exceeded without any change of the override. */
 void override_rates(const struct override_samples *samples, const struct override_powers *at,
                     double *rest, double *jerk);
 

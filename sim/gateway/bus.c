@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements gateway/bus.h (see there): the CAN side of the gateway, its signals and its errors. Used by gateway/main,
- * gateway/fifo_side and gateway/slcan_side. One thread. */
+/* Implements gateway/bus.h (see there): sends frames of the gateway to CAN, counts the signals that end the process,
+ * and prints error messages. Used by gateway/main, gateway/fifo_side and gateway/slcan_side. One thread. Sends to the
+ * CAN socket, sets signal handlers and the signal mask of the process, and writes to stderr. */
 #define _GNU_SOURCE
 #include "gateway/bus.h"
 
@@ -37,8 +38,9 @@ int bus_catch_signals(void)
 {
     struct sigaction before;
     (void)signal(SIGPIPE, SIG_IGN);
+    /* A SIGHUP that is ignored, as by nohup, stays ignored. */
     if (sigaction(SIGHUP, NULL, &before) != 0 ||
-        (before.sa_handler != SIG_IGN && !catch_signal(SIGHUP))) { /* nohup */
+        (before.sa_handler != SIG_IGN && !catch_signal(SIGHUP))) {
         return -1;
     }
     return catch_signal(SIGTERM) && catch_signal(SIGINT) ? 0 : -1;

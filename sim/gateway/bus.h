@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* bus: the CAN side of the gateway, its signals and its errors. Used by gateway/main, gateway/fifo_side and
- * gateway/slcan_side. One thread. */
+/* bus: sends frames of the gateway to CAN, counts the signals that end the process, and prints error messages. Used by
+ * gateway/main, gateway/fifo_side and gateway/slcan_side. One thread. Sends to the CAN socket, sets signal handlers and
+ * the signal mask of the process, and writes to stderr. */
 #ifndef GATEWAY_BUS_H
 #define GATEWAY_BUS_H
 

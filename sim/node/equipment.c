@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/equipment.h (see there): limit switches, home switch and brake of a simulated axis. Used by sim/node
- * only. Pure functions. */
+ * only. Any thread; equipment_init writes the caller's struct, the other functions change nothing. No I/O. */
 #include "node/equipment.h"
 
 void equipment_init(struct equipment *e, const struct drive_config *config)

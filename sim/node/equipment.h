@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* equipment: limit and home switches, ratings, holding brake and friction of a simulated axis. Used by sim/node only.
  *
- * Switches have places in the coordinates that the axis has at power-on. Homing changes the coordinates, not the
- * switches. Pure functions.
+ * The places of the switches are in the coordinates of the axis at power-on. Homing changes the coordinates, not the
+ * switches. Any thread; equipment_init writes the caller's struct, the other functions change nothing. No I/O.
  */
 #ifndef NODE_EQUIPMENT_H
 #define NODE_EQUIPMENT_H
@@ -23,8 +23,8 @@
 struct equipment {
     double limit_negative_mm; /* switch on at and below; -EQUIPMENT_NOWHERE: none */
     double limit_positive_mm; /* switch on at and above; EQUIPMENT_NOWHERE: none */
-    double home_from_mm;      /* home switch on from here ... */
-    double home_to_mm;        /* ... to here; from above to: none */
+    double home_from_mm;      /* home switch on from this place ... */
+    double home_to_mm;        /* ... to this place; less than home_from_mm: no home switch */
     double rated_torque_nm;   /* more than 0 */
     double rated_current_a;   /* more than 0 */
     double overload_s;        /* from cold to the overload trip at the full voltage; 0: never */
@@ -38,7 +38,7 @@ struct equipment {
  * as the motor. */
 void equipment_init(struct equipment *equipment, const struct drive_config *config);
 
-/* Whether all figures are in their ranges; and the rule, as one phrase. */
+/* Whether all values are in their ranges. equipment_rule: these ranges in words, for an error message. */
 bool equipment_ok(const struct equipment *equipment);
 extern const char equipment_rule[];
 

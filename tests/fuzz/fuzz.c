@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fuzz.h (see there): support of the fuzz harnesses. Part of each fuzz harness; ends the process when a
- * check fails. */
+/* Implements fuzz.h (see there): support of the fuzz harnesses. Part of each fuzz harness. No I/O, except that
+ * fuzz_broken writes the broken rule to stderr and aborts the process. */
 #include "fuzz.h"
 
 #include <stdio.h>

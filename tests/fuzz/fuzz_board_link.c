@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What comes from a board: characters to the SLCAN decoder, and requests to the gateway's pacing. A decoded frame,
- * encoded and decoded again, is the same frame. A request is replied to after fewer than ROUNDS_MAX waits, each longer
- * than 0.
+ * Fuzz harness of can/slcan.h and gateway/pacing.h: characters and requests as an emulated board sends them. A frame
+ * that the SLCAN decoder accepts is the same after encoding and decoding it again. Each request gets its reply after
+ * fewer than ROUNDS_MAX waits, and each wait is longer than 0.
  *
- * Input: requests (one byte each selects the kind), then characters. Run by `make fuzz`, and on its corpus by
- * `make unit`; no other I/O.
+ * Input: requests (one byte each selects the kind), then characters.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <string.h>
 
@@ -46,7 +48,8 @@ static void characters(struct fuzz_input *in)
     }
 }
 
-/* The gateway waits for pacing_wait_ns; `frames` come at the given round. */
+/* Makes one request and waits as the gateway does, by pacing_wait_ns. If `how` is at least 0x80, one frame has come
+ * after the round (how & 7). */
 static void request(struct fuzz_input *in, struct pacing *pacing, uint64_t *now_ns)
 {
     const uint8_t how = fuzz_byte(in);

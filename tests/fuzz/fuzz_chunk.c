@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Chunks of a job with changes, always with the CRCs that they should have. What chunk_check accepts is taken over and
- * runs under holds, resumes, overrides, stops and fault stops at any tick, each chunk in time, late or never: setpoints
- * do not jump, the motion along the path keeps the limits that the chunks were checked against, and no stop takes
- * longer than its deadline.
+ * Fuzz harness of core/chunk.h: chunks of a job with changes, always with the CRCs that they should have. What
+ * chunk_check accepts is taken over and runs under holds, resumes, overrides, stops and fault stops at any tick, each
+ * chunk in time, late or never. Setpoints do not jump, the motion along the path keeps the limits that the chunks were
+ * checked against, and no stop takes longer than its deadline.
  *
  * Input: which job and form (job + JOBS * form), 16 commands (ticks to wait, command), the ticks from which each chunk
- * is there, then changes. Run by `make fuzz`, and on its corpus by `make unit`; reads files of tests/data.
+ * is there, then changes.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). Reads files of
+ * tests/data; no other I/O, except that a broken rule is printed and aborts the process.
  */
 #include <math.h>
 #include <stdlib.h>

@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The whole controller on the fake port, with two fake drives, a host, and another node that sends any frames; frames
- * are lost and refused, ticks are late, the power fails. Rules: those of port.h (the fake port checks them); no
- * setpoint of an axis on the path is farther from the one before than its velocity limit allows; a program that a block
- * transfer has brought, or taken, is the one that was sent, whatever came between its frames; and where the
- * configuration is still the first one, a sound bus and a reset lead out of everything.
+ * Fuzz harness of app/controller.h: the whole controller on the fake port, with two fake drives, a host, and another
+ * node that sends any frames; frames are lost and refused, ticks are late, the power fails. Rules: those of port.h (the
+ * fake port checks them); no setpoint of an axis on the path is farther from the one before than its velocity limit
+ * allows; a program that a block transfer has brought, or taken, is the one that was sent, whatever came between its
+ * frames; and where the configuration is still the first one, a sound bus and a reset lead out of everything.
  *
- * Input: one byte selects what happens next. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
+ * Input: one byte selects what happens next.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <stdlib.h>
 #include <string.h>

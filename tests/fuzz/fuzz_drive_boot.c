@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The SDO client and the boot of the drives on a bus where anything may happen to requests and answers, with any
- * configuration. A boot that ends has found drives of the expected identity. Afterwards, on a bus that is sound and
- * with drives that were switched on anew, it ends.
+ * Fuzz harness of app/drives/drive_boot.h: the SDO client and the boot of the drives on a bus where anything may happen
+ * to requests and answers, with any configuration. A boot that ends has found drives of the expected identity.
+ * Afterwards, on a bus that is sound and with drives that were switched on anew, it ends.
  *
- * Input: writes to the configuration, then what becomes of each frame. Run by `make fuzz`, and on its corpus by
- * `make unit`; no other I/O.
+ * Input: writes to the configuration, then what becomes of each frame.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <string.h>
 

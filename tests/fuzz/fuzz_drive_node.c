@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A simulated drive with any frames at any time: what it sends are frames, and after a reset its SDO server answers.
+ * Fuzz harness of node/drive_node.h: a simulated drive receives any frames at any time. What it sends are frames, and
+ * after a reset its SDO server answers.
  *
- * Input: one byte selects what happens next. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
+ * Input: one byte selects what happens next.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <string.h>
 

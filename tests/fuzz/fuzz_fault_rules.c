@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Fault rules: any text to their parser, and what the injector and the drives do by the rules that it takes. A refusal
- * has one line; all frames that come out are frames; time that is due comes.
+ * Fuzz harness of faults/fault_rules.h: any text to the parser of fault rules, and what the injector and the drives do
+ * by the rules that it takes. A refusal has one line; all frames that come out are frames; time that is due comes.
  *
- * Input: text up to the first byte 0, then frames and time. Run by `make fuzz`, and on its corpus by `make unit`; no
- * other I/O.
+ * Input: text up to the first byte 0, then frames and time.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <string.h>
 

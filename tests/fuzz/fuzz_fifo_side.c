@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What an emulated board writes to its FIFO, in pieces of any size, while frames wait on the bus. Each complete request
- * gets one reply, of frames of the bus; only frames and filters go to the bus; a request that is none ends the service.
+ * Fuzz harness of gateway/fifo_side.h: what an emulated board writes to its FIFO, in pieces of any size, while frames
+ * wait on the bus. Each complete request gets one reply, of frames of the bus; only frames and filters go to the bus; a
+ * request that is none ends the service.
  *
  * Input: how many frames wait on the bus, and these; then requests. The FIFOs are a pair of sockets that keep the
- * pieces apart, so all of them can be written before the gateway reads. Run by `make fuzz`, and on its corpus by
- * `make unit`; opens pairs of sockets.
+ * pieces apart, so all of them can be written before the gateway reads.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). Opens pairs of
+ * sockets; no other I/O, except that a broken rule is printed and aborts the process.
  */
 #define _GNU_SOURCE
 #include <string.h>

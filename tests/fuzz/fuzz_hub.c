@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The hub with processes that send anything: members, participants and others connect, send packets and leave, in real
- * and in virtual time. It closes connections that send what it does not understand, and serves the next one.
+ * Fuzz harness of hub/hub.h: members, participants and other processes connect, send any packets and leave, in real and
+ * in virtual time. It closes connections that send what it does not understand, and serves the next one.
  *
- * Input: the kind of time, then who does what. Run by `make fuzz`, and on its corpus by `make unit`; opens sockets.
+ * Input: the kind of time, then who does what.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). Opens sockets and a
+ * pipe; the socket of the hub is a file in /tmp that it removes. A broken rule is printed and aborts the process.
  */
 #define _GNU_SOURCE
 #include <stdio.h>

@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A program image: a golden one with changes, or any bytes, always with the CRC that it should have. What program_check
- * accepts for axes with limits runs to its end, or to the end of a stop, under holds, resumes, overrides and stops at
- * any tick: the setpoints keep the limits of each axis at every tick and stay within travel.
+ * Fuzz harness of core/program_check.h: a program image, a golden one with changes, or any bytes, always with the CRC
+ * that it should have. What program_check accepts for axes with limits runs to its end, or to the end of a stop, under
+ * holds, resumes, overrides and stops at any tick. The setpoints keep the limits of each axis at every tick and stay
+ * within travel.
  *
- * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes. Run by `make fuzz`,
- * and on its corpus by `make unit`; reads files of tests/data.
+ * Input: which image, 6 bytes of limits, commands (16 pairs: ticks to wait, command), then changes.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). Reads files of
+ * tests/data; no other I/O, except that a broken rule is printed and aborts the process.
  */
 #include <math.h>
 #include <stdlib.h>

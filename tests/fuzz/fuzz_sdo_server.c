@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The SDO server with any frames, at any time, with hooks that refuse: it keeps to the rules of its hooks (checked in
- * small_od.c), leaves constants alone, and serves the next honest client.
+ * Fuzz harness of canopen/sdo_server.h: the SDO server with any frames, at any time, with hooks that refuse. It keeps
+ * to the rules of its hooks (checked in small_od.c), leaves constants alone, and serves the next honest client.
  *
  * Input: one byte selects what happens next: time, refusals, what an honest client would send next, the beginning of a
- * transfer, or any frame. Run by `make fuzz`, and on its corpus by `make unit`; no other I/O.
+ * transfer, or any frame.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <string.h>
 

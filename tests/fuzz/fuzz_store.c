@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What a controller finds in its store at power-on: any bytes, in banks with records that are right or wrong; and what
- * a loss of power at any operation leaves. With a store that it wrote itself the controller has the parameters from
- * before a save or those of the save, and nothing else.
+ * Fuzz harness of app/controller.h and app/bank_record.h: what a controller finds in its store at power-on. That is any
+ * bytes, in banks with records that are right or wrong; and what a loss of power at any operation leaves. With a store
+ * that it wrote itself the controller has the parameters from before a save or those of the save, and nothing else.
  *
- * Input: what is in the banks; then values to save, and when the power goes. Run by `make fuzz`, and on its corpus by
- * `make unit`; no other I/O.
+ * Input: what is in the banks; then values to save, and when the power fails.
+ *
+ * Run by `make fuzz` with libFuzzer, and on its corpus by `make test` and `make unit` (replay.c). No I/O, except that a
+ * broken rule is printed and aborts the process.
  */
 #include <stdlib.h>
 #include <string.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * main() of a harness without libFuzzer: runs the files that it is given, or those of its corpus, tests/data/fuzz/NAME
- * for a program fuzz_NAME, in the root of the tree; and on the empty input. Each run may abort. Run by `make unit`;
- * reads the files.
+ * for a program fuzz_NAME, in the root of the tree; and on the empty input. Each run may abort. Linked with each
+ * harness. Run by `make test` and `make unit`; reads the files, and writes their names to stderr.
  */
 #define _GNU_SOURCE
 #include <dirent.h>

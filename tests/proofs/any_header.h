@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* The header of a program before its sizes and counts are checked. Include it after core/program.c and proof.h.
- * Included by cbmc_compact.c and cbmc_record.c; never executed. */
+ * Included by cbmc_compact.c and cbmc_record.c; never executed, touches nothing. */
 #ifndef HODOGRAPH_PROOFS_ANY_HEADER_H
 #define HODOGRAPH_PROOFS_ANY_HEADER_H
 

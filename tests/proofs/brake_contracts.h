@@ -2,7 +2,7 @@
 /*
  * What the parts of a brake promise each other (docs/theory/numerics.md section 12, "Path stop"; docs/theory/proofs.md
  * 15.5 and 15.6); for eva_brake.c, eva_depth.c and cbmc_brake.c. Included by cbmc_brake.c, cbmc_settle.c, eva_brake.c
- * and override_contracts.h; never executed.
+ * and override_contracts.h; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_BRAKE_CONTRACTS_H
 #define HODOGRAPH_BRAKE_CONTRACTS_H

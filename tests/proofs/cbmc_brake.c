@@ -3,7 +3,7 @@
  * A brake goes one way (docs/theory/proofs.md section 15.6). From every state that a falling tick can find, whatever
  * the products are that it compares: once the acceleration is not above 0 it stays so, and the speed does not rise; the
  * remainder is a state of the same kind, or one from which the release phase takes two ticks or more (cbmc_settle.c).
- * Analysed by CBMC in `make proofs`; never executed.
+ * Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --signed-overflow-check

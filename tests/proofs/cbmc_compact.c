@@ -2,7 +2,7 @@
 /*
  * Compact segments, pieces, stops and events lie inside the image, as those of cbmc_record.c do: every record begins
  * where it has its whole length before the end of an image of up to 8 KiB that program_open accepts. Analysed by CBMC
- * in `make proofs`; never executed.
+ * in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 40

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The slow division and the count of zeros: no division by 0, no zero counted, no shift out of range, for any operands
- * but a divisor of 0. Analysed by CBMC in `make proofs`; never executed.
+ * but a divisor of 0. Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never
+ * executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 70

@@ -2,8 +2,8 @@
 /*
  * The program clock searches its piece, in a program of any three pieces of which any first ones have records, from any
  * of these and at any time: it never reads a record after the last, stops at the first piece that ends after the time,
- * and is at the duration in no other than the last state of the program. Analysed by CBMC in `make proofs`; never
- * executed.
+ * and is at the duration in no other than the last state of the program. Analysed by CBMC in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 6 --pointer-check --bounds-check

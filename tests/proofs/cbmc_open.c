@@ -2,7 +2,8 @@
 /*
  * program_open for every image of any size: it reads inside the image only, and the sizes that it accepts are those of
  * its axes and flags. That its counts fit is shown by cbmc_record.c and cbmc_compact.c. Whether the CRC is right is
- * left open. Analysed by CBMC in `make proofs`; never executed.
+ * left open. Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches
+ * nothing.
  *
  * prover: cbmc
  * options: --unwind 40

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A constant override: a tick that searches a ramp, or begins one, leaves a sound plan (plan_is_sound.h), and so does a
- * reset. Analysed by CBMC in `make proofs`; never executed.
+ * reset. Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches
+ * nothing.
  *
  * prover: cbmc
  * options: --unwind 6 --signed-overflow-check

@@ -2,7 +2,7 @@
 /*
  * The numbers of core/real.h, from any normal ones or 0: nothing overflows, every shift is in range, and what comes out
  * is normal or 0, with an exponent as real_contracts.h says. Quotients of mantissas are left open; none is by 0.
- * Analysed by CBMC in `make proofs`; never executed.
+ * Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 4

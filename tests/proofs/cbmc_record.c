@@ -2,8 +2,8 @@
 /*
  * Segments, pieces and events lie inside the image: every record begins where it has its whole length before the end of
  * an image of up to 16 KiB that program_open accepts, and its readers stay inside the record. (For any size: h + s i +
- * s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.) Analysed by CBMC in `make proofs`; never
- * executed.
+ * s <= h + s n as i < n; a line that SAT solvers find hard with 32 bits.) Analysed by CBMC in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 40

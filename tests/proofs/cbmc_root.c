@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The square root: no division by 0, no shift out of range, no zero counted, for any number; the root of a word is
- * exact, no root is above 2^32 - 1, none of 2^28 or more below 2^14 - 1. Analysed by CBMC in `make proofs`; never
- * executed.
+ * Square roots (core/qmath.h): no division by 0, no shift out of range, no unsigned overflow, and `__builtin_clz` is
+ * never called with 0. For any word of at least 2^30 the root is in [2^15, 2^16), the remainder is at most twice the
+ * root, and qmath_root_above is in [2^15, 65602]. For any 64-bit number qmath_root is below 2^32; for numbers of 2^28
+ * or more it is at least 2^14 - 1.
+ *
+ * Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 70 --unsigned-overflow-check

@@ -2,7 +2,7 @@
 /*
  * The release phase of a brake (docs/theory/proofs.md section 15.6): as long as the jerks are not negative the speed
  * does not rise in a tick, it takes as many ticks as it began with, and speed and acceleration are 0 at its end.
- * Analysed by CBMC in `make proofs`; never executed.
+ * Analysed by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 11 --unwinding-assertions --signed-overflow-check

@@ -2,8 +2,8 @@
 /*
  * What check_speed lets through of a planar program is bounded as segment_bounds.h says: the five coefficients of sigma
  * are positive, the greatest is at most twice the least and a fifteenth of their sum at most 32, so each of them is at
- * most 3 * 64. The products stand for what eva_product.c shows of them. Analysed by CBMC in `make proofs`; never
- * executed.
+ * most 3 * 64. The products stand for what eva_product.c shows of them. Analysed by CBMC in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 10

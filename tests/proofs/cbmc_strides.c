@@ -3,7 +3,7 @@
  * Segments, pieces, stops and events follow each other, with and without compact records: each begins where
  * cbmc_record.c and cbmc_compact.c say. Shown of the first ones, since a place is linear in the number of its record
  * and in the counts. The reader of stops stays inside its record: the last one, in an image that ends with it. Analysed
- * by CBMC in `make proofs`; never executed.
+ * by CBMC in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 40

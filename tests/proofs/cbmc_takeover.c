@@ -6,8 +6,8 @@
  * that goes on never counts as ended, a takeover in motion keeps time and piece, and other records change nothing
  * else.
  *
- * The functions that the motion calls do anything that their headers allow. Analysed by CBMC in `make proofs`; never
- * executed.
+ * The functions that the motion calls do anything that their headers allow. Analysed by CBMC in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 4 --unwinding-assertions --signed-overflow-check

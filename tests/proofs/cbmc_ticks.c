@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * A ramp has no more ticks of rise than of half, whatever the products of override_ticks_of are, so `even` is not
- * negative; and a step is a half of its change at most. Analysed by CBMC in `make proofs`; never executed.
+ * negative; and a step is a half of its change at most. Analysed by CBMC in `make proofs` (tools/analysis/prove.py
+ * explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * replaces: qmath_product_unsigned:some_product qmath_div_u64:some_quotient

@@ -2,8 +2,8 @@
 /*
  * The time of an arc length, in a program of three pieces of any durations and starts: no piece is requested that there
  * is not, none at a time beyond its end, and the time is never beyond the program's. A round of the bisection, from any
- * state that a round can leave, halves the remainder at least: it ends after 64. Analysed by CBMC in `make proofs`;
- * never executed.
+ * state that a round can leave, halves the remainder at least: it ends after 64. Analysed by CBMC in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: cbmc
  * options: --unwind 6 --unwinding-assertions

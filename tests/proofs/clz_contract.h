@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What proofs take for granted of qmath_clz64, which is the compiler's own; alone, for proofs that have the other
- * functions of qmath. Included by proofs of this folder; never executed. */
+/* Contract of qmath_clz64 that proofs assume: it is a built-in function of the compiler. A header of its own, for
+ * proofs that include the other functions of core/qmath. Included by proofs of this folder. Declarations only; never
+ * executed, touches nothing. */
 #ifndef HODOGRAPH_CLZ_CONTRACT_H
 #define HODOGRAPH_CLZ_CONTRACT_H
 

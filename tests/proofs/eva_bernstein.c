@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The Bernstein form: halving any coefficients of any degree, and reading them, keeps inside the arrays and overflows
- * nowhere. Its search through the halves: docs/theory/proofs.md section 15.2. Analysed by Eva in `make proofs`; never
- * executed.
+ * nowhere. Its search through the halves: docs/theory/proofs.md section 15.2. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * shows: bernstein_within bernstein_halve

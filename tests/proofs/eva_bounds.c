@@ -2,7 +2,7 @@
 /*
  * feed_bounds and what it stands on, for every piece whose coefficients and duration are in range and for any bounds:
  * nothing overflows, every index and shift is in range, and the results are as piece_bounds.h says. Analysed by Eva in
- * `make proofs`; never executed.
+ * `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;

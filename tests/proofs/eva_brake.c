@@ -3,7 +3,7 @@
  * The brake along the path, for every code of the stop table, every state that it may begin from, and every state of a
  * tick: nothing overflows, no shift is out of range, no division by 0. What comes out of the table and of the begin is
  * in the ranges that the ticks start from. The release phase by ranges of its number of ticks. Analysed by Eva in
- * `make proofs`; never executed.
+ * `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 5000

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * A tick of the program clock and of the plan of its override, for any program of three pieces, wherever its time is
- * and after any command: nothing overflows, no window needs a piece after the last one. What the plan decides:
- * cbmc_plan.c. Which piece the clock is in: cbmc_ends.c. Analysed by Eva in `make proofs`; never executed.
+ * One tick of the program clock and of the plan of the feed override, for any program of three pieces, at any time in
+ * each piece, after any command: nothing overflows, and the look-ahead reads no piece after the last one. What the plan
+ * decides: cbmc_plan.c. Which piece the clock is in: cbmc_ends.c. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 10

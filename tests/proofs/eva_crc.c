@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The CRC of any bytes: nothing outside of them and of its table is read. Their value: test_program.c and the golden
- * files. Analysed by Eva in `make proofs`; never executed.
+ * files. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches
+ * nothing.
  *
  * prover: eva
  * options: -eva-slevel 0

@@ -2,7 +2,7 @@
 /*
  * The bound of one brake, from any start and with any codes: nothing overflows, also no unsigned number, so that no
  * bound is shortened by a wrap; no division by 0. What intervals do not follow: docs/theory/proofs.md section 15.2.
- * Analysed by Eva in `make proofs`; never executed.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 100 -warn-unsigned-overflow

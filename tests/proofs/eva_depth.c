@@ -2,8 +2,8 @@
 /*
  * How deep a tick of a brake may go, for any jerk of the stop table and any speed that is above two ticks of it and
  * below 2^31 of them: no number wraps or overflows, no shift is out of range, no division by 0, the root is above 3/2,
- * and what comes out is at most 2^62. By octaves. Rough numbers have 31 bits. Analysed by Eva in `make proofs`; never
- * executed.
+ * and what comes out is at most 2^62. By octaves. Rough numbers have 31 bits. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 20000 -warn-unsigned-overflow

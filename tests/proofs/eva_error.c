@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The text of any code: found inside the table, and never none. Analysed by Eva in `make proofs`; never executed.
+ * The text of any code: found inside the table, and never none. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * shows: program_error_text

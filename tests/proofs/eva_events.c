@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The rules of events, for up to twenty of them of any contents: no event is read that the image does not have.
- * Analysed by Eva in `make proofs`; never executed.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000

@@ -2,7 +2,7 @@
 /*
  * A feed piece of the integer kernels, for any coefficients and duration in range and any time: the arc length and the
  * feed overflow nowhere, shifts are in range. That no sum of the slope passes 31 bits: docs/theory/proofs.md 15.3.
- * Analysed by Eva in `make proofs`; never executed.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 100

@@ -3,7 +3,8 @@
  * The fixed kernel on any segment that passes the checks, at any arc length on it or 2^-33 mm outside: nothing
  * overflows, no conversion changes a number, no division by 0. A segment is given by the power of four above its sigma,
  * of which all 22 are gone through, and the least Bernstein coefficient, in seven ranges; the greatest is at most twice
- * that. Analysed by Eva in `make proofs`; never executed.
+ * that. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches
+ * nothing.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast

@@ -1,8 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * The first guess of z, as eva_fixed.c takes it: it has the sign of the arc length, is not 0 far outside, and nothing
- * overflows, for any slopes of the cubic that a speed ratio of 2 leaves, in 6 x 6 ranges, and 16 of t. Analysed by Eva
- * in `make proofs`; never executed.
+ * The contract of first_guess (core/kernel_fixed.c) that eva_fixed.c assumes. The first guess of z has the sign of the
+ * arc length s, |z| is at least FAR_Z_Q31 where s is beyond FAR_Q30, and nothing overflows. Shown for all end slopes of
+ * the cubic in [0.47, 2.06], the range that a speed ratio of at most 2 permits, with room for rounding; in 6 x 6 ranges
+ * of the slopes and 16 ranges of t.
+ *
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 10
@@ -24,7 +27,7 @@ static int32_t last_q26;
 
 #include "core/kernel_fixed.c"
 
-/* first_guess needs t only: with this scale it is as wide as s_q30 / 2. */
+/* first_guess needs t only: with this scale t takes the values of s_q30 / 2. */
 static void guess(struct kernel_fixed_arc *k, int64_t from, int64_t to)
 {
     int32_t s_q30 = (int32_t)any_between(from, to);
@@ -35,7 +38,7 @@ static void guess(struct kernel_fixed_arc *k, int64_t from, int64_t to)
     prove(z <= 0 && z > INT32_MIN);
 }
 
-/* t is the greatest there is where s is beyond FAR_Q30, as no segment's scale is below 2. */
+/* Where s is beyond FAR_Q30, t has its greatest value, because the scale of every segment is at least 2. */
 static void guess_far(struct kernel_fixed_arc *k)
 {
     int64_t s_q30 = any_between(FAR_Q30, INT32_MAX);

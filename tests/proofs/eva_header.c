@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * program_check and the rules of the header, for every header: no read outside of it, and what the checks of segments
- * and pieces start from. Analysed by Eva in `make proofs`; never executed.
+ * and pieces start from. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never
+ * executed, touches nothing.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations

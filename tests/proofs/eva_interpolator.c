@@ -2,7 +2,8 @@
 /*
  * The interpolator and the coefficient records of a program, for any program of three segments and pieces and of two to
  * six path axes that passed the checks, any kernel, wherever the cursor is, and any times: no segment, piece or record
- * is requested that there is not, nothing overflows. Analysed by Eva in `make proofs`; never executed.
+ * is requested that there is not, nothing overflows. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains
+ * the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 60

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Products from halves of 16 bits, for cores that have no longer ones: no sum overflows, for any factors. Analysed by
- * Eva in `make proofs`; never executed.
+ * Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * mutant: core/qmath.h: int32_t b0 = (int32_t)((uint32_t)b & 0xFFFFu) => int32_t b0 = (int32_t)((uint32_t)b & 0x1FFFFu)

@@ -3,7 +3,8 @@
  * The feed override, for a program of three pieces: every command, a tick and every question, from any phase and state,
  * whatever the plan of the override, the brake and the interpolator give in their ranges: nothing overflows, no
  * conversion to a signed type changes a number, no division by 0, no entry of the stop table beyond the last is read,
- * and what stands in a field of few values stays one of them. Analysed by Eva in `make proofs`; never executed.
+ * and what stands in a field of few values stays one of them. Analysed by Eva in `make proofs` (tools/analysis/prove.py
+ * explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 60 -warn-signed-downcast

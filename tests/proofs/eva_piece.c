@@ -2,7 +2,7 @@
 /*
  * The checks of feed pieces and their joints, for every image of four pieces (the third and all later ones are met in
  * the same state) and any limits: nothing overflows, every index and shift is in range. Analysed by Eva in
- * `make proofs`; never executed.
+ * `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 8000

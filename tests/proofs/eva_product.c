@@ -2,7 +2,7 @@
 /*
  * How much a product adds to a sum, as cbmc_speed.c takes it: a square is not negative, to rounding, and is large where
  * its factor is, and a product of small factors is small. The sum is 0 here; qwide_add_product only adds to it.
- * Analysed by Eva in `make proofs`; never executed.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * shows: qwide_add_product

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * qmath, qwide and counts: no operation overflows, no shift is out of range, under the conditions that their headers
- * state; and the ranges of the results that other proofs rely on. Analysed by Eva in `make proofs`; never executed.
+ * state; and the ranges of the results that other proofs rely on. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;

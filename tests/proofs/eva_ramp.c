@@ -2,7 +2,8 @@
 /*
  * What a tick computes of a ramp of the override, for any override bounds above 0, any period and any change: nothing
  * overflows, no shift is out of range, no division by 0, no product of ticks passes 64 bits; and what
- * override_contracts.h promises. Analysed by Eva in `make proofs`; never executed.
+ * override_contracts.h promises. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords);
+ * never executed, touches nothing.
  *
  * prover: eva
  * assumes: qmath_div_u64 program_piece_override

@@ -2,7 +2,8 @@
 /*
  * The checks of segments and their joints, and the expansion that they use, for every image of four segments and of two
  * to six path axes: nothing overflows, every index and shift is in range. Four are as good as any number: the third and
- * all later ones are met in the same state. Analysed by Eva in `make proofs`; never executed.
+ * all later ones are met in the same state. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the
+ * keywords); never executed, touches nothing.
  *
  * prover: eva
  * instead: core/qmath.h: uint32_t high = (uint32_t)((uint64_t)a >> 32); => if (1) return (a >> 32) * (int64_t)b + (int64_t)(((uint64_t)(uint32_t)a * b) >> 32); uint32_t high = 0;

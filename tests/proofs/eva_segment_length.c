@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * Minimum segment length, for six segments and six pieces that have passed their own checks: nothing overflows, no
- * division by 0, and no segment or piece is read that the image does not have. Analysed by Eva in `make proofs`; never
- * executed.
+ * division by 0, and no segment or piece is read that the image does not have. Analysed by Eva in `make proofs`
+ * (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-domains equality,symbolic-locations -eva-slevel 2000

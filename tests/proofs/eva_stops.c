@@ -3,7 +3,7 @@
  * The check of the stop table, for every image of ten pieces whose pieces have passed their own check (more than the
  * walk remembers; all later ones are met in the same state) and any limits: it reads the table inside the image,
  * nothing overflows, also no unsigned number, so that no bound is shortened by a wrap, no division by 0, and it ends.
- * Analysed by Eva in `make proofs`; never executed.
+ * Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 0 -warn-unsigned-overflow

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The fixed kernel on a segment below all resolution, whose arc length is replaced, in the plane and in space: as
- * eva_fixed.c, with nothing taken for granted. Analysed by Eva in `make proofs`; never executed.
+ * eva_fixed.c, with nothing taken for granted. Analysed by Eva in `make proofs` (tools/analysis/prove.py explains the
+ * keywords); never executed, touches nothing.
  *
  * prover: eva
  * options: -eva-slevel 20 -warn-signed-downcast

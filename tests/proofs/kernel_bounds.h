@@ -3,7 +3,7 @@
  * What the fixed kernel's functions promise each other beyond what intervals show: consequences of the positive
  * Bernstein coefficients of sigma (docs/theory/proofs.md section 15.3). Eva takes them for granted in eva_fixed.c, and
  * tests/unit/test_kernel_ranges.c holds the functions themselves to them at the corners. Included by eva_fixed.c and
- * eva_guess.c; never executed.
+ * eva_guess.c; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_KERNEL_BOUNDS_H
 #define HODOGRAPH_KERNEL_BOUNDS_H

@@ -2,7 +2,7 @@
 /*
  * What a tick of the feed override takes for granted of the program clock, the plan of the override, the brake and the
  * interpolator; for eva_override.c (docs/theory/proofs.md sections 15.5 and 15.6). Included by eva_override.c; never
- * executed.
+ * executed, touches nothing.
  */
 #ifndef HODOGRAPH_OVERRIDE_CONTRACTS_H
 #define HODOGRAPH_OVERRIDE_CONTRACTS_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * What the checks of a feed piece need of feed_bounds, and what they get: eva_bounds.c proves it, eva_piece.c,
- * eva_segment_length.c and eva_stops.c rely on it. Included by eva_bounds.c, eva_piece.c, eva_segment_length.c and
- * eva_stops.c; never executed.
+ * Contracts of the functions of core/feed_bounds.h: what they require of a feed piece and what they ensure.
+ * eva_bounds.c proves them; eva_piece.c, eva_segment_length.c and eva_stops.c assume them. Included by these four
+ * files. Declarations with contracts (ACSL) and predicates only; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_PIECE_BOUNDS_H
 #define HODOGRAPH_PIECE_BOUNDS_H

@@ -7,7 +7,7 @@
  *
  * With d the step, f the ticks risen, r and e those of rise and of even slope that are left, the slope is d f, a cut
  * would raise the override by d f^2, and what is still to come before the fall raises it by 4 d f r + 2 d r^2 + 2 d e
- * (f + r) more: three numbers of their own here. Included by cbmc_plan.c; never executed.
+ * (f + r) more: three numbers of their own here. Included by cbmc_plan.c; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_PLAN_IS_SOUND_H
 #define HODOGRAPH_PLAN_IS_SOUND_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What a proof is written with; the same words for both provers. tools/analysis/prove.py runs the proofs, and
- * docs/theory/proofs.md section 15 says what they show. Included by proofs of this folder; never executed.
+ * docs/theory/proofs.md section 15 says what they show. Included by proofs of this folder; never executed, touches
+ * nothing.
  */
 #ifndef HODOGRAPH_PROOF_H
 #define HODOGRAPH_PROOF_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What other proofs take for granted of qmath. Which proof or test shows each: docs/theory/proofs.md section 15.5.
- * Included by proofs of this folder; never executed.
+ * Included by proofs of this folder; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_QMATH_CONTRACTS_H
 #define HODOGRAPH_QMATH_CONTRACTS_H

@@ -2,7 +2,7 @@
 /*
  * What the parts of the feed override promise each other: docs/theory/numerics.md section 12, "Feed override", and
  * docs/theory/proofs.md 15.4. Each contract stands here once, for the proof that shows it and for those that assume it
- * (section 15.5). Included by proofs of this folder; never executed.
+ * (section 15.5). Included by proofs of this folder; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_RAMP_CONTRACTS_H
 #define HODOGRAPH_RAMP_CONTRACTS_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * What the numbers of core/real.h are after an operation: eva_segment.c relies on it, cbmc_real.c shows it. Included by
- * cbmc_real.c and eva_segment.c; never executed.
+ * cbmc_real.c and eva_segment.c; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_REAL_CONTRACTS_H
 #define HODOGRAPH_REAL_CONTRACTS_H

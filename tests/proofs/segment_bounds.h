@@ -3,7 +3,7 @@
  * What follows from the rules of protocol.md 1.2 for the size of the preimage, rounded up: docs/theory/numerics.md
  * section 15.1. cbmc_speed.c shows that check_speed lets nothing else through in a planar program; in a spatial one no
  * component has more than 48 bits, which is less. Included by cbmc_speed.c, eva_interpolator.c, eva_product.c and
- * eva_segment.c; never executed.
+ * eva_segment.c; never executed, touches nothing.
  */
 #ifndef HODOGRAPH_SEGMENT_BOUNDS_H
 #define HODOGRAPH_SEGMENT_BOUNDS_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What the check of the stop table stands on; eva_curve.c and eva_stops.c (docs/theory/proofs.md section 15.5).
- * Included by eva_curve.c and eva_stops.c; never executed. */
+ * Included by eva_curve.c and eva_stops.c; never executed, touches nothing. */
 #ifndef HODOGRAPH_STOP_CONTRACTS_H
 #define HODOGRAPH_STOP_CONTRACTS_H
 

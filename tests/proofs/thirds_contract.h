@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* What proofs take for granted of the divisions of qmath by 3 and 5 (docs/theory/proofs.md section 15.2); alone,
- * likewise. Included by eva_brake.c, eva_fixed.c and qmath_contracts.h; never executed. */
+/* Contracts of qmath_third and qmath_fifth that proofs assume; docs/theory/proofs.md section 15.2 gives the argument. A
+ * header of its own, because eva_brake.c and eva_fixed.c include core/qmath.c and can assume these two only. Included
+ * by these proofs and by qmath_contracts.h. Declarations only; never executed, touches nothing. */
 #ifndef HODOGRAPH_THIRDS_CONTRACT_H
 #define HODOGRAPH_THIRDS_CONTRACT_H
 

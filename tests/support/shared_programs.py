@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Programs that are computed once for all tests of a process. Used by conftest.py of several folders; keeps results in
-memory, no I/O.
+"""Programs that are computed once for all tests of a process. Used by conftest.py of several folders. While tests run
+it replaces `plan_stops` of hodograph.program.compiler and steps of `Pipeline`, and keeps up to 200 results in memory;
+`MonkeyPatch` restores the replaced functions. No I/O of its own.
 
 Most tests of a program's motion compile one of a few example files, which costs more processor time than the rest of
-the test. Commands in other processes compile as always.
+the test. Commands that a test starts as processes are not affected.
 
-- `stops_planned_once`, a fixture for the conftest.py of a folder: `compile_path` plans the stops of a motion once. That
-  is nine tenths of its time. Stops are kept by all that they follow from: the image of the program without stops, and
-  both kinds of limits.
-- `share_programs`, for system tests: a `Pipeline` computes each of its steps once. Results are kept by the whole
-  content of path file and machine, so a test that changes a value gets a program of its own.
+- `stops_planned_once`, a fixture for the conftest.py of a folder: `compile_path` plans the stops of a motion once.
+  Planning the stops takes nine tenths of the time of `compile_path`. The key of a stored result is everything that
+  determines it: the program image without name and events, the limits for holds and for fault stops, and the settings
+  of StopTerms.
+- `share_programs`, for system tests: a `Pipeline` computes each of its steps once. The key of a result is the whole
+  content of path file and machine file. So a test that changes a value does not get another test's program.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Programs that a test runs from start to end, with a limit of time and the expected exit status. Used by the tests of
-packages and of the library. Starts processes.
+"""Runs a program to its end, with a time limit, and compares its exit status with the expected one. Used by the tests
+of packages and of the library. Starts processes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,11 @@ ROOT = Path(__file__).resolve().parents[2]
 def run(
     *command: object, cwd: Path = ROOT, status: int = 0, limit_s: float = 300.0
 ) -> subprocess.CompletedProcess[str]:
-    """Runs a program in a folder. AssertionError with the end of its output: it ended with another status."""
+    """Runs a program in a folder.
+
+    Raises AssertionError, with the end of the output, if the exit status differs, and subprocess.TimeoutExpired after
+    limit_s.
+    """
     done = subprocess.run(
         list(map(str, command)),
         cwd=cwd,

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A board that ends in the middle of a motion: by a signal, it stops the axes first; without power, the drives stop.
-Run by pytest; starts an emulated board and drives on a local bus.
+"""A board is ended during a motion. By a signal: it stops the axes on the path first. By loss of power: the drives stop
+by themselves. Run by pytest; starts an emulated board (QEMU, with the image of `make firmware`) and drives on a local
+bus.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from hodograph.pipeline import Pipeline, load_pipeline
 ROOT = Path(__file__).resolve().parents[2]
 DRIVE_EDS = ROOT / "sim/node/drive.eds"
 PERCENT = {"fifo": 100, "slcan": 10}
-"""Of feed: in real time the alpha shall not be over before a busy host has got to act in the middle of it."""
+"""Feed override by link. In real time the motion must last so long that a host under load still acts during it."""
 MIDWAY_TICKS = 300
 """Of 1101 at full feed."""
 TICK = 2
@@ -38,7 +39,7 @@ NO_HEARTBEAT, NO_SETPOINTS, NO_SYNC = 0x8130, 0x8250, 0x8700
 END_S = 300.0
 SYNC_TIMEOUT_US = 200_000
 LOOK_US = 10_000
-"""A simulated drive that nobody wakes reads its clock that often."""
+"""Interval in which a simulated drive without frames reads its clock."""
 
 
 @dataclass(frozen=True)

@@ -37,11 +37,14 @@ pytestmark = pytest.mark.long
 RING_KIB = 16
 """A ring that holds little, so that most instants are near a takeover."""
 LIMIT_S = 120.0
+"""Longest wait for the end of a command, and for the end of a motion."""
 TRANSFER_S = 6.0
-"""After so long the controller gives up a transfer that has broken off, and answers others."""
+"""Time after which the controller aborts an interrupted SDO transfer and accepts another."""
 NEAR_UM = 1.0
-"""From the path, as lines between setpoints 1 ms apart."""
+"""Greatest accepted distance of a target from the path, which is taken as straight lines between setpoints 1 ms apart.
+"""
 LOOK_TICKS = 400
+"""Setpoints of the path among which the place of a target is searched."""
 
 
 def _path_counts(file: Path, machine: Machine) -> NDArray[np.float64]:

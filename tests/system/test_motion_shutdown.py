@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Shutdown of a moving machine at any instant of an optimal program: by one and by two signals, and by the loss of its
-host.
+"""Shutdown of a moving machine at several instants of a time-optimal program: by one and by two signals, and by the
+loss of its host.
 
-The frames on the bus are the evidence: setpoints come to rest within the bound of the stop, or the drives get a quick
-stop. A drive whose axis moves is never switched off. Run by pytest; starts a controller and drives on a local bus.
+The test reads the frames on the bus: the setpoints stop changing within the bound of the stop, or the drives get a
+quick stop. A drive whose axis moves is never switched off. Run by pytest; starts a controller and drives on a local
+bus.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ ENABLE_VOLTAGE, QUICK_STOP = 0x0002, 0x0002
 STATE_BITS, POWERED = 0x6F, (0x27, 0x07)
 """Of the statusword: Operation enabled, Quick stop active. A drive ends its quick stop by itself."""
 STANDS_COUNTS = 2000
-"""2 um: the last of the settling."""
+"""2 um: the axis may still settle by this much."""
 LATE_US = 7000
-"""A round of the main loop, and the ticks until its word is on the bus."""
+"""One cycle of the main loop, and the ticks until its controlword is on the bus."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements checked.h (see there): the program in the store, and limits to check it against. Part of the images
- * checker and stop_checker; reads the store. */
+/* Implements checked.h (see there): opens the program in the store, and has the limits that it is checked against. Part
+ * of the images checker and stop_checker. Reads the store. */
 #include "checked.h"
 
 #include <stdint.h>
@@ -20,6 +20,7 @@ int checked_open(struct program *program)
     return program_open(program, startup_store_base, image_size());
 }
 
+/* The limits of examples/machines/paper_alpha.toml. */
 struct program_limits checked_limits(void)
 {
     const struct program_limits limits = {

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The check of linked images finds each class of what it forbids, and its stacks are those of the compiler. Run by
-pytest; starts compilers and `make`, and writes to temporary folders.
+"""The check of linked images (tools/check_image.py) finds each kind of forbidden code, and its stack sizes agree with
+those that the compiler reports. Run by pytest; starts compilers and `make`, reads build/firmware, and writes to
+temporary folders.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ HEAP = "#include <stdlib.h>\nvoid *f(unsigned n) { void *p = "
 
 
 def compiled(folder: Path, core: tuple[str, ...], source: str) -> Image:
-    """An object."""
+    """Compiles a source to an object file."""
     (folder / "x.c").write_text(source)
     command = [*core, "--specs=picolibc.specs", "-std=c99", "-O1", "-c", "-o"]
     subprocess.run([*command, folder / "x.o", folder / "x.c"], check=True)

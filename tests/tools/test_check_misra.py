@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Deviations from MISRA C: what they cover, and that they go when nothing needs them. Run by pytest; reads the list of
-deviations and its page.
+"""tools/misra/check_misra.py: where a deviation applies, and that a deviation that nothing needs is reported. Run by
+pytest; reads tools/misra/deviations.txt and docs/validation/testing.md.
 """
 
 import re
@@ -35,7 +35,7 @@ def test_a_deviation_holds_in_its_place_only() -> None:
     assert len(_judge("15.5 * early\n21.6 firmware/core/* messages\n")) == 2
 
 
-def test_a_deviation_that_nothing_needs_is_complained_of() -> None:
+def test_a_deviation_that_nothing_needs_is_reported() -> None:
     (complaint,) = _judge("# why\n15.5 * early\n21.6 * messages\n2.5 * of generated files\n")
     assert "nothing deviates from rule 2.5" in complaint
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The parts of continuous integration: a part that fails, or loses its count, is a failure in the last line. Run by
-pytest; starts processes.
+"""tools/run_parts.py: a part that fails, or that prints no count of tests, adds a failure to the sum in the last line.
+Run by pytest; starts processes.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * app_bench: a whole controller on the fake port, with two fake drives, optionally an I/O module, and an SDO client as
- * host, on a bus without delays. Used by the tests of firmware/app (test_app_*.c). One thread; no I/O.
+ * host, on a bus without delays. Used by the tests of firmware/app (test_app_*.c). Changes the bench that it is given
+ * and the one fake port; ends the running test on a failure. One thread; no I/O.
  */
 #ifndef TESTS_UNIT_APP_BENCH_H
 #define TESTS_UNIT_APP_BENCH_H
@@ -14,7 +15,7 @@
 #include "node/io_module.h"
 
 #define BENCH_DRIVES  2u
-#define BENCH_TARGETS 8192u /* of an axis that are recorded */
+#define BENCH_TARGETS 8192u /* setpoints recorded for each axis */
 
 struct app_bench {
     struct controller controller;
@@ -29,8 +30,8 @@ struct app_bench {
     uint32_t beats;                    /* heartbeats of the controller seen, not its boot-up */
     int32_t targets[2][BENCH_TARGETS]; /* setpoints sent while a program ran, by axis */
     uint32_t recorded;
-    bool
-        unconfirmed; /* the host does not confirm the configuration; else it does before each command */
+    /* true: the host does not confirm the configuration. false: it confirms it before each command */
+    bool unconfirmed;
 };
 
 /* Controller and drives at power-on; drives stand at the positions. */
@@ -42,7 +43,7 @@ void app_bench_add_module(struct app_bench *bench, uint8_t node);
 /* The power of the controller goes off and on; drives, the store and the recorded counts stay. */
 void app_bench_power_cycle(struct app_bench *bench);
 
-/* One period: tick, answers, main loop. */
+/* One bus period: tick, answers, main loop. */
 void app_bench_period(struct app_bench *bench);
 void app_bench_period_without_main_loop(struct app_bench *bench); /* without the main loop */
 void app_bench_periods(struct app_bench *bench, uint32_t count);

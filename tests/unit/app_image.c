@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app_image.h (see there): a program small enough to be written by hand. Part of the C tests; no I/O. */
+/* Implements app_image.h (see there): a program small enough to be written by hand. Used by the tests of firmware/app
+ * and by harnesses of tests/fuzz. The functions write the caller's image only. No I/O. */
 #include "app_image.h"
 
 #include <string.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements fake_port.h (see there): port.h for tests: a bus, a clock and a store in memory. Part of the C tests;
- * no I/O. */
+/* Implements fake_port.h and port/port.h (see there) for tests, with a bus, a clock and a store in memory. Used by
+ * app_bench, the tests of firmware/app and of port/stm32g4, and harnesses of tests/fuzz. One thread; no I/O. Changes
+ * its own variable `self`, and fails the running test when a rule of port.h is broken. */
 #include "fake_port.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
 /*
  * fake_port: port.h for tests: time that the test moves, sent frames that the test takes, interrupts that the test
  * calls. Ends the test when a rule of port.h about the lock is broken. Used by app_bench, the tests of firmware/app and
- * harnesses of tests/fuzz. One thread; no I/O.
+ * of port/stm32g4, and harnesses of tests/fuzz. One thread; no I/O. Changes only its own variable.
  */
 #ifndef TESTS_UNIT_FAKE_PORT_H
 #define TESTS_UNIT_FAKE_PORT_H

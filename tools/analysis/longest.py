@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
 """The longest path through a function of a linked image, with all that it calls, in instructions. Used by
-tools/longest_path. Reads loops.toml, and the image by `analysis/image`.
+tools/longest_path. Reads loops.toml. Reads the image by `analysis/image`, which starts the binary utilities.
 
-Each path that the instructions allow counts, whether values can take it or not, so no run can be longer.
-firmware/targets/loops.toml has what instructions do not show: bounds of loops, targets of calls through pointers, and
-functions that a tick of the controller never calls. A loop or a call that is not in it is a LongestError.
+All paths through the instructions count, also those that no values lead to. So no execution is longer.
+firmware/targets/loops.toml has what instructions do not show: bounds of loops and targets of calls through pointers.
+The caller names the functions that are never called. A loop, or a call through a pointer, without an entry is a
+LongestError.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 from analysis.effects import effect
 from analysis.image import Function, Image
 
-_NEVER = -(10**9)  # what no path reaches
+_NEVER = -(10**9)  # less than the length of any path
 
 
 class LongestError(Exception):
@@ -27,7 +28,7 @@ class LongestError(Exception):
 
 @dataclass(frozen=True)
 class Bounds:
-    """loops.toml."""
+    """Contents of loops.toml, and the functions that are never called."""
 
     rounds: dict[str, int]
     order: dict[str, list[str]]
@@ -35,7 +36,7 @@ class Bounds:
 
     @classmethod
     def read(cls, file: Path, *never: str) -> Bounds:
-        """From the file; `never`: functions that are not called."""
+        """Reads the file. `never`: functions that are never called."""
         data = tomllib.loads(file.read_text(encoding="utf-8"))
         return cls(data["rounds"], data["order"], frozenset(never))
 

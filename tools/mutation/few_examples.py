@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A plugin of pytest: properties are tried with few examples, since each mutant waits for all of them. Loaded by
-pytest, which mutation/python_tests.py starts. Changes the settings of tests in that process; no I/O.
+"""A plugin of pytest: limits the number of examples of Hypothesis tests, because every mutant runs all of these tests.
+Loaded by pytest, which mutation/python_tests.py starts. Changes the settings of tests in that process; no I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/tpdo_monitor.h: counts the TPDO1 frames that a drive did not send. Used by axis.c and
- * machine_supervise.c. Receive, timer and main loop, under the port's lock. */
+/* Implements app/machine/tpdo_monitor.h: counts the TPDO1 frames that a drive did not send. Used by app/machine.
+ * Receive, timer and main loop, under the port's lock. Changes only the monitor that it is given. No I/O. */
 #include "app/machine/tpdo_monitor.h"
 
 #include <string.h>

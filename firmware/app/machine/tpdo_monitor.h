@@ -3,12 +3,13 @@
  * tpdo_monitor: counts the TPDO1 frames that a drive did not send, one monitor for each axis.
  *
  * The drive sends one TPDO1 after each SYNC. The frame does not contain which SYNC it answers. So a TPDO1 that is
- * absent at the next SYNC is pending first. It was late if two TPDO1 come in one later period, at most `wait_us` after
- * the SYNC that it belongs to. Otherwise it is missed. Missed frames are counted, late ones are not. All pending frames
- * of a lost drive are missed. A drive that becomes late by one SYNC and stays so gives one missed frame.
+ * absent at the next SYNC is pending first. If two TPDO1 arrive in a later period, at most `wait_us` after the SYNC of
+ * the pending one, the pending TPDO1 was late. Otherwise it is missed. Missed frames are counted, late ones are not.
+ * All pending frames of a lost drive are missed. If every TPDO1 of a drive arrives one period late from some SYNC on,
+ * one frame is counted as missed.
  *
- * Used by axis.c and machine_supervise.c. Receive, timer and main loop, under the port's lock. Times are
- * port_time_us(), which wraps.
+ * Used by app/machine; objects_axis.c reads `missed` and `present`. Receive, timer and main loop, under the port's
+ * lock. Changes only the monitor that it is given. No I/O. Times are port_time_us(), which wraps.
  */
 #ifndef APP_MACHINE_TPDO_MONITOR_H
 #define APP_MACHINE_TPDO_MONITOR_H
@@ -20,7 +21,7 @@
 #define TPDO_MONITOR_PENDING_MAX 8u
 
 struct tpdo_monitor {
-    bool present;           /* a TPDO1 has come since tpdo_monitor_init */
+    bool present;           /* a TPDO1 has come since tpdo_monitor_init, or since axis_init */
     bool lost;              /* the drive has not answered more SYNCs in a row than is permitted */
     uint8_t count;          /* TPDO1 since the present SYNC; more than 1: late or doubled frames */
     uint32_t last_us;       /* time of the last TPDO1 */
@@ -29,7 +30,7 @@ struct tpdo_monitor {
     uint32_t absent_us[TPDO_MONITOR_PENDING_MAX];
     uint8_t first;   /* index of the oldest */
     uint8_t pending; /* number of pending frames */
-    uint32_t missed; /* frames missed since tpdo_monitor_init */
+    uint32_t missed; /* frames missed since tpdo_monitor_init, tpdo_monitor_restart or axis_init */
 };
 
 void tpdo_monitor_init(struct tpdo_monitor *monitor);
@@ -37,11 +38,12 @@ void tpdo_monitor_init(struct tpdo_monitor *monitor);
 /* A TPDO1 has come at now_us. Receive. */
 void tpdo_monitor_take(struct tpdo_monitor *monitor, uint32_t now_us);
 
-/* Sets all counters to 0. `present` stays. Main loop or timer, under the lock. */
+/* Sets all counters to 0 and `lost` to false. `present` and `last_us` stay. Main loop or timer, under the lock. */
 void tpdo_monitor_restart(struct tpdo_monitor *monitor);
 
-/* Closes a SYNC that was answered while no frame is pending: true, and nothing is missed. Otherwise false, and nothing
- * is changed: call tpdo_monitor_close_sync. Timer. */
+/* Quick path of tpdo_monitor_close_sync. If the SYNC was answered and no frame is pending, closes it and returns true;
+ * no frame is missed. Otherwise changes nothing and returns false: the caller then calls tpdo_monitor_close_sync.
+ * Timer. */
 static inline bool tpdo_monitor_close_answered(struct tpdo_monitor *monitor)
 {
     if (monitor->count == 0u || monitor->pending != 0u) {

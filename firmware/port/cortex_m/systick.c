@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/cortex_m/systick.h (see there): sysTick as the tick's timer and as the clock of a port. Used by
- * port/mps2. Main loop and interrupts, as each function states. */
+/* Implements port/cortex_m/systick.h (see there): SysTick as timer of the tick and as clock of a port. Used by
+ * port/mps2. Main loop and interrupts, as each function of the header states. Writes the registers of SysTick and its
+ * priority (SHPR3), reads ICSR, and masks interrupts while it reads the time. */
 #include "port/cortex_m/systick.h"
 
 #include "port/cortex_m/core.h"

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a
- * local bus without kernel CAN. Used by port/linux and sim/. One thread at a time for each socket, except that
- * can_socket_send may be called by a second one. */
+/* Implements port/linux/can_socket.h (see there): classic CAN frames through a raw SocketCAN socket, or through a local
+ * bus without kernel CAN. Used by port/linux and sim/. One thread at a time for each socket, except that
+ * can_socket_send may be called by a second one. Changes its socket, and in virtual time the clock of the process
+ * (clock_note_sent). */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 
@@ -26,7 +27,7 @@ void can_socket_close(struct can_socket *socket)
     }
 }
 
-/* For the hub: it reads frames of the base format, without remote frames. */
+/* Filters for the hub and for the Linux kernel: identifiers of the base format, no remote frames. */
 static void raw_filters(struct can_filter *raw, const struct can_match *filters, size_t count)
 {
     for (size_t i = 0; i < count; ++i) {
@@ -47,7 +48,7 @@ static int tell_hub(const struct can_socket *socket, uint16_t kind, const struct
     return send(socket->fd, &message, size, MSG_NOSIGNAL) == (ssize_t)size ? 0 : -errno;
 }
 
-/* Own frames that are tracked pass as well; without a filter all do. */
+/* Own frames that are tracked also pass the filters. Without filters all frames pass. */
 static int set_kernel_filters(const struct can_socket *socket)
 {
     struct can_filter raw[CAN_SOCKET_FILTERS + CAN_SOCKET_TRACKED];

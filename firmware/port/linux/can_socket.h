@@ -3,8 +3,9 @@
  * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without kernel CAN. Used by
  * port/linux and sim/. One thread at a time for each socket, except that can_socket_send may be called by a second one.
  *
- * The socket never blocks. Received remote, extended and error frames are dropped. A socket does not receive its own
- * frames; other sockets of the same machine receive them.
+ * The socket never blocks in real time. In virtual time sending waits until the hub takes the frame. Received remote,
+ * extended and error frames are dropped. A socket does not receive its own frames; other sockets of the same machine
+ * receive them.
  *
  * Tracking shows whether frames have been sent on the bus, not only queued. SocketCAN gives a frame back when the CAN
  * controller has sent it (vcan, and drivers that do not support this, when it is queued). A local bus in virtual time

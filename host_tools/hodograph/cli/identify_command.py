@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""hodograph identify: plants from a recorded run. Started by cli/main. Reads the recording and the machine file, may
-write machine and drive files, and prints to stdout and stderr.
+"""hodograph identify: fits the plant (motor, screw and encoder) of each axis to a recorded run. Started by cli/main.
+Reads the recording, the machine file and its drive files; with --output writes a machine file and drive files. Prints
+to stdout and stderr.
 """
 
 from __future__ import annotations

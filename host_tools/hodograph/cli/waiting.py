@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Shows a line with the name and the running time of a command on the terminal while it computes, from AFTER_S on. Used
-by cli/demo_command, cli/main and cli/output. A thread writes to stderr; sys.stdout is replaced meanwhile.
+"""Shows a line with the name and the running time of a command on the terminal while it computes, when it has written
+nothing for AFTER_S seconds. Used by cli/demo_command, cli/main and cli/output. A thread writes to stderr; sys.stdout is
+replaced until the command ends. Nothing happens if stderr is no terminal.
 
 The line disappears before other output is written. It is never written to files and pipes.
 """
@@ -51,7 +52,7 @@ class _Line:
         self._thread.start()
 
     def end(self) -> None:
-        """Ends it, with the line removed."""
+        """Ends the thread and removes the line."""
         self._ended.set()
         self._thread.join()
         self.remove()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reads the input files (TOML): path, machine and drive files as checked, frozen dataclasses. Used by most modules of
+"""Reads the input files (TOML): path, machine and drive files as checked, frozen dataclasses. Used by many modules of
 host_tools. Reads the files that it is given, and the files that they name.
 """
 

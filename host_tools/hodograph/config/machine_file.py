@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Machine files: bus, controller limits, work offset, axes and their drives. Used by most modules of host_tools. Reads
+"""Machine files: bus, controller limits, work offset, axes and their drives. Used by many modules of host_tools. Reads
 the file that it is given, and the drive files that it names.
 """
 

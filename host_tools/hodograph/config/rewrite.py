@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Replaces numbers in the texts of machine and drive files; all other text stays, also comments and order. Used by
+"""Makes the texts of changed machine and drive files: replaces values of drives, and the names of drive files; adds
+missing keys, and a first comment line in drive files. All other text stays, with its comments and order. Used by
 cli/tune_command and cli/identify_command. Reads these files, and writes none.
 """
 
@@ -34,8 +35,8 @@ def rewritten(
 ) -> dict[Path, str]:
     """The texts of the machine file `output` and of drive files beside it, by path; nothing is written.
 
-    `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by`: author of the
-    change, for a comment in the drive files.
+    `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by`: name of the command
+    that makes the change, for a comment in the drive files.
     """
     document = _parsed(machine.file)
     tables: Any = {int(table["node"]): table for table in document["axis"]}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""From a stream of frames to samples, one for each SYNC: setpoints and answers.
+"""Decodes a stream of frames to samples, one for each SYNC: setpoints and answers.
 
 `bus.capture.decode` requires a complete recording. This decoder continues if frames are missing: the value is NaN then.
-An answer may come after the next SYNC (docs/reference/protocol.md section 2), so the last SYNCs are kept for a few
-ticks, and of two answers between two SYNCs the first is the late one.
+An answer may come after the next SYNC (docs/reference/protocol.md section 2), so the decoder waits HELD_BACK SYNCs
+before it gives samples. If a drive has two answers between two SYNCs, the first belongs to the SYNC before.
 
 Used by monitor/ and cli/monitor_command. No I/O.
 """
@@ -20,7 +20,7 @@ from ..bus.capture.decode import RPDO1, SYNC_ID, SYNC_OVERFLOW, TPDO1
 from ..bus.capture.frames import Frames
 
 HELD_BACK = 3
-"""SYNCs that wait for late answers."""
+"""SYNCs for which samples are not given yet, since answers may come."""
 _MOST_TAIL = 4096
 """Most setpoints and answers kept without a SYNC; if there are more, they are dropped."""
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The contour error of a streamed job: its path is known from the chunks that have passed on the bus.
 
-The next chunk repeats the last part of a chunk's path, so each chunk is used up to the start of its successor.
+Each chunk repeats the end of the previous chunk's path. So a chunk is used only up to the start of the next one.
 
 Used by monitor/pump. No I/O. Changes its own object only; one thread. A chunk is a part of a job (docs/glossary.md).
 """
@@ -21,8 +21,8 @@ from ..stream.geometry import Curve
 from .decoder import Floats
 
 _ON_PATH_UM = 1.0
-"""Greatest distance from the path of its setpoints, which are rounded to counts. Setpoints beyond it belong to another
-motion.
+"""Greatest distance in um of a setpoint from the path of its job, because setpoints are rounded to counts. A setpoint
+farther away belongs to another motion.
 """
 _STEP_MM, _MOST_SAMPLES = 0.1, 20_000
 """Step in mm of the search for a setpoint whose place is not known."""

@@ -4,7 +4,7 @@
 `make build` makes the compiled module (build_native.py); without it each call raises a HodographError with that
 message. Arrays go in and out without copies; the interpreter lock is released during the calls.
 
-Used by most modules of host_tools. Loads the compiled module; no other I/O.
+Used by many modules of host_tools. Loads the compiled module; no other I/O.
 """
 
 from ..names import KERNELS

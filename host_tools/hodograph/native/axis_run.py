@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs one simulated axis along given setpoints, without rounding of its position (sim/offline/axis_run.h). Used by
-identify/. No I/O.
+"""Runs one simulated axis along given setpoints. Returns the positions of the motor before encoder and bus round them
+(sim/offline/axis_run.h). Used by identify/. No I/O.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, eq=False)
 class AxisInputs:
     """What the drive receives in each of n bus periods, (n,) each: setpoints in counts, 0x60B1 in counts/s, 0x60B2 in
-    per mille. The axis stands at `start_counts` at first.
+    per mille. The axis stands still at `start_counts` before the first period.
     """
 
     start_counts: int
@@ -34,7 +34,9 @@ class AxisInputs:
 def run_axis(
     drive: Drive, inputs: AxisInputs, counts_per_mm: int, period_us: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Positions in mm and volts, (n,) each, at the end of each period. Raises InputError for figures out of range."""
+    """Positions in mm and volts, (n,) each, at the end of each period. Raises InputError for values of the drive file
+    out of range, and HodographError if the compiled module is missing.
+    """
     ffi, lib = library()
     count = len(inputs.targets)
     columns = (

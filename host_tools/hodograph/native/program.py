@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Opens, checks and interpolates a program image with the controller's own code (firmware/core). Used by most modules
+"""Opens, checks and interpolates a program image with the controller's own code (firmware/core). Used by many modules
 of host_tools. No I/O.
 """
 

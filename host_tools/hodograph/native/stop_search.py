@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Searches the stop parameters of feed pieces: the jerk and the deceleration with which a path stop brakes
-(docs/theory/feed.md section 7). Used by program/stop_planning and native/stop_trial. No I/O; the search is in C
+"""Searches the stop parameters of feed pieces: the jerk of onset, the deceleration and the jerk of release of a path
+stop (docs/theory/feed.md section 7). Used by program/stop_planning and native/stop_trial. No I/O; the search is in C
 (sim/offline/stop_search.h).
 """
 
@@ -23,16 +23,17 @@ FREE: tuple[float, ...] = (inf, inf)
 
 @dataclass(frozen=True)
 class StopLimits:
-    """The limits of a brake; inf: no limit. mm and s; limits of axes have one number for each path axis, missing ones:
-    no limit.
+    """The limits that a path stop keeps; inf: no limit. mm and s. A limit of axes has one number for each path axis. A
+    missing number means no limit.
 
     feed, acceleration, jerk   along the path; stop parameters never exceed the last two
-    centripetal, axis_…        acceleration across the path; velocity, acceleration and jerk of each axis
+    centripetal                acceleration across the path
+    axis_…                     velocity, acceleration and jerk of each axis
     reach                      limit of |velocity + time_constant * acceleration| of each axis, mm/s
     zones                      (from_mm, to_mm, feed_mm_s) each
     reach_at_rate_1            `reach` applies at a feed override of 100 % only
-    rise_is_cut                while the override rises, a stop waits until the rise adds at most a quarter of its
-                               deceleration to the acceleration along the path
+    rise_is_cut                a stop that is requested while the override rises begins only when the rise adds at most
+                               a quarter of the deceleration of the stop to the acceleration along the path
     quick                      few stop parameters are tried: for long programs
     """
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The program of the controller: compiles, encodes, decodes, checks and prints it; docs/reference/protocol.md section
-1. Used by most modules of host_tools. Reads a program image; no other I/O.
+1. Used by many modules of host_tools. Reads a program image; no other I/O.
 """
 
 from .check import Fault, check

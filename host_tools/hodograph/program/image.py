@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The program image: reads it from a file, decodes it to arrays, encodes it to bytes; and the memory that it needs.
+"""The program image: reads it from a file, decodes it to arrays, encodes it to bytes, and gives the memory that it
+needs in the controller. Format: docs/reference/protocol.md 1.1 to 1.4.
 
-docs/reference/protocol.md 1.1 to 1.4.
-
-Used by most modules of host_tools. `read_image` reads the file that it is given; no other I/O.
+Used by many modules of host_tools. `read_image` reads the file that it is given; no other I/O.
 """
 
 from __future__ import annotations

@@ -27,7 +27,10 @@ Case = tuple[Pipeline, Motion, BusRun | None]
 
 
 def write_report(cases: Sequence[Case], directory: Path) -> Path:
-    """Writes report.html and PNG files into `directory`; returns the HTML file. Raises InputError."""
+    """Writes report.html and PNG files into `directory`; returns the HTML file.
+
+    Raises InputError if a file cannot be written.
+    """
     with styled():
         shown_cases = _distinct(_once([_case(*case) for case in cases]))
     text = _render(cases, shown_cases)
@@ -40,7 +43,7 @@ def write_report(cases: Sequence[Case], directory: Path) -> Path:
 
 
 def _once(shown_cases: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Leaves out figures of earlier cases: paths of one profile share its search."""
+    """Removes each figure that an earlier case shows already: paths with the same profile have the same search."""
     first: dict[bytes, str] = {}
     for case in shown_cases:
         for figure in list(case["figures"]):

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Keeps planned chunks (parts of a job) on disk until they are sent, in temporary files of bounded size that are
-removed as they are read. Used by plan.py. Writes and reads files without a name in the folder for temporary files.
+"""Keeps planned chunks (parts of a job) on disk until they are sent, in temporary files of bounded size, without a
+name. Each is closed, and its space freed, after its chunks were read. Used by plan.py, which calls it only under its
+lock, or after the planner thread has ended: it is not thread-safe. Writes and reads these files, in the folder for
+temporary files.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ RESERVE_BYTES = 64 << 20
 
 
 def store_folder() -> Path:
-    """$TMPDIR, else /var/tmp where there is one: /tmp is often memory."""
+    """$TMPDIR, else /var/tmp where there is one: /tmp is often a file system in memory (tmpfs)."""
     if "TMPDIR" not in os.environ and os.access("/var/tmp", os.W_OK):
         return Path("/var/tmp")
     return Path(tempfile.gettempdir())
@@ -31,7 +33,7 @@ def store_folder() -> Path:
 
 class ChunkStore:
     """Encoded chunks, numbered from 0. Chunks before the newest one that was read are forgotten. The newest one is also
-    kept in memory, since it may be sent again after its file is removed.
+    kept in memory, since it may be sent again after its file is closed.
     """
 
     def __init__(self) -> None:

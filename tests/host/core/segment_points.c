@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* Points of PH segments by each kernel, for comparison with exact arithmetic. Each line of the input is a segment and
- * an arc length: axis_count, start, x, y, z, four times three coefficients of the preimage, for each extra axis its
- * start and five coefficients, the arc length. Each line of the output has the coordinates by kernel 0, those by 1,
- * those by 2. Run by test_space_kernels.py, which builds it; reads
- * stdin, and prints. */
+ * an arc length: axis_count, start, x, y, z, the 4 x 3 coefficients of the preimage, component by component, for each
+ * extra axis its start and five coefficients, the arc length. An axis_count of 0 ends the input. Each line of the
+ * output has the coordinates by the fixed, the float and the double kernel. Run by test_space_kernels.py, which builds
+ * it. Reads stdin, writes stdout. */
 #include <inttypes.h>
 #include <stdio.h>
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The kernels in space against 40-digit arithmetic, within the bounds of docs/theory/numerics.md sections 9 to 12. Run
-by pytest; starts processes, and writes to temporary folders.
+by pytest; builds and runs segment_points.c (gcc), and writes to temporary folders.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ KERNELS = ("fixed", "float", "double")
 BOUND_MM = {"fixed": 2.0**-36, "float": 5e-6, "double": 3e-11}
 EXTRA_BOUND = {"fixed": 1e-6, "float": 1e-5, "double": 1e-9}
 ARC_BOUND_MM = 2.0**-40
-"""The arc length itself is a multiple of this; an extra axis may turn far within it."""
+"""The arc length itself is a multiple of this; an extra axis may turn by a large angle within this length."""
 
 Quaternion = tuple[float, float, float, float]
 
@@ -41,7 +41,9 @@ def times(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 def scaled(shape: list[Quaternion], length_mm: float, turn: Quaternion, start: int) -> Segment:
-    """The shape, turned, of a length; its preimage rounded to the image."""
+    """The shape, rotated by `turn` and scaled to `length_mm`; the coefficients of its preimage are rounded as in a
+    program image.
+    """
     size = math.sqrt(sum(c * c for c in turn))
     unit: Quaternion = (turn[0] / size, turn[1] / size, turn[2] / size, turn[3] / size)
     turned = [times(unit, q) for q in shape]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of streamed jobs: the events of the whole in the same ticks, and none that the machine lacks. Run by pytest;
-writes to temporary folders.
+"""Outputs of streamed jobs: a job in chunks switches the same outputs in the same ticks as the same job in one program,
+and an output that the machine file does not define is refused. Run by pytest; starts threads and processes, and writes
+to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Notes of a streamed toolpath on commands that the machine does not execute. Run by pytest; writes to temporary
-folders.
+"""The reader of streamed toolpaths: the place of an output on the path, how far it reads ahead before a section begins,
+and one note for each kind of command that the machine does not execute. Run by pytest; writes to temporary folders.
 """
 
 from collections.abc import Iterator
@@ -45,10 +45,12 @@ def test_an_output_has_its_place(tmp_path: Path, word: str, places: list[float])
 
 
 @pytest.mark.parametrize(("machine", "moves"), [("mill.toml", 1), ("dispenser.toml", 3)])
-def test_a_section_waits_for_what_is_at_rest_after_it(
+def test_before_a_section_begins_it_is_read_up_to_the_next_move(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, moves: int
 ) -> None:
-    """Where outputs may be after it; a move that is too short for a section does not count as the next one."""
+    """Only if the machine has outputs: these may stand between both. A move that is too short for a section of its own
+    does not end this search.
+    """
     found = reader(tmp_path, machine, "G1 X10\nM65 P0\nG4 P1\nG1 X10.0001\nM62 P0\nG1 X20")
     read_moves: list[Move] = []
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A job that is read by another process: the same chunks and errors, and no process that stays. Run by pytest; starts
+"""A job that is read by another process: the same chunks and errors, and no process is left. Run by pytest; starts
 processes, and writes to temporary folders.
 """
 
@@ -26,6 +26,7 @@ from hodograph.toolpath.files import ReadOptions
 ROOT = Path(__file__).resolve().parents[3]
 MILL = ROOT / "examples" / "machines" / "mill.toml"
 MOST = 16 * 1024
+"""Greatest size of a chunk, in bytes."""
 PART = """G64 P0.01
 F6000
 M8

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of G-code become events of the sections' programs. Run by pytest; writes to temporary folders."""
+"""Outputs of G-code become events of the sections' programs. Run by pytest; reads examples/machines; writes to
+temporary folders.
+"""
 
 import re
 from dataclasses import replace

@@ -35,7 +35,9 @@ STATES = {
     10: "quick stop",
 }
 TIMINGS = {0: "kept", 1: "not permitted", 2: "not permitted, accepted"}
-"""Object 0x2040: whether the operating system of the controller allows ticks in time."""
+"""Object 0x2040: whether the ticks of the controller are on time; `kept`: guaranteed. Otherwise the operating system
+does not permit real-time priority.
+"""
 PROGRAM_STATES = {0: "none", 1: "receiving", 2: "ready"}
 
 CONFIGURED = {0: "none", 1: "confirmed", 2: "restored"}
