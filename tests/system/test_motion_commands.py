@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bench import MakeAlpha, MakeBench
+from bench import EXAMPLES, PAPER_ALPHA, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
-from hodograph.bus.sdo.controller import HELD, READY, RUNNING, Controller
+from hodograph.bus.sdo.controller import HELD, OFF, READY, RUNNING, Controller
 from hodograph.cli.main import main
 
 
@@ -86,3 +87,29 @@ def test_goes_on_where_it_was_stopped(
     clock.sleep(0.1)
     assert main(["stop"]) == 0
     assert status(capsys)["motion"]["arc_length_mm"] > arc_mm
+
+
+def test_no_drive_is_switched_on_outside_of_its_travel(
+    make_bench: MakeBench, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It would move to its software limit at once. An axis may stand there after a limit switch."""
+    bench = make_bench()
+    assert main(["goto", "--to", "40", "-30", str(PAPER_ALPHA)]) == 0
+    assert main(["stop", "--off"]) == 0
+    stands = bench.controller.targets(2)
+    text = PAPER_ALPHA.read_text().replace('"../drives/', f'"{EXAMPLES}/drives/')
+    narrow = tmp_path / "narrow.toml"
+    narrow.write_text(text.replace("travel_mm = [-200, 200]", "travel_mm = [-35, 35]", 1))
+    assert narrow.read_text() != text
+    for words in (
+        ["goto", "--to", "0", "0", str(narrow)],
+        ["run", str(EXAMPLES / "alpha.toml"), "--machine", str(narrow)],
+    ):
+        capsys.readouterr()
+        assert main(words) == 5
+        assert "axis x stands at 40 mm, outside of its travel -35 to 35 mm" in (
+            capsys.readouterr().err
+        )
+        assert bench.controller.state() == OFF
+        assert bench.controller.targets(2) == pytest.approx(stands, abs=1000)
+    assert main(["goto", "--to", "0", "0", str(PAPER_ALPHA)]) == 0, "travel_mm is enlarged"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from ..bus.goto import goto
+from ..bus.goto import goto, require_inside_travel
 from ..bus.hub import LocalHub
 from ..bus.own_bus import bus_address
 from ..bus.run import BusRun, RunSession, run_program, run_session
@@ -72,7 +72,8 @@ class Controller:
         actions.home(self._node, wait_s)
 
     def enable(self) -> None:
-        """Switches the drives on; returns at standstill."""
+        """Switches the drives on; returns at standstill. Raises RefusedError: an axis stands outside of its travel."""
+        require_inside_travel(self._node, self._machine._file)
         self._node.enable()
 
     def disable(self) -> None:

@@ -21,8 +21,8 @@ from ..program import ProgramOptions, StopTerms, compile_path, encode
 from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
-from .sdo.controller import Controller
-from .sdo.objects import OVERRIDE
+from .sdo.controller import BOOT, OFF, READY, Controller
+from .sdo.objects import ACTUAL, OVERRIDE
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
@@ -39,6 +39,9 @@ QUICK_ABOVE_MM = 50.0
 """Stops of longer moves in space are searched with few trials. All trials would take up to 36 s of processor time and
 make stops at most 8 % shorter.
 """
+
+TRAVEL_SLACK_MM = 0.1
+"""How far outside of its travel an axis may stand when its drive is switched on, mm or degrees."""
 
 Place = tuple[float, ...]
 """A position of path axes, mm or degrees: of the two or three that draw a path, or of all."""
@@ -125,6 +128,26 @@ def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, 
     beside = start_mm[0] + math.copysign(detour_mm, middle - start_mm[0])
     detour = (beside, *start_mm[1:SPACE_AXES], *end_mm[SPACE_AXES:])
     return [(start_mm, detour), (detour, end_mm)]
+
+
+def require_inside_travel(controller: Controller, machine: Machine) -> None:
+    """Call it before drives are switched on: a drive outside of its software limits moves to them at once, without a
+    ramp. An axis may stand there after a limit switch. Raises RefusedError, naming the axis.
+    """
+    state = controller.state()
+    if state == BOOT:
+        state = controller.wait_for((OFF, READY), 10.0)
+    if state != OFF:
+        return
+    for number, axis in enumerate(machine.axes, 1):
+        at = controller.read(ACTUAL, number) / axis.counts_per_unit
+        least, most = axis.travel_min_mm - TRAVEL_SLACK_MM, axis.travel_max_mm + TRAVEL_SLACK_MM
+        if not least <= at <= most:
+            raise RefusedError(
+                f"{controller.who()}: axis {axis.name} stands at {at:g} {axis.unit}, outside of its travel "
+                f"{axis.travel_min_mm:g} to {axis.travel_max_mm:g} {axis.unit}, where its drive must not be switched "
+                "on: move it with the drive's own tool or by hand, or enlarge travel_mm meanwhile"
+            )
 
 
 def goto(

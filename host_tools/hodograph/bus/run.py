@@ -21,7 +21,7 @@ from .capture.decode import unhomed_starts
 from .capture.frames import Frames
 from .capture.recorder import Recorder
 from .capture.recordings import write_recording
-from .goto import goto
+from .goto import goto, require_inside_travel
 from .processes import SimulatedMachine
 from .sdo.controller import DISABLE, STATISTICS, Controller, connect
 from .sdo.follow import Follower
@@ -145,6 +145,7 @@ def bring_up(at: RunSession, machine: Machine, kernel: str) -> None:
     """Configures the controller, sets the override to 100 % and switches the drives on."""
     at.controller.configure(machine, kernel)
     at.controller.override(100)
+    require_inside_travel(at.controller, machine)
     at.controller.enable()
 
 

@@ -12,6 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..bus.goto import goto as goto_point
+from ..bus.goto import require_inside_travel
 from ..bus.own_bus import bus_address, opened_bus
 from ..bus.run import BusRun, rig_until_interrupted
 from ..bus.sdo.follow import Follower
@@ -92,6 +93,7 @@ def goto(options: Namespace) -> None:
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
         controller.require_standing()
         controller.configure(machine, options.kernel or machine.kernel)
+        require_inside_travel(controller, machine)
         with stopping(controller):
             controller.enable()
             follower = Follower(controller, note)
