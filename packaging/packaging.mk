@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# libhodograph, and the packages that are made of the tree; included by the Makefile.
+# Makes libhodograph, and the packages that are made of the tree. Included by the Makefile. Writes build/ and dist/;
+# `make install` writes below DESTDIR and PREFIX, `make container` an image of buildah.
 
 LIBRARY         := $(BUILD)/library
 LIBRARY_VERSION := $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' host_tools/hodograph/__init__.py)

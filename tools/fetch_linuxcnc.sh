@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 # fetch_linuxcnc.sh OUT: unpacks the interpreter of LinuxCNC and the programs that come with it from Debian's packages
 # into OUT/root. Nothing is installed; the packages are those that the machine's apt would install.
+# Run by tests/support/linuxcnc.py. Needs the network; writes OUT and a temporary folder.
 set -euo pipefail
 out=$1
 work=$(mktemp -d)

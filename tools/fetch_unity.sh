@@ -1,6 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
-# fetch_unity.sh PYTHON LOCK OUT: puts unity.c, unity.h, unity_internals.h and the licence of Unity into OUT.
+# fetch_unity.sh PYTHON LOCK OUT: puts unity.c, unity.h, unity_internals.h and the licence of Unity into OUT. pip of
+# PYTHON downloads the package that LOCK pins by its hash. Run by the Makefile before the C tests are compiled. Writes
+# OUT and a temporary folder; installs nothing.
 set -euo pipefail
 python=$1 lock=$2 out=$3
 work=$(mktemp -d)

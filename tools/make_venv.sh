@@ -1,7 +1,8 @@
 #!/bin/bash
 # SPDX-License-Identifier: MIT
 # make_venv.sh VENV LOCK: makes the virtual environment when it is missing or broken, installs the locked
-# requirements and leaves VENV/.ready with the path of the tree it was made for.
+# requirements and leaves VENV/.ready with the path of the tree it was made for. Run by the Makefile and by
+# packaging/packaging.mk. Needs the network; writes VENV and the lock file .venv.lock.
 set -euo pipefail
 venv=$1 lock=$2
 exec 9>".venv.lock"

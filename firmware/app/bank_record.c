@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/bank_record.h (see there): the commit record at the end of a bank of the store, which marks the
- * content as complete. Used by app/program_slot, app/program_table and app/parameter_store. Main loop. */
+ * content as complete. Used by app/program_slot, app/program_table and app/parameter_store. Main loop. Reads and writes
+ * the store. */
 #include "app/bank_record.h"
 
 #include "canopen/cob.h"

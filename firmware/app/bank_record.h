@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * bank_record: the commit record at the end of a bank of the store, which marks the content as complete. Used by
- * app/program_slot, app/program_table and app/parameter_store.
+ * app/program_slot, app/program_table and app/parameter_store. Reads and writes the store.
  *
  *     sequence u32 | size u32 | tag u32 | CRC-32 (u32) of the twelve bytes before it
  *

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/chunk_records.h (see there): the coefficient records of a job in chunks, made ahead of the tick. Used
- * by app/stream. Main loop; takes the machine's lock where it is needed. */
+ * by app/stream. Main loop; takes the machine's lock where it is needed. Changes its struct and the port's memory for
+ * records. */
 #include "app/chunk_records.h"
 
 #include "core/kernel.h"

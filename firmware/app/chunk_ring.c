@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/chunk_ring.h (see there): memory for the chunks of a stream. Used by app/stream. Main loop. */
+/* Implements app/chunk_ring.h (see there): memory for the chunks of a stream. Used by app/stream. Main loop. Changes
+ * only its struct. */
 #include "app/chunk_ring.h"
 
 #include <stddef.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * chunk_ring: memory for the chunks of a job: contiguous blocks, taken and freed in the same order. Used by app/stream.
+ * Changes only its struct.
  *
  * A block that does not fit after the newest one begins at the start of the memory again; the remainder at the end
  * stays unused until then. The newest block may be made smaller, or given back, as long as no other has been taken.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/controller.h (see there): the wiring of machine, tick, protocol objects and port. Used by app/main.c.
- * Main loop. */
+ * Main loop. Starts the port, sends frames, and changes the one controller. */
 #include "app/controller.h"
 
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/frame_queue.h (see there): frames from the receive interrupt to the main loop, in order. Called by
- * app/controller.c. Receive puts frames in, the main loop takes them under the port's lock. */
+ * app/controller.c. Receive puts frames in, the main loop takes them under the port's lock. Changes only the queue. */
 #include "app/frame_queue.h"
 
 void frame_queue_init(struct frame_queue *queue)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* frame_queue: passes frames from the receive interrupt to the main loop, in their order. One producer, one consumer.
- * Called by app/controller.c. Receive puts frames in, the main loop takes them under the port's lock. */
+ * Called by app/controller.c. Receive puts frames in, the main loop takes them under the port's lock. The functions
+ * change only the queue. */
 #ifndef APP_FRAME_QUEUE_H
 #define APP_FRAME_QUEUE_H
 

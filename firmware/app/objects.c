@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/objects.h (see there): the behaviour of the controller's object dictionary (controller.eds). Used by
- * app/controller.c. Main loop. */
+ * app/controller.c. Main loop. Writes change the controller, the machine under the lock, the period of the tick and the
+ * stored parameters. */
 #include "app/objects.h"
 
 #include <stddef.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * objects: the behaviour of the controller's object dictionary (controller.eds): values that are computed when they are
- * read, checks and effects of writes, commands, the program's image. Used by app/controller.c. Main loop.
+ * read, checks and effects of writes, commands, the program's image. Used by app/controller.c. Main loop. Writes change
+ * the controller, the machine under the lock, the period of the tick and the stored parameters.
  *
  * Handlers are attached to entries in one table (objects.c): an object with behaviour needs its lines in the EDS file,
  * its handlers and a row in that table. Those of one axis are in objects_axis.c, those of the program in

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/objects_axis.h (see there): handlers of objects that have one value for each axis, for the table in
- * objects.c. Called by objects.c only. Main loop, under the lock. */
+ * objects.c. Called by objects.c only. Main loop, under the lock. Changes nothing. */
 #include "app/objects_axis.h"
 
 #include "canopen/cob.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/parameter_store.h (see there): parameters of the object dictionary that are kept without power
- * (objects 0x1010 and 0x1011). Called by app/controller.c and app/objects.c. Main loop. */
+ * (objects 0x1010 and 0x1011). Called by app/controller.c and app/objects.c. Main loop. Erases and writes the parameter
+ * banks of the store; restoring writes the dictionary. */
 #include "app/parameter_store.h"
 
 #include <stddef.h>

@@ -10,7 +10,8 @@
  * the bus: 0x1006, 0x1016, 0x1017, 0x1029, the configuration (app/machine/config.h), the node number 0x2054. A save
  * writes them to the parameter bank that does not hold the newest ones, and the bank's record last (bank_record.h). So
  * after a loss of power at any moment the old parameters or the new ones are found, complete. Called by
- * app/controller.c and app/objects.c. Main loop. Layout of the content:
+ * app/controller.c and app/objects.c. Main loop. Layout of the content: Erases and writes the parameter banks of the
+ * store; restoring writes the dictionary.
  *
  *     CRC-32 of (index u16, sub u8, size u8) of each parameter u32 | CRC-32 of the configuration u32 | confirmed u8 |
  *     zero u8 x 3 | values in rising order of (index, sub), little-endian | zeros to a multiple of 8 bytes

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/program_table.h (see there): the coefficient records of the program in a bank of the store, right
- * after its image, for the kernel that the tick uses. Used by app/program_slot. Main loop. */
+ * after its image, for the kernel that the tick uses. Used by app/program_slot. Main loop. Reads and writes the bank of
+ * the store that it is given. */
 #include "app/program_table.h"
 
 #include <string.h>

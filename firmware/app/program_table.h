@@ -2,7 +2,8 @@
 /*
  * program_table: stores the coefficient records (core/coefficients.h) of a program in its bank, after the image. They
  * are for the kernel that the tick uses. The controller computes them when an upload has passed its checks. After
- * power-on it compares the stored records with those that it would write. Used by app/program_slot. Main loop.
+ * power-on it compares the stored records with those that it would write. Used by app/program_slot. Main loop. Reads
+ * and writes the bank of the store that it is given.
  */
 #ifndef APP_PROGRAM_TABLE_H
 #define APP_PROGRAM_TABLE_H

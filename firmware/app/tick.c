@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/tick.h: one period of the controller. Called by app/controller.c. Timer, once a period, under the
- * port's lock; tick_init in the main loop. */
+ * port's lock; tick_init in the main loop. Sends frames, and changes the tick and the machine. */
 #include "app/tick.h"
 
 #include <string.h>

@@ -5,7 +5,7 @@
  *
  * tick.c contains the order on the bus and all frames of a tick; states and faults are in app/machine. No other module
  * sends SYNC or setpoints. Called by app/controller.c. Timer, once a period, under the port's lock; tick_init in the
- * main loop.
+ * main loop. Sends frames, and changes the tick and the machine.
  */
 #ifndef APP_TICK_H
 #define APP_TICK_H

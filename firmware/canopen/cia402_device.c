@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/cia402_device.h (see there): the drive's side of the CiA 402 state machine. Used by the simulated
- * drives (sim/node/servo). All in one context. */
+ * drives (sim/node/servo). All in one context. Changes only the device; no I/O. */
 #include "canopen/cia402_device.h"
 
 /* The option codes 0x605A from which on the drive stays in Quick stop active. */

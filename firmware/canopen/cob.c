@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/cob.h (see there): identifiers of the predefined connection set and little-endian access to frame
- * bytes. Used by firmware/app, firmware/canopen and sim/node. Pure functions, any context. */
+ * bytes. Used by firmware/app, firmware/canopen and sim/node. Any context; the functions write only their arguments. */
 #include "canopen/cob.h"
 
 #include <string.h>

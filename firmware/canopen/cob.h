@@ -2,7 +2,7 @@
 /* cob: identifiers of the predefined connection set (CiA 301, 7.3.3) and little-endian access to
  * frame bytes.
  *
- * Used by firmware/app, firmware/canopen and sim/node. Pure functions, any context. */
+ * Used by firmware/app, firmware/canopen and sim/node. Any context; the functions write only their arguments. */
 #ifndef CANOPEN_COB_H
 #define CANOPEN_COB_H
 

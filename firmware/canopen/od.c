@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/od.h: finds and moves values of an object dictionary. Used by canopen/od_transfer,
- * canopen/pdo_map, firmware/app and sim/node. Main loop, if not stated otherwise. */
+ * canopen/pdo_map, firmware/app and sim/node. Main loop, if not stated otherwise. Changes the struct with the values;
+ * no I/O. */
 #include "canopen/od.h"
 
 #include <string.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/od_transfer.h: writes or reads one object of a dictionary piece by piece. Called by
- * canopen/sdo_server. Main loop. */
+ * canopen/sdo_server. Main loop. Changes its struct and the dictionary; no I/O. */
 #include "canopen/od_transfer.h"
 
 #include <stddef.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* od_transfer: writes or reads one object of a dictionary piece by piece. It joins the segments and blocks of
- * sdo_server to the object dictionary (canopen/od). Called by canopen/sdo_server.
+ * sdo_server to the object dictionary (canopen/od). Called by canopen/sdo_server. Changes its struct and the
+ * dictionary; no I/O.
  *
  *     write: od_transfer_begin_write, od_transfer_put as often as needed, od_transfer_finish_write
  *     read:  od_transfer_begin_read,  od_transfer_get as often as needed

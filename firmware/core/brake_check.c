@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/brake_check.h (see there): the proof that path stops keep the limits of the path axes. Used by
- * `hodograph verify` through host_tools/hodograph/native; a controller does not call it. Main loop of a host. */
+ * `hodograph verify` through host_tools/hodograph/native; a controller does not call it. Main loop of a host. Changes
+ * only its struct; no I/O. */
 #include "core/brake_check.h"
 
 #include "core/qmath.h"

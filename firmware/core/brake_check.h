@@ -3,7 +3,7 @@
  * brake_check: proves that path stops keep the limits of the path axes (velocity, acceleration, jerk): a stop that
  * begins at any instant of a feed piece, at any feed override that the override bounds allow, at every instant until
  * standstill. docs/guides/limits.md describes what is proved and what is not. Used by `hodograph verify` through
- * host_tools/hodograph/native; a controller does not call it.
+ * host_tools/hodograph/native; a controller does not call it. Changes only its struct; no I/O.
  *
  * All path stops that may begin in a part of a piece are followed at once. At each time there are lower and upper
  * bounds of arc length, speed, acceleration and jerk. They follow from the law of core/path_brake (docs/theory/feed.md

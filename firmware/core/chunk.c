@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/chunk.h (see there): a chunk, a part of a job that is longer than the controller's memory: reading
  * and checking it. Used by firmware/app, core/feed_override, sim/offline/stream and host tools. Main loop; the inline
- * functions in any context. */
+ * functions in any context. Changes only its arguments; no I/O. */
 #include "core/chunk.h"
 
 #include <stddef.h>

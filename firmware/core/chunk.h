@@ -2,6 +2,7 @@
 /*
  * chunk: reads and checks a chunk, a part of a job that is longer than the memory of the controller
  * (docs/reference/protocol.md 1.7). Used by firmware/app, core/feed_override, sim/offline/stream and host tools.
+ * Changes only its arguments; no I/O.
  *
  * Each chunk holds a whole program, which ends at rest: its last pieces are a tail that brakes along the path, inside
  * the limits of the program. The next chunk begins inside its predecessor. It repeats the pieces and segments up to the

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/coefficient_cache.h (see there): coefficient records near the motion, in two halves of a memory.
- * Used by app/chunk_records and sim/offline/stream. Main loop. */
+/* Implements core/coefficient_cache.h (see there): coefficient records near the motion, in two halves of a memory. Used
+ * by app/chunk_records and sim/offline/stream. Main loop. Changes only its struct and its memory; no I/O. */
 #include "core/coefficient_cache.h"
 
 #include <string.h>

@@ -2,7 +2,7 @@
 /*
  * coefficient_cache: coefficient records of the few pieces and segments near the motion, so that the chunks of a job
  * need no memory for all their records (docs/theory/numerics.md section 12, "Coefficient cache"). Used by
- * app/chunk_records and sim/offline/stream.
+ * app/chunk_records and sim/offline/stream. Changes only its struct and its memory; no I/O.
  *
  * The memory has two halves. The motion uses the records in one of them, a window of a program (core/coefficients.h).
  * They do not change while it does. The main loop makes the next window in the other half, further on in the same

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/feed_piece.h (see there): arc length and feed of a feed piece at a time, in integers. Used by
- * firmware/core: the kernels fixed and float, and program_time. Pure: feed_piece_set and program_time in the main
- * loop, otherwise in the tick. */
+ * firmware/core: the kernels fixed and float, and program_time. Writes only its arguments; feed_piece_set and
+ * program_time in the main loop, otherwise in the tick. */
 #include "core/feed_piece.h"
 
 #include "core/qmath.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * feed_piece: evaluates a feed piece in integers: arc length, feed and acceleration at a time (docs/theory/numerics.md
- * section 9, "Feed"). Used by firmware/core: the kernels fixed and float, and program_time. Pure: feed_piece_set and
- * program_time in the main loop, otherwise in the tick.
+ * section 9, "Feed"). Used by firmware/core: the kernels fixed and float, and program_time. Writes only its arguments;
+ * feed_piece_set and program_time in the main loop, otherwise in the tick.
  */
 #ifndef HODOGRAPH_CORE_FEED_PIECE_H
 #define HODOGRAPH_CORE_FEED_PIECE_H

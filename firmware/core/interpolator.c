@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/interpolator.h (see there): program time in, point on the path out. Used by core, app/machine,
- * sim/offline and host tools. Main loop or tick, as each function states. */
+ * sim/offline and host tools. Main loop or tick, as each function states. Changes only its struct; no I/O. */
 #include "core/interpolator.h"
 
 #include <stddef.h>

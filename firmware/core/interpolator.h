@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * interpolator: program time in, point on the path out. Used by core, app/machine, sim/offline and host tools. Main
- * loop or tick, as each function states.
+ * loop or tick, as each function states. Changes only its struct; no I/O.
  *
  * The point is a pure function of (program, time, kernel): the cursor inside struct interpolator only stores the
  * present segment and piece. So a run, a seek and a run backwards by seeks give the same bits. Kernels:

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/limit_check.h (see there): the proof that a program keeps the limits of its path axes. A part of
- * program_check. Main loop. */
+ * program_check. Main loop. Changes only its result; no I/O. */
 #include "core/limit_check.h"
 
 #include <stddef.h>

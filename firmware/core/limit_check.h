@@ -2,7 +2,7 @@
 /*
  * limit_check: proves that a program keeps the limits of its path axes (velocity, acceleration, jerk) at every instant,
  * at every feed override that its override bounds allow. docs/guides/limits.md describes what is proved and what is
- * not. A part of program_check.
+ * not. A part of program_check. Changes only its result; no I/O.
  *
  * It uses nothing of the image but its coefficients. Time is cut into cells: one feed piece on one segment. In a cell
  * every quantity q of the motion has a bound M of |q''|, by Taylor series with majorants; between two samples h apart q

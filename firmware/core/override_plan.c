@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/override_plan.h (see there): which override ramp comes next towards the commanded override, and a
- * tick of it. Used by core/feed_override. Tick, except override_plan_begin. */
+ * tick of it. Used by core/feed_override. Tick, except override_plan_begin. Changes only its struct; no I/O. */
 #include "core/override_plan.h"
 
 #include <string.h>

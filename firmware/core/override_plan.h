@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * override_plan: decides which ramp comes next towards the commanded override, and executes it tick by tick. Used
- * by core/feed_override.
+ * override_plan: decides which ramp comes next towards the commanded override, and executes it tick by tick. Used by
+ * core/feed_override. Changes only its struct; no I/O.
  *
  * One ramp at a time is decided, between two constant overrides, by look-ahead into the feed pieces that it covers. The
  * decision is spread over the ticks before it, one step of a search in a tick. Up to `guaranteed_q57`, the override

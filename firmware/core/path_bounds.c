@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/path_bounds.h (see there): bounds of how the axes move along the path, for a stretch of it. Used by
- * the proof of the stops (core/brake_check, for `hodograph verify`). Main loop. */
+ * the proof of the stops (core/brake_check, for `hodograph verify`). Main loop. Changes only its struct; no I/O. */
 #include "core/path_bounds.h"
 
 #include <stddef.h>

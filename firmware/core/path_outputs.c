@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/path_outputs.h (see there): the outputs of the path at each setpoint. Used by app/machine,
- * sim/offline and host tools. Main loop or tick, as each function states. */
+ * sim/offline and host tools. Main loop or tick, as each function states. Changes only its struct; no I/O. */
 #include "core/path_outputs.h"
 
 #include <string.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * path_outputs: which outputs of the path are on, and the values of the analogue ones, at each setpoint of a program.
- * Used by app/machine, sim/offline and host tools. Main loop or tick, as each function states.
+ * Used by app/machine, sim/offline and host tools. Main loop or tick, as each function states. Changes only its struct;
+ * no I/O.
  *
  * An event (docs/reference/protocol.md 1.8) acts in the tick whose setpoint is the first at or past its place. So the
  * outputs depend on the program and the place alone, not on override, holds or the place of the start. A value in

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/program.h (see there): reading header, segments, feed pieces and stops of a program image. Used by
- * firmware/core, firmware/app, sim/offline and host tools. Any context. */
+ * firmware/core, firmware/app, sim/offline and host tools. Any context. Reads the image; changes only its arguments; no
+ * I/O. */
 #include "core/program.h"
 
 #include <stddef.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/program_check.h (see there): all checks of a program before it may run, and the texts of refusals.
- * Used by app/program_slot, core/chunk and host tools. Main loop, never an interrupt. */
+ * Used by app/program_slot, core/chunk and host tools. Main loop, never an interrupt. Reads the image, and changes only
+ * the reported fault; no I/O. */
 #include "core/program_check.h"
 
 #include "core/event_check.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/program_clock.h (see there): which program time each tick has, and which feed piece that time is in.
- * Used by core/override_plan, which decides the override, and core/feed_override. Tick, if not stated otherwise. */
+ * Used by core/override_plan, which decides the override, and core/feed_override. Tick, if not stated otherwise.
+ * Changes only its struct; no I/O. */
 #include "core/program_clock.h"
 
 uint64_t program_clock_step_q62_s(const struct program_clock *clock,

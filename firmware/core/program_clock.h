@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * program_clock: which program time each tick has, and which feed piece that time is in. Used by core/override_plan,
- * which decides the override, and core/feed_override.
+ * which decides the override, and core/feed_override. Changes only its struct; no I/O.
  *
  * A tick advances the clock by the period times the feed override of that tick. At override 1, tick k is at min(k
  * period, duration), without drift, in two resolutions: q42 is floor(k period_us 2^42 / 10^6 + 1/2), which a tick uses;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/segment_length_check.h (see there): minimum segment length. Used by program_check and event_check.
- * Main loop. */
+ * Main loop. Changes only its result; no I/O. */
 #include "core/segment_length_check.h"
 
 #include "core/feed_bounds.h"

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * segment_length_check: minimum segment length (docs/reference/protocol.md 1.2): no tick crosses more than two segment
- * ends. This rule needs segments and feed pieces together. Used by program_check and event_check. Main loop.
+ * ends. This rule needs segments and feed pieces together. Used by program_check and event_check. Main loop. Changes
+ * only its result; no I/O.
  */
 #ifndef HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H
 #define HODOGRAPH_CORE_SEGMENT_LENGTH_CHECK_H

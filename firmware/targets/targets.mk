@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-# The firmware for machines other than this one; included by the Makefile. A target is a core with its flags, a linker
-# script of its name beside this file, and the folders of firmware/port that it is made from.
+# Makes the firmware for machines other than this one. Included by the Makefile. Writes build/firmware. A target is a
+# core with its flags, a linker script of its name beside this file, and the folders of firmware/port that it is made
+# from.
 #
 #   build/firmware/TARGET/IMAGE.elf
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * Implements numerics/quadratic_program.h (see there). Called by host_tools/hodograph/native. Any thread.
+ * Implements numerics/quadratic_program.h (see there). Called by host_tools/hodograph/native. Any thread. Writes only
+ * the caller's arrays; no I/O.
  *
  * Every bound becomes a side: coefficient x + slack = most, slack >= 0, with a multiplier >= 0. A Newton step needs
  *

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * quadratic_program: solves convex quadratic programs along a chain of intervals, for the feed planner:
- * docs/theory/feed.md 5.6. Called by host_tools/hodograph/native.
+ * docs/theory/feed.md 5.6. Called by host_tools/hodograph/native. Writes only the caller's arrays; no I/O.
  *
  * Each of n + 1 knots has two unknowns. Every row bounds a linear function of the four unknowns at both ends of one
  * interval, and the objective couples no others:

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* fifo_side: serves the requests of an emulated board on two FIFOs (port/mps2/exchange.h). Called by gateway/main. One
- * thread, once: its state is static. */
+ * thread, once: its state is static. Opens and reads the FIFOs, sends and receives frames, and writes errors to stderr.
+ * */
 #ifndef GATEWAY_FIFO_SIDE_H
 #define GATEWAY_FIFO_SIDE_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements gateway/slcan_side.h (see there): a stream of SLCAN lines (can/slcan.h) on a socket. Called by
- * gateway/main (hodograph-bridge --slcan). One thread. */
+ * gateway/main (hodograph-bridge --slcan). One thread. Opens a connection to the board, sends and receives frames, and
+ * writes errors to stderr. */
 #define _GNU_SOURCE
 #include "gateway/slcan_side.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* slcan_side: forwards frames between a CAN bus and a stream of SLCAN lines (can/slcan.h), which an emulated board
- * reads and writes. Called by gateway/main (hodograph-bridge --slcan). One thread. */
+ * reads and writes. Called by gateway/main (hodograph-bridge --slcan). One thread. Opens a connection to the board,
+ * sends and receives frames, and writes errors to stderr. */
 #ifndef GATEWAY_SLCAN_SIDE_H
 #define GATEWAY_SLCAN_SIDE_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements injector/outbox.h (see there): frames to one bus that are sent together. Used by injector/main. One
- * thread for each box. */
+/* Implements injector/outbox.h (see there): frames to one bus that are sent together. Used by injector/main. One thread
+ * for each box. Sends frames, and changes its box. */
 #define _GNU_SOURCE
 #include "injector/outbox.h"
 

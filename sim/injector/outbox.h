@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* outbox: collects the frames for one bus and sends them together, because a system call for each frame would take most
- * of the injector's time. Used by injector/main.
+ * of the injector's time. Used by injector/main. Sends frames, and changes its box.
  *
  * If the queue of the interface is full, outbox_flush waits for a few frame times. If it stays full, the bus is off,
  * and the frames are lost. One thread for each box.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/axis_stop.h (see there): how a simulated drive stops its axis. Used by node/servo. One call in each
- * period; all in one context. */
+ * period; all in one context. Changes its struct and the axis that it is given; no I/O. */
 #include "node/axis_stop.h"
 
 #define WAIT_MAX_US 1000000u /* longest wait for the target position */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* axis_stop: stops the axis of a simulated drive: by a ramp (0x6084, 0x6085), or at the motor's limits, as the option
- * codes 0x605A and 0x605E request. Used by node/servo. One call in each period; all in one context.
+ * codes 0x605A and 0x605E request. Used by node/servo. One call in each period; all in one context. Changes its struct
+ * and the axis that it is given; no I/O.
  */
 #ifndef NODE_AXIS_STOP_H
 #define NODE_AXIS_STOP_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/drive_errors.h: reports errors of a simulated drive. Used by node/servo, node/drive_pdos and
- * node/drive_node. All in one context. */
+ * node/drive_node. All in one context. Changes its struct and the values of the dictionary; no I/O, since
+ * node/drive_node sends the EMCY. */
 #include "node/drive_errors.h"
 
 enum { HISTORY = 8 };

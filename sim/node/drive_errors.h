@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_errors: reports errors of a simulated drive: error code 0x603F, error register 0x1001, history 0x1003, EMCY. It
  * does not change the motion: the reaction to an error is in node/servo. Used by node/servo, node/drive_pdos and
- * node/drive_node. All in one context.
+ * node/drive_node. All in one context. Changes its struct and the values of the dictionary; no I/O, since
+ * node/drive_node sends the EMCY.
  */
 #ifndef NODE_DRIVE_ERRORS_H
 #define NODE_DRIVE_ERRORS_H

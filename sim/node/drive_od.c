@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_od.h (see there): the behaviour of the object dictionary of a simulated drive (drive.eds).
- * Used by node/drive_node. All in one context. */
+/* Implements node/drive_od.h (see there): the behaviour of the object dictionary of a simulated drive (drive.eds). Used
+ * by node/drive_node. All in one context. Changes the node that it is given; no I/O. */
 #include "node/drive_od.h"
 
 #include <stddef.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_od: the behaviour of the object dictionary of a simulated drive; its table is generated from drive.eds. Values
  * that follow from the model, checks of writes, effects of writes. One row for each object that has a handler. Used by
- * node/drive_node. All in one context.
+ * node/drive_node. All in one context. Changes the node that it is given; no I/O.
  */
 #ifndef NODE_DRIVE_OD_H
 #define NODE_DRIVE_OD_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_pdos.h (see there): the PDOs of a simulated drive. Called by node/drive_node and
- * node/drive_od. All in one context. */
+/* Implements node/drive_pdos.h (see there): the PDOs of a simulated drive. Called by node/drive_node and node/drive_od.
+ * All in one context. Changes its struct, the dictionary and the servo, and sends frames through its port; no other
+ * I/O. */
 #include "node/drive_pdos.h"
 
 enum { FIRST_RPDO = 0x1400, FIRST_TPDO = 0x1800 };

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_pdos: the PDOs of a simulated drive: four in each direction, remappable (canopen/pdo_map.h). Received values
  * act on the servo: a controlword at once or at SYNC, a target from the next period on. Called by node/drive_node and
- * node/drive_od. All in one context.
+ * node/drive_od. All in one context. Changes its struct, the dictionary and the servo, and sends frames through its
+ * port; no other I/O.
  */
 #ifndef NODE_DRIVE_PDOS_H
 #define NODE_DRIVE_PDOS_H

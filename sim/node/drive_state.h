@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_state: the state of a simulated drive, in one struct. Used by node/drive_od and node/drive_node, which begins
- * and runs it. Data only; the context of drive_node. */
+ * and runs it. Data only; the context of drive_node. No functions. */
 #ifndef NODE_DRIVE_STATE_H
 #define NODE_DRIVE_STATE_H
 

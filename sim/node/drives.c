@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/drives.h (see there): the simulated drives of one process on one SocketCAN bus. Used by node/main
- * (hodograph-drive). One thread. */
+ * (hodograph-drive). One thread. Reads frames from the socket, sends frames, and prints injected faults to stdout. */
 #define _GNU_SOURCE
 #include "node/drives.h"
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/io_module.h (see there): a simulated I/O module. Used by node/drives. All in one context. */
+/* Implements node/io_module.h (see there): a simulated I/O module. Used by node/drives. All in one context. Changes the
+ * module, and sends frames through its port; no other I/O. */
 #include "node/io_module.h"
 
 #include <string.h>

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* io_module: a simulated I/O module (CiA 401) with 16 digital and 3 analogue outputs, for one bus. Used by node/drives.
+ * Changes the module, and sends frames through its port; no other I/O.
  *
  * Synchronous RPDOs act at the next SYNC, others at once. Outputs take their error values (0x6206, 0x6207, 0x6443,
  * 0x6444) when the heartbeat of the master is lost and when the node is STOPPED; at power-on and at a reset they are

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/node_faults.h (see there): faults injected into simulated drives. Used by node/drives. All in one
- * context, that of drive_node_receive, between two frames. */
+ * context, that of drive_node_receive, between two frames. Changes its struct and the drives, and reports each fault to
+ * the caller's function; no I/O of its own. */
 #include "node/node_faults.h"
 
 #include <assert.h>

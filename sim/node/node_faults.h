@@ -3,7 +3,8 @@
  * (docs/reference/protocol.md section 4) on the drives of this process.
  *
  * Each rule is independent of the others. A fault lasts until its rule ends, also over a restart of the drive: a broken
- * encoder stays broken. Used by node/drives. All in one context, that of drive_node_receive, between two frames. */
+ * encoder stays broken. Used by node/drives. All in one context, that of drive_node_receive, between two frames.
+ * Changes its struct and the drives, and reports each fault to the caller's function; no I/O of its own. */
 #ifndef NODE_NODE_FAULTS_H
 #define NODE_NODE_FAULTS_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/scaling.h (see there): bus counts per mm of a simulated drive, from encoder resolution 0x608F, gear
- * ratio 0x6091 and feed constant 0x6092. Used by node/drive_od. All in one context. */
+ * ratio 0x6091 and feed constant 0x6092. Used by node/drive_od. All in one context. Changes the axis that it is given;
+ * no I/O. */
 #include "node/scaling.h"
 
 #include "canopen/sdo_abort.h"

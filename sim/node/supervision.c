@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements node/supervision.h (see there): what a simulated drive supervises in each period. Used by node/servo. All
- * in one context. */
+ * in one context. Changes only its struct; no I/O. */
 #include "node/supervision.h"
 
 #include "canopen/emcy.h"

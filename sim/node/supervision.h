@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* supervision: supervises the following error and the motor overload of a simulated drive in each period, and stores
  * the effects of injected faults on switches, encoder and supply. It reports conditions; the servo decides the
- * reaction. Used by node/servo. All in one context.
+ * reaction. Used by node/servo. All in one context. Changes only its struct; no I/O.
  */
 #ifndef NODE_SUPERVISION_H
 #define NODE_SUPERVISION_H

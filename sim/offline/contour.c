@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements offline/contour.h (see there): the contour error: distance of a position from the exact curve. Used by
- * offline/offline and host_tools/hodograph/native. One thread for each struct contour. */
+ * offline/offline and host_tools/hodograph/native. One thread for each struct contour. Changes only its struct and the
+ * lent array; no I/O. */
 #include "offline/contour.h"
 
 #include <math.h>

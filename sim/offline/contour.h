@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* contour: the contour error, the distance of a point from the exact curve of a program. Used by offline/offline and
- * host_tools/hodograph/native.
+ * host_tools/hodograph/native. Changes only its struct and the lent array; no I/O.
  *
  * The curve is that of the program image (docs/reference/protocol.md 1.2), every segment expanded once to powers of its
  * parameter. The foot of the perpendicular is found by Newton steps from the commanded arc length, across segment ends

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements offline/offline.h (see there): interpolation, rounding and simulated axes in one process, without a bus.
- * Called by host_tools/hodograph/native. One thread for each struct offline. */
+ * Called by host_tools/hodograph/native. One thread for each struct offline. Changes only its struct and the caller's
+ * arrays; no I/O. */
 #include "offline/offline.h"
 
 #include <stddef.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* offline: the offline simulation, without a bus: interpolator, rounding to counts, simulated axes and contour error in
  * one process. It gives the same setpoints and encoder positions as a run on the bus, bit for bit. Called by
- * host_tools/hodograph/native.
+ * host_tools/hodograph/native. Changes only its struct and the caller's arrays; no I/O.
  *
  * Timing (docs/reference/protocol.md section 2): row k holds setpoint k, which is sent after SYNC k, latched
  * at SYNC k+1 and reached at SYNC k+2, and the positions and volts that the drives report for SYNC

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/smoothing.h (see there): Newton's method with a barrier for banded least squares in bounds.
- * Called by host_tools/hodograph/native. Any thread. */
+/* Implements offline/smoothing.h (see there): Newton's method with a barrier for banded least squares in bounds. Called
+ * by host_tools/hodograph/native. Any thread. Writes only the lent arrays; no I/O. */
 #include "offline/smoothing.h"
 
 #include <math.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stream.h (see there): a job in chunks without a bus. Called by host_tools/hodograph/native.
- * Chunks are opened, checked and taken over by the code of the controller, one attempt before each tick; commands are
- * those of the feed override. Dwells between chunks take their ticks, program stops no time. */
+/* Implements offline/stream.h (see there): a job in chunks without a bus. Called by host_tools/hodograph/native. Chunks
+ * are opened, checked and taken over by the code of the controller, one attempt before each tick; commands are those of
+ * the feed override. Dwells between chunks take their ticks, program stops no time. Changes only its struct and the
+ * lent memory; no I/O. */
 #include "offline/stream.h"
 
 #include <stddef.h>

@@ -4,7 +4,8 @@
  * (docs/reference/protocol.md 1.7). Called by host_tools/hodograph/native. Chunks are opened, checked and taken over by
  * the code of the controller, one attempt before each tick; commands are those of the feed override. Dwells between
  * chunks take their ticks, program stops no time. Setpoints are those of the controller, bit for bit. Records exist
- * only near the motion, as in the controller (core/coefficient_cache.h); they are made before each tick.
+ * only near the motion, as in the controller (core/coefficient_cache.h); they are made before each tick. Changes only
+ * its struct and the lent memory; no I/O.
  *
  * Use: offline_stream_begin; for each chunk offline_stream_check and offline_stream_add, before its tick; and
  * offline_stream_run in between. No heap: the caller lends memory for records, and a struct offline_part and the bytes

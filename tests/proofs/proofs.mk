@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# The proofs of tests/proofs by Frama-C and CBMC; included by the Makefile. PROOFS="eva_piece ..." runs these only.
+# Runs the proofs of tests/proofs by Frama-C and CBMC (tools/analysis/prove.py); included by the Makefile.
+# PROOFS="eva_piece ..." runs these only. Downloads the provers once; writes build/provers, build/proofs and stamps.
 PROVERS := $(BUILD)/provers/.ready
 
 .PHONY: proofs

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * An image to test the counter of instructions with: the same work a hundred times, with SysTick interrupts at any
- * place in it, which must not be counted. The first word is the file that gets the number of interrupts, a u32. Run
- * on an emulated board by tests/system/test_target_counts.py.
+ * place in it, which must not be counted. The first word is the file that gets the number of interrupts, a u32. Run on
+ * an emulated board by tests/system/test_target_counts.py. Writes that file by semihosting.
  */
 #include <stdint.h>
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # The images of this folder as processes of this machine, by two compilers, unoptimised and optimised: what their
-# setpoints are compared with. Included by the Makefile.
+# setpoints are compared with. Included by the Makefile. Writes build/target; `make golden` writes tests/data/bits.
 #
 #   build/target/setpoints-COMPILER-LEVEL STORE KERNEL FILE ...
 

@@ -4,9 +4,10 @@
  *
  *     u += V T / |r'| - (V T)^2 (r' . r'') / (2 |r'|^4)
  *
- * with r, r' and r'' by de Boor's algorithm, in single precision. Not part of the product. Words: FILE, which gets the
+ * with r, r' and r'' by de Boor's algorithm, in single precision. Not in the product. Words: FILE, which gets the
  * setpoints, i32 x and y in nm. The store holds a struct path, all float (the emulator puts it there). Reciprocals of
- * differences of knots are made beforehand, which is to the credit of the other side.
+ * differences of knots are made beforehand, which is to the credit of the other side. Run on an emulated board by
+ * tools/analysis/taylor.py. Reads the store, and writes FILE by semihosting.
  */
 #include <math.h>
 #include <stdint.h>

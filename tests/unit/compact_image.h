@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* An image with compact records, made of one without them; docs/reference/protocol.md 1.7.1. Used by chunked.c and
- * test_program.c. Pure. */
+ * test_program.c. Writes only `out`. */
 #ifndef TESTS_UNIT_COMPACT_IMAGE_H
 #define TESTS_UNIT_COMPACT_IMAGE_H
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# Instructions of the tick, counted in the emulator; included by the Makefile.
+# Counts the instructions of the tick in the emulator (tools/count.py). Included by the Makefile. Writes below build/;
+# `make count UPDATE=1` writes tests/data/counts.json and docs/validation/counts.md.
 
 COUNT_PLUGIN := $(BUILD)/target/count_plugin.so
 

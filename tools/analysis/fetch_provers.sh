@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: MIT
 # fetch_provers.sh LOCK OUT: puts Frama-C and CBMC under OUT, as OUT/bin/{frama-c,cbmc,goto-cc,goto-instrument}.
 #
-# apt downloads each package of LOCK from its Debian release, under Debian's signature, and its hash is compared with that of
-# LOCK. Where the release has a newer one by now (Debian replaces packages of stable releases every few months), that is taken,
-# and this says so. The archive is the one this machine's apt has Debian from, or $DEBIAN_MIRROR.
+# apt downloads each package of LOCK from its Debian release, under Debian's signature, and its hash is compared with
+# that of LOCK. Where the release has a newer one by now (Debian replaces packages of stable releases every few months),
+# that is taken, and this says so. The archive is the one this machine's apt has Debian from, or $DEBIAN_MIRROR.
 #
-# Nothing is installed. Frama-C asks findlib for packages that are linked into it already; empty descriptions satisfy it.
+# Run by `make proofs` (tests/proofs/proofs.mk). Writes below OUT only, and needs the network; nothing is installed.
+# Frama-C asks findlib for packages that are linked into it already; empty descriptions satisfy it.
 set -euo pipefail
 lock=$1 out=$2
 # shellcheck disable=SC2016  # apt fills in these fields

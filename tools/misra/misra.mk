@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-# cppcheck's MISRA C:2012 add-on over the firmware, a part of `make lint`; included by the Makefile.
+# Runs cppcheck's MISRA C:2012 add-on over the firmware, as a part of `make lint`. Included by the Makefile. Writes
+# build/lint/misra.
 MISRA_C := $(wildcard firmware/core/*.c firmware/canopen/*.c firmware/can/*.c firmware/app/*.c firmware/app/*/*.c firmware/port/*/*.c)
 
 .PHONY: lint-misra

@@ -3,7 +3,7 @@
 
 time accel_t cruise_t decel_t x y z direction_x direction_y direction_z start_v cruise_v accel, in s and mm; start
 position, and direction as unit vector. `benchmarks/peers/klipper.py` puts this file into a copy of Klipper's extras.
-Loaded by Klipper, which calls `load_config`.
+Loaded by Klipper, which calls `load_config`. Writes that file.
 """
 
 from typing import Any

@@ -6,7 +6,7 @@
  * A refused write is no error if the object already has the value. So a drive with a fixed PDO mapping is
  * accepted if the mapping is the right one.
  *
- * Called by app/controller.c. Frames in, frames out; main loop.
+ * Called by app/controller.c. Frames in, frames out; main loop. Changes only its struct.
  */
 #ifndef APP_DRIVES_DRIVE_BOOT_H
 #define APP_DRIVES_DRIVE_BOOT_H

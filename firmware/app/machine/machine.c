@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/machine.h (see there): initial values, the parts of the machine, and its queries. Used by
  * firmware/app. Guarded by the port's lock as a whole. Files use each other in one direction: tick, supervise and
- * requests -> fault -> drives -> machine. */
+ * requests -> fault -> drives -> machine. Changes only the machine; no I/O. */
 #include "app/machine/machine.h"
 
 #include <string.h>

@@ -9,7 +9,8 @@
  *
  * The state changes in three places: requests (main loop, under the lock; machine_requests.c), the timer's functions
  * (machine_tick.c, machine_supervise.c), and faults (machine_fault.c). Used by firmware/app. Guarded by the port's lock
- * as a whole. Files use each other in one direction: tick, supervise and requests -> fault -> drives -> machine.
+ * as a whole. Files use each other in one direction: tick, supervise and requests -> fault -> drives -> machine. The
+ * functions change only the machine; no I/O.
  */
 #ifndef APP_MACHINE_MACHINE_H
 #define APP_MACHINE_MACHINE_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/machine_drives.h (see there): all drives of a machine at once. Used by app/machine only.
- * Under the lock, any context. */
+/* Implements app/machine/machine_drives.h (see there): all drives of a machine at once. Used by app/machine only. Under
+ * the lock, any context. Changes only the goals of the axes; no I/O. */
 #include "app/machine/machine_drives.h"
 
 void machine_command(struct machine *machine, enum cia402_goal goal)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* machine_drives: all drives of a machine at once: sets their goals, and evaluates their states. Used by app/machine
- * only. Under the lock, any context. */
+ * only. Under the lock, any context. Changes only the goals of the axes; no I/O. */
 #ifndef APP_MACHINE_MACHINE_DRIVES_H
 #define APP_MACHINE_MACHINE_DRIVES_H
 

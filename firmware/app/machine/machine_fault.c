@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/machine_fault.h (see there): how the machine enters a fault, goes through its phases and
  * leaves it. Used by app/machine only; the public functions of machine_fault.c are in machine.h (machine_raise,
- * machine_note_emergency, machine_switch_off, machine_reset). Under the lock. */
+ * machine_note_emergency, machine_switch_off, machine_reset). Under the lock. Changes only the machine; no I/O. */
 #include "app/machine/machine_fault.h"
 
 #include "app/machine/machine_drives.h"

@@ -2,7 +2,7 @@
 /* The requests of app/machine/machine.h: commands of the operator, from app/commands.c (main loop, under the lock).
  * Each changes the state, or returns why not. docs/reference/architecture.md section 4 has the table of requests by
  * state. Used by firmware/app. Guarded by the port's lock as a whole. Files use each other in one direction: tick,
- * supervise and requests -> fault -> drives -> machine. */
+ * supervise and requests -> fault -> drives -> machine. Changes only the machine; no I/O. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"

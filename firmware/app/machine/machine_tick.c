@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* machine_step() of app/machine/machine.h: what each tick does in each state. Timer context, under the lock. Used by
  * firmware/app. Guarded by the port's lock as a whole. Files use each other in one direction: tick, supervise and
- * requests -> fault -> drives -> machine. */
+ * requests -> fault -> drives -> machine. Changes only the machine; no I/O. */
 #include "app/machine/machine.h"
 
 #include "app/machine/machine_drives.h"

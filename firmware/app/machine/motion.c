@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/motion.h: one run of a program. Used by firmware/app. Main loop: app/commands.c and
  * app/stream.c prepare it and hand it to the machine. Then it belongs to the tick (machine_tick.c), under the port's
- * lock. */
+ * lock. Changes only the motion; no I/O. */
 #include "app/machine/motion.h"
 
 #include <string.h>

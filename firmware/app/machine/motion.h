@@ -4,7 +4,7 @@
  * (hold, stop, override), and the targets of the axes that follow the path.
  *
  * Used by firmware/app. Main loop: app/commands.c and app/stream.c prepare it and hand it to the machine. Then it
- * belongs to the tick (machine_tick.c), under the port's lock.
+ * belongs to the tick (machine_tick.c), under the port's lock. The functions change only the motion; no I/O.
  */
 #ifndef APP_MACHINE_MOTION_H
 #define APP_MACHINE_MOTION_H

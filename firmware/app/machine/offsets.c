@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/offsets.h: velocity and torque offsets of the setpoints. Called by app/tick after the
- * machine's step, while feedforward is configured. Timer; offsets_init in the main loop. */
+ * machine's step, while feedforward is configured. Timer; offsets_init in the main loop. Changes only its struct. */
 #include "app/machine/offsets.h"
 
 #include <stddef.h>

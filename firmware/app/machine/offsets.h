@@ -3,6 +3,7 @@
  * offsets: velocity and torque offsets that feedforward (core/feedforward) adds to the setpoints of a motion.
  *
  * Called by app/tick after the machine's step, while feedforward is configured. Timer; offsets_init in the main loop.
+ * Changes only its struct.
  */
 #ifndef APP_MACHINE_OFFSETS_H
 #define APP_MACHINE_OFFSETS_H

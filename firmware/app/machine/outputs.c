@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/outputs.h: the effect of the machine's state, the delay by ticks, and the frame. Called by
- * app/tick after the machine's step. Timer; outputs_init in the main loop. */
+ * app/tick after the machine's step. Timer; outputs_init in the main loop. Changes its struct and the outputs of the
+ * machine's motion. */
 #include "app/machine/outputs.h"
 
 #include <string.h>

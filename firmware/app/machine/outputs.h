@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * outputs: sends the outputs that a path switches to the I/O module. Called by app/tick after the machine's step.
- * Timer; outputs_init in the main loop.
+ * Timer; outputs_init in the main loop. Changes its struct and the outputs of the machine's motion.
  *
  * The state of the machine can switch outputs off: hold, stop, end of the program, fault, as 0x2035 configures it.
  * Outputs that are on are delayed by a configured number of ticks. Setpoint k is sent after SYNC k, latched at SYNC k+1

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/common/ram_store.h (see there): the store of port.h in memory. Used by port/linux/store and
- * port/mps2/store. Main loop. */
+ * port/mps2/store. Main loop. Writes the memory of the store. */
 #include "port/common/ram_store.h"
 
 #include <string.h>

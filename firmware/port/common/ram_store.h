@@ -2,7 +2,7 @@
 /*
  * ram_store: the store of port.h in memory. For Linux (port/linux/store.h: also a file that is mapped there), emulated
  * boards, and the beginning of a new port. A real board keeps its content in flash (port/stm32g4/flash_store.h). Used
- * by port/linux/store and port/mps2/store. Main loop.
+ * by port/linux/store and port/mps2/store. Main loop. Writes the memory of the store.
  *
  * The memory belongs to the port, which defines `ram_store`:
  *

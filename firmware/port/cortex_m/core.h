@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* core: what every Cortex-M has at the same addresses: SysTick, interrupt controller, the mask of all interrupts. Used
- * by port/cortex_m, port/mps2 and port/stm32g4. Any context. */
+ * by port/cortex_m, port/mps2 and port/stm32g4. Any context. Names of registers, and functions that read and write
+ * them. */
 #ifndef PORT_CORTEX_M_CORE_H
 #define PORT_CORTEX_M_CORE_H
 

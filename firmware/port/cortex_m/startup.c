@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/cortex_m/startup.h (see there): what every Cortex-M does between reset and main(). Called by the
- * hardware, at reset and in interrupts; a board defines those that it needs. */
+ * hardware, at reset and in interrupts; a board defines those that it needs. Writes the variables in RAM and the
+ * control registers of the core before main(). */
 #include "port/cortex_m/startup.h"
 
 #include <stddef.h>

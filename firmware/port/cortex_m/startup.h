@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * startup: what every Cortex-M does between reset and main(): vectors, stack, memory, FPU. ARMv6-M to ARMv8-M. Called
- * by the hardware, at reset and in interrupts; a board defines those that it needs.
+ * by the hardware, at reset and in interrupts; a board defines those that it needs. Writes the variables in RAM and the
+ * control registers of the core before main().
  *
  * At its start the core has to be in the state after reset: thread mode, MSP, no interrupt enabled. A boot loader must
  * leave this state, and may load the image anywhere: startup sets VTOR to the vector table. A Cortex-M0 has no VTOR;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * systick: SysTick as timer of the tick and as clock, for ports of a Cortex-M without a better timer. The time is 0
- * before systick_begin(). Used by port/mps2. Main loop and interrupts, as each function states.
+ * before systick_begin(). Used by port/mps2. Main loop and interrupts, as each function states. Writes the registers of
+ * SysTick and its priority.
  *
  * SysTick counts down to 0, where its interrupt (startup_systick) becomes pending and the next period begins; so ticks
  * never drift, and none is closer to the next than a period less its own lateness. The core's clock must be a whole

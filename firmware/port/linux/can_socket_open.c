@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* can_socket_open() of port/linux/can_socket.h: opens an interface or a local bus, and makes the message for the user
  * if that fails. Used by port/linux and sim/. One thread at a time for each socket, except that can_socket_send may be
- * called by a second one. */
+ * called by a second one. Opens a socket, and writes the message to the caller's buffer. */
 #define _GNU_SOURCE
 #include "port/linux/can_socket.h"
 

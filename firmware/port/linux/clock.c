@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/clock.h (see there): the time of a process of this computer, for the Linux port and the
- * simulated drives. Used by port/linux and sim/. Any thread in real time, one thread in virtual time. */
+ * simulated drives. Used by port/linux and sim/. Any thread in real time, one thread in virtual time. In virtual time
+ * it opens a connection to the hub, sends and receives on it, and blocks the three signals outside of clock_poll(). */
 #define _GNU_SOURCE
 #include "port/linux/clock.h"
 

@@ -2,7 +2,8 @@
 /*
  * clock: the time of a process, for the Linux port and the programs of sim/. It is the monotonic clock of the system.
  * If the process takes part in a local bus with virtual time (local_bus.h), it is that virtual time. Used by port/linux
- * and sim/.
+ * and sim/. In virtual time it opens a connection to the hub, sends and receives on it, and blocks the three signals
+ * outside of clock_poll().
  *
  * The state is one for the whole process. One thread uses all functions in virtual time, except clock_note_signal
  * (signal handlers). It sleeps in clock_poll() only: what it does between two calls takes no virtual time. SIGINT,

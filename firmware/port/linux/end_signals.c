@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/end_signals.h (see there): SIGTERM and SIGINT as something to wait for. Used by hub/main,
  * injector/main and node/main. Main thread. It blocks both signals in the calling thread and in all threads that are
- * made later. */
+ * made later. Opens the descriptor. */
 #define _GNU_SOURCE
 #include "port/linux/end_signals.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* end_signals: SIGTERM and SIGINT as a descriptor that can be polled. Used by hub/main, injector/main and node/main.
- * Main thread. It blocks both signals in the calling thread and in all threads that are made later. */
+ * Main thread. Opens the descriptor, and blocks both signals in the calling thread and in all threads that are made
+ * later. */
 #ifndef PORT_LINUX_END_SIGNALS_H
 #define PORT_LINUX_END_SIGNALS_H
 

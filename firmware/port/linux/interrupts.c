@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/interrupts.h (see there): the thread that stands for both interrupts of a board, and what the
- * main loop shares with it. Used by port_linux.c. Main loop, except interrupts_in_tick (any context). */
+ * main loop shares with it. Used by port_linux.c. Main loop, except interrupts_in_tick (any context). Starts and ends
+ * the thread, receives frames from the socket, and calls the handlers of the application. */
 #define _GNU_SOURCE
 #include "port/linux/interrupts.h"
 

@@ -11,7 +11,8 @@
  * In virtual time (clock.h) there is no thread: the main loop runs the interrupts while it sleeps, so that the work of
  * the controller is one sequence.
  *
- * Used by port_linux.c. Main loop, except interrupts_in_tick (any context).
+ * Used by port_linux.c. Main loop, except interrupts_in_tick (any context). Starts and ends the thread, receives frames
+ * from the socket, and calls the handlers of the application.
  */
 #ifndef PORT_LINUX_INTERRUPTS_H
 #define PORT_LINUX_INTERRUPTS_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/interrupts_thread.h (see there): how the thread of the interrupts is made. Used by
- * port/linux/interrupts. Main loop. */
+ * port/linux/interrupts. Main loop. Starts a thread, sets its scheduler, locks the memory of the process, and writes
+ * notes by port_log. */
 #define _GNU_SOURCE
 #include "port/linux/interrupts_thread.h"
 

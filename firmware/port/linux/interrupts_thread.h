@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* interrupts_thread: creates the thread for the interrupts: under SCHED_FIFO for real time, or as a batch thread for
- * the fast pace. Used by port/linux/interrupts. Main loop. */
+ * the fast pace. Used by port/linux/interrupts. Main loop. Starts a thread, sets its scheduler, locks the memory of the
+ * process, and writes notes by port_log. */
 #ifndef PORT_LINUX_INTERRUPTS_THREAD_H
 #define PORT_LINUX_INTERRUPTS_THREAD_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/local_connection.h (see there): opening a connection to the hub of a local bus (local_bus.h).
- * Used by can_socket_open and clock. Any thread; local_connection_open waits for the welcome of the hub. */
+ * Used by can_socket_open and clock. Any thread; local_connection_open waits for the welcome of the hub. Opens a
+ * socket, sends a message and receives one. */
 #define _GNU_SOURCE
 #include "port/linux/local_connection.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* local_connection: opens a connection to the hub of a local bus (local_bus.h). Used by can_socket_open and clock. Any
- * thread; local_connection_open waits for the welcome of the hub. */
+ * thread; local_connection_open waits for the welcome of the hub. Opens a socket, sends a message and receives one. */
 #ifndef PORT_LINUX_LOCAL_CONNECTION_H
 #define PORT_LINUX_LOCAL_CONNECTION_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/linux/long_options.h (see there): reads the command line of a program, one option after the other,
- * by getopt_long. Used by port/linux/options and sim/. One thread. */
+/* Implements port/linux/long_options.h (see there): reads the command line of a program, one option after the other, by
+ * getopt_long. Used by port/linux/options and sim/. One thread. Changes its struct and the globals of getopt, and
+ * writes the error to the caller's buffer. */
 #define _GNU_SOURCE
 #include "port/linux/long_options.h"
 

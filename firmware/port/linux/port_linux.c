@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/port.h for Linux: SocketCAN, a thread for the interrupts, main() for the main loop. Used by
- * firmware/app and the ports. Contexts: port/port.h. */
+ * firmware/app and the ports. Contexts: port/port.h. Opens the bus and the store, starts a thread, sets signal
+ * handlers, and writes to stderr. */
 #define _GNU_SOURCE
 #include "port/port.h"
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/linux/store.h (see there): the stores of port.h as memory of the process, or as a file that is mapped
- * there and outlives it. Used by port_linux.c: main thread, at the start of the process; ram_store_put: main loop. */
+ * there and outlives it. Used by port_linux.c: main thread, at the start of the process; ram_store_put: main loop.
+ * Opens, maps and writes the file; writes errors to stderr. */
 #define _GNU_SOURCE
 #include "port/linux/store.h"
 

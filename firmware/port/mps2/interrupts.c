@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/mps2/interrupts.h (see there): the tick, and the receive handler. Used by port_mps2.c, uart.c,
- * link_fifo.c and link_slcan.c. Main loop and interrupts, as each function states. */
+ * link_fifo.c and link_slcan.c. Main loop and interrupts, as each function states. Writes the registers of SysTick,
+ * masks interrupts, and calls the handlers of the application. */
 #include "port/mps2/interrupts.h"
 
 #include <string.h>

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * interrupts: the tick, and the receive handler that both links call. Used by port_mps2.c, uart.c, link_fifo.c and
- * link_slcan.c. Main loop and interrupts, as each function states.
+ * link_slcan.c. Main loop and interrupts, as each function states. Writes the registers of SysTick, masks interrupts,
+ * and calls the handlers of the application.
  *
  * Priorities: SysTick 0, the UART below it. So a tick interrupts the taking of characters, never the receive handler,
  * which runs with all interrupts masked. The FPU keeps its state lazily, as after reset: an interrupt reserves room on

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * link: how CAN frames leave and reach the emulated board. Used by port/mps2 only. Main loop and interrupts, as struct
- * link states. The command line selects one of two links (docs/guides/target.md):
+ * link states. Declarations only; a link sends and receives frames. The command line selects one of two links
+ * (docs/guides/target.md):
  *
  *   link_fifo   records on two FIFOs, exchanged in the tick's interrupt while the clock of the guest stands still
  *   link_slcan  text on a UART, received by interrupt in real time

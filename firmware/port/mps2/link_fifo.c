@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* link_fifo of port/mps2/link.h: in each tick it sends all frames and receives those that came, as if by an interrupt
- * right after the tick. Used by port/mps2 only. Main loop and interrupts, as struct link states. */
+ * right after the tick. Used by port/mps2 only. Main loop and interrupts, as struct link states. Reads and writes the
+ * two FIFOs by semihosting. */
 #include "port/cortex_m/core.h"
 #include "port/cortex_m/systick.h"
 #include "port/mps2/exchange.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* link_slcan of port/mps2/link.h: SLCAN on the UART, in real time. The board acts as a host of an adapter: it opens
- * the bus. Used by port/mps2 only. Main loop and interrupts, as struct link states. */
+/* link_slcan of port/mps2/link.h: SLCAN on the UART, in real time. The board acts as a host of an adapter: it opens the
+ * bus. Used by port/mps2 only. Main loop and interrupts, as struct link states. Sends and receives characters by
+ * uart.c. */
 #include "can/slcan.h"
 #include "port/cortex_m/core.h"
 #include "port/mps2/interrupts.h"

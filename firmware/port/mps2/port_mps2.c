@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/port.h for QEMU's mps2 boards: command line, console and end by semihosting. Used by firmware/app
- * and the ports. Contexts: port/port.h. */
+/* Implements port/port.h for QEMU's mps2 boards: command line, console and end by semihosting. Used by firmware/app and
+ * the ports. Contexts: port/port.h. Reads the command line and writes the console by semihosting, and ends the emulator
+ * at the end. */
 #include "port/port.h"
 
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The store and the memory of streamed jobs of port/port.h. The store is the board's PSRAM, 16 MiB. The ring of
  * streamed jobs has as much RAM as a microcontroller could provide. Used by firmware/app and the ports. Contexts:
- * port/port.h. */
+ * port/port.h. Defines memory, and returns its addresses; port/common/ram_store writes it. */
 #include "port/common/ram_store.h"
 #include "port/port.h"
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/rv32/startup.h (see there): what a RISC-V hart does between reset and main(). Called by the hardware
- * only, at reset and in traps. */
+ * only, at reset and in traps. Writes the variables in RAM before main(); a trap ends the emulator. */
 #include "port/rv32/startup.h"
 
 #include <stddef.h>

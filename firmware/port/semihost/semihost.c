@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/semihost/semihost.h (see there): semihosting: files, console and exit of an emulated board. Used by
- * port/mps2, port/rv32 and tests/target. Any context; each call waits. */
+ * port/mps2, port/rv32 and tests/target. Any context; each call waits. Reads and writes files of the computer that
+ * emulates the board, and ends the emulator. */
 #include "port/semihost/semihost.h"
 
 #include <string.h>

@@ -2,7 +2,8 @@
 /*
  * semihost: file operations, console and exit by semihosting: the emulator (or a debugger) executes them for the
  * program while the clock of the guest is stopped. Arm IHI 0100 (Semihosting for AArch32 and AArch64); RISC-V uses the
- * same numbers. Used by port/mps2, port/rv32 and tests/target.
+ * same numbers. Used by port/mps2, port/rv32 and tests/target. Reads and writes files of the computer that emulates the
+ * board, and ends the emulator.
  *
  * On hardware without a debugger the first call is a fault. Any context; each call waits.
  */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/console.h (see there): sends the lines of port_log and of faults by LPUART1 on PA2, which the
  * board's ST-LINK shows as a serial port. Used by port_stm32g4.c and faults. Main loop, and handlers that do not
- * return: a character takes 87 us, and the functions wait for it. */
+ * return: a character takes 87 us, and the functions wait for it. Writes registers of LPUART1 and RCC. */
 #include "port/stm32g4/console.h"
 
 #include "port/stm32g4/pins.h"

@@ -2,7 +2,8 @@
 /*
  * console: sends the lines of port_log and of faults by LPUART1 on PA2, which the board's ST-LINK shows as a serial
  * port: 115200 bit/s, 8 data bits, no parity. Receives nothing. Used by port_stm32g4.c and faults. Main loop, and
- * handlers that do not return: a character takes 87 us, and the functions wait for it.
+ * handlers that do not return: a character takes 87 us, and the functions wait for it. Writes registers of LPUART1 and
+ * RCC.
  */
 #ifndef PORT_STM32G4_CONSOLE_H
 #define PORT_STM32G4_CONSOLE_H

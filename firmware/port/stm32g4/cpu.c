@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/cpu.h (see there): interrupts, sleep and reset of the core, by BASEPRI, NVIC and AIRCR
- * (ARMv7-M Architecture Reference Manual B1, B3). Used by port/stm32g4 only. Any context, but cpu_sleep: main loop. */
+ * (ARMv7-M Architecture Reference Manual B1, B3). Used by port/stm32g4 only. Any context, but cpu_sleep: main loop.
+ * Writes these registers only. */
 #include "port/stm32g4/cpu.h"
 
 #include "port/cortex_m/core.h"

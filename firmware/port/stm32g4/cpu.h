@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * cpu: interrupts, sleep and reset of the core (ARMv7-M Architecture Reference Manual B1, B3). Used by port/stm32g4
- * only. Any context, but cpu_sleep: main loop. On any other machine the tests define these functions.
+ * only. Any context, but cpu_sleep: main loop. On any other machine the tests define these functions. Writes registers
+ * of the core only (BASEPRI, NVIC, AIRCR).
  *
  * Priorities: 0 is the highest of 16. NMI and hard fault are above all of them.
  */

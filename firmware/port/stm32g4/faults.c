@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/faults.h (see there): hard faults and uncorrectable words of the flash. Used by
- * port_stm32g4.c. Main loop; the reactions run in the interrupt handlers of the faults. */
+ * port_stm32g4.c. Main loop; the reactions run in the interrupt handlers of the faults. Writes a line to the console,
+ * and restarts the chip. */
 #include "port/stm32g4/faults.h"
 
 #include <stdbool.h>

@@ -2,7 +2,8 @@
 /*
  * faults: reactions to faults of the chip itself: a word of the flash that cannot be corrected (NMI), a hard fault. One
  * line on the console, and the chip restarts. SYNC stops, so the drives stop by themselves. Used by port_stm32g4.c.
- * Main loop; the reactions run in the interrupt handlers of the faults.
+ * Main loop; the reactions run in the interrupt handlers of the faults. Writes a line to the console, and restarts the
+ * chip.
  */
 #ifndef PORT_STM32G4_FAULTS_H
 #define PORT_STM32G4_FAULTS_H

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/fdcan.h (see there): FDCAN1 for classic frames with 11-bit identifiers. Used by
- * port_stm32g4.c and irq. Main loop and interrupts, as each function states. */
+ * port_stm32g4.c and irq. Main loop and interrupts, as each function states. Reads and writes the registers and the
+ * message RAM of FDCAN1. */
 #include "port/stm32g4/fdcan.h"
 
 #include <string.h>

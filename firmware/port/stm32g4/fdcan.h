@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * fdcan: FDCAN1 for classic frames with 11-bit identifiers. Used by port_stm32g4.c and irq. Main loop and interrupts,
- * as each function states.
+ * as each function states. Reads and writes the registers and the message RAM of FDCAN1.
  *
  * Sending. Two queues, one for the interrupts (SYNC, setpoints) and one for the main loop (SDO, heartbeats), each in
  * order. The chip's own FIFO of three takes all frames of the interrupts. It takes one frame of the main loop at a

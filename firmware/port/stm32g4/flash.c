@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/flash.h (see there): erasing and programming pages of the second flash bank, while the
  * program runs from the first. Used by flash_store.c, port_stm32g4.c and faults.c. Main loop, except
- * flash_take_ecc_error (NMI). */
+ * flash_take_ecc_error (NMI). Writes the registers of FLASH and the second bank. */
 #include "port/stm32g4/flash.h"
 
 #include <string.h>

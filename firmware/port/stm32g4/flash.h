@@ -4,7 +4,8 @@
  *
  * A page takes about 22 ms to erase, a double word 85 us to program; the functions wait. Other contexts continue: they
  * run from bank 1, which can be read at the same time. A read of bank 2 stalls the core until the operation has ended.
- * Used by flash_store.c, port_stm32g4.c and faults.c. Main loop, except flash_take_ecc_error (NMI).
+ * Used by flash_store.c, port_stm32g4.c and faults.c. Main loop, except flash_take_ecc_error (NMI). Writes the
+ * registers of FLASH and the second bank.
  *
  * The data cache is off during an operation and empty afterwards. On other dual-bank chips of the family it may cache
  * wrong data if bank 2 is read during a write, and would keep old contents after an erase.

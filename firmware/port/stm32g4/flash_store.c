@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/flash_store.h (see there): the banks of port.h's store in the chip's second flash bank. Used
- * by port_store.c. Main loop. */
+ * by port_store.c. Main loop. Erases and writes the second flash bank by flash.c. */
 #include "port/stm32g4/flash_store.h"
 
 #include <string.h>

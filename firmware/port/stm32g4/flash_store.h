@@ -10,7 +10,7 @@
  * whose erasing or writing was interrupted needs no repair: the next erase begins again.
  *
  * Writes collect eight bytes, the unit that the flash programs and protects by its error correction. Each double word
- * is programmed once. Used by port_store.c. Main loop.
+ * is programmed once. Used by port_store.c. Main loop. Erases and writes the second flash bank by flash.c.
  */
 #ifndef PORT_STM32G4_FLASH_STORE_H
 #define PORT_STM32G4_FLASH_STORE_H

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * irq: the two interrupts of the controller, and how they exclude each other. Used by port_stm32g4.c and vectors.c.
- * Main loop, except the handlers and irq_period (tick).
+ * Main loop, except the handlers and irq_period (tick). Switches the interrupts on and off by cpu, tick_timer and
+ * fdcan, and calls the handlers of the application.
  *
  *     TIM2        priority 1: the tick
  *     FDCAN1 IT0  priority 2: frames that came, the next ones to send, bus-off

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/pins.h (see there): the pins that the port uses. Used by port_stm32g4.c and console. Main
- * loop, at the start. */
+ * loop, at the start. Writes registers of GPIOA and RCC. */
 #include "port/stm32g4/pins.h"
 
 #include "port/stm32g4/reg_clock.h"

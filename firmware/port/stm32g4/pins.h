@@ -7,7 +7,8 @@
  *
  * FDCAN1 is also available on PB8 and PB9, but PB8 is BOOT0. With option bit nSWBOOT0 as delivered, the chip would
  * start its boot loader if the bus is recessive (high) at reset, which is the usual state. PA11 and PA12 are the chip's
- * USB pins, which this board does not use. Used by port_stm32g4.c and console. Main loop, at the start.
+ * USB pins, which this board does not use. Used by port_stm32g4.c and console. Main loop, at the start. Writes
+ * registers of GPIOA and RCC.
  */
 #ifndef PORT_STM32G4_PINS_H
 #define PORT_STM32G4_PINS_H

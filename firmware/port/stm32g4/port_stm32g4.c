@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/port.h for NUCLEO-G474RE by the modules of this folder; the store is in port_store.c. Used by
- * firmware/app and the ports. Contexts: port/port.h. */
+ * firmware/app and the ports. Contexts: port/port.h. Writes registers of RCC; sends, receives and writes the console by
+ * the modules of this folder. */
 #include "port/port.h"
 
 #include "port/stm32g4/clock.h"

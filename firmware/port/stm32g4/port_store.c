@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The store of port/port.h: the banks of flash_store, with the watchdog fed in between; and the ring of streamed jobs
- * in RAM. Used by firmware/app and the ports. Main loop, except where port/port.h states otherwise. */
+ * in RAM. Used by firmware/app and the ports. Main loop, except where port/port.h states otherwise. Erases and writes
+ * the second flash bank by flash_store, and feeds the watchdog. */
 #include "port/port.h"
 #include "port/stm32g4/flash_store.h"
 

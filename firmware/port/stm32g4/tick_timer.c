@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/tick_timer.h (see there): the clocks of the port, and when the next tick is due. Used by
- * irq.c, fdcan.c and port_stm32g4.c. Main loop and tick; the times in any context. */
+ * irq.c, fdcan.c and port_stm32g4.c. Main loop and tick; the times in any context. Writes the registers of TIM2 and
+ * TIM5. */
 #include "port/stm32g4/tick_timer.h"
 
 #include "port/stm32g4/reg_io.h"

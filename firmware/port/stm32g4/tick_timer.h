@@ -7,7 +7,8 @@
  *
  * Ticks are due a period apart. After a late tick the next one comes at its own due time, but at least three quarters
  * of a period after the late one. After a tick that was late by a whole period the clock of the ticks is set anew. Used
- * by irq.c, fdcan.c and port_stm32g4.c. Main loop and tick; the times in any context.
+ * by irq.c, fdcan.c and port_stm32g4.c. Main loop and tick; the times in any context. Writes the registers of TIM2 and
+ * TIM5.
  */
 #ifndef PORT_STM32G4_TICK_TIMER_H
 #define PORT_STM32G4_TICK_TIMER_H

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements port/stm32g4/watchdog.h (see there): the independent watchdog. Used by port_stm32g4.c. Main loop. */
+/* Implements port/stm32g4/watchdog.h (see there): the independent watchdog. Used by port_stm32g4.c. Main loop. Writes
+ * registers of IWDG and the reset flags in RCC_CSR only. */
 #include "port/stm32g4/watchdog.h"
 
 #include "port/stm32g4/reg_clock.h"

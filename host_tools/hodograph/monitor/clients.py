@@ -5,7 +5,8 @@ A new socket waits until its browser has sent a hello message. At most 64 socket
 closed. A browser that only watches is refused when all 16 slots are taken. A browser with the token always gets a slot,
 if necessary that of the oldest browser with the token.
 
-Used by `server` and `session`. All methods except `Broadcaster.publish` have to be called in the event loop.
+Used by `server` and `session`. All methods except `Broadcaster.publish` have to be called in the event loop. No I/O:
+the server closes the sockets and sends the messages.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 The content of messages depends on the time stamps of the frames only; the clock of this computer only paces them.
 
 Used by link, session and cli/monitor_command. Takes frames from its source and gives messages to functions of the
-caller.
+caller. Starts a thread, which reads the bus.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""From a spline and a feed plan to a program; docs/theory/numerics.md section 8. Used by the modules that compile
-programs. No I/O.
+"""Compiles a spline and a feed plan to a program; docs/theory/numerics.md section 8. Used by all modules of host_tools
+that compile a program, such as pipeline. No I/O.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths. Used by most modules of host_tools. No
+"""C2 Pythagorean-hodograph quintic splines: from points to exact arc lengths. Used by many modules of host_tools. No
 I/O.
 """
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""The judge finds each kind of violation in a made-up record, and none in a good one. Run by pytest; starts and writes
-nothing.
+"""The judge finds each kind of violation in a made-up record, and none in a good one. Run by pytest; reads
+examples/faults; starts and writes nothing.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Reads G-code: RS274/NGC as LinuxCNC 2.9 understands it. docs/reference/gcode.md lists the words. Used by
-`toolpath/files`.
+`toolpath/files`. No I/O.
 """
 
 from .options import Options
