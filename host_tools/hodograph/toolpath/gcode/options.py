@@ -26,8 +26,8 @@ class Options:
     g28, g30        reference points, as machine positions
     tools           offset of each tool by its number. None: every tool has offset 0, so that programmed positions are
                     those of the tool's tip. With a table, a tool that is not in it is refused.
-    feed_mm_s       feed of moves while no F is in force; in degrees per second where rotary axes move alone. None: moves
-                    without an F in force are refused. job.py replaces the feeds that F gives, if requested.
+    feed_mm_s       feed of moves while no F is in force; in degrees per second where rotary axes move alone. None:
+                    moves without an F in force are refused. job.py replaces the feeds that F gives, if requested.
     block_delete    whether lines that begin with "/" are left out
     optional_stops  whether M1 stops; False: it is left out
     most_jumps      most subroutine calls and backward jumps of loops; a program with more is refused, since its loops
