@@ -69,6 +69,7 @@ def ends(text: str) -> list[tuple[float, ...]]:
         ("G10 L2 P1 R90\nG28 Z3", (100.0, -40.0, 0.0, 5.0)),
         ("G0 Z#<_abs_z>", (100.0, -40.0, -60.0, 5.0)),
         ("G0 X5\nG53 G0 X#<_abs_x> Y[#<_abs_y> + 1]", (105.0, -39.0, -30.0, 5.0)),
+        ("G20 G0 Z1\nG53 G0 X#<_abs_y> Z[#<_abs_z> + 1]", (-40.0, -40.0, 20.8, 5.0)),
     ],
 )
 def test_machine_positions_of_a_program(text: str, end: tuple[float, ...]) -> None:

@@ -6,7 +6,7 @@ gcode/interpreter. No I/O.
 #5401 to #5406         tool offset in force, in mm and degrees
 #5420 to #5425         program position, in program units
 #<_x> to #<_c>         the same
-#<_abs_x> to #<_abs_c> machine position, in mm and degrees
+#<_abs_x> to #<_abs_c> machine position, in program units
 #<_line>               number of the line
 #<_metric> #<_imperial> #<_absolute> #<_incremental> #<_ijk_absolute_mode> #<_inverse_time> #<_units_per_minute>
 #<_units_per_rev> #<_retract_r_plane> #<_retract_old_z> #<_mist> #<_flood> #<_spindle_on> #<_spindle_cw>
@@ -95,4 +95,4 @@ def _program_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
 
 
 def _machine_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
-    return lambda: modes.position[axis] + where.work[axis]
+    return lambda: modes.in_program_units(axis, modes.position[axis] + where.work[axis])
