@@ -285,7 +285,7 @@ def test_system_parameters() -> None:
     ] == (
         pytest.approx(-25.4),
         pytest.approx(50.8 * 25.4),
-        25.4,
+        1.0,
         540.0,
     )
 

@@ -6,7 +6,8 @@ gcode/interpreter. No I/O.
 #5401 to #5406         tool offset in force, in mm and degrees
 #5420 to #5425         program position, in program units
 #<_x> to #<_c>         the same
-#<_abs_x> to #<_abs_c> machine position, in mm and degrees
+#5021 to #5026         machine position, in program units
+#<_abs_x> to #<_abs_c> the same
 #<_line>               number of the line
 #<_metric> #<_imperial> #<_absolute> #<_incremental> #<_ijk_absolute_mode> #<_inverse_time> #<_units_per_minute>
 #<_units_per_rev> #<_retract_r_plane> #<_retract_old_z> #<_mist> #<_flood> #<_spindle_on> #<_spindle_cw>
@@ -43,7 +44,7 @@ def add_system_parameters(parameters: Parameters, modes: Modes, where: Coordinat
     for axis, letter in enumerate(AXES):
         numbers[5401 + axis] = _tool_offset(where, axis)
         numbers[5420 + axis] = names[f"_{letter}"] = _program_coordinate(modes, where, axis)
-        names[f"_abs_{letter}"] = _machine_coordinate(modes, where, axis)
+        numbers[5021 + axis] = names[f"_abs_{letter}"] = _machine_coordinate(modes, where, axis)
     for name, is_true in _flags(modes).items():
         names[name] = _as_number(is_true)
     names["_call_level"] = lambda: float(parameters.level)
@@ -95,4 +96,4 @@ def _program_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
 
 
 def _machine_coordinate(modes: Modes, where: Coordinates, axis: int) -> Getter:
-    return lambda: modes.position[axis] + where.work[axis]
+    return lambda: modes.in_program_units(axis, modes.position[axis] + where.work[axis])
