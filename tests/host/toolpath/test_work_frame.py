@@ -157,7 +157,7 @@ def test_a_rotary_move_first_leaves_x_y_z_at_the_start(
         start_mm=tuple(place[name][0] for name in path),
         offset_mm=tuple(place[name][1] for name in path),
     )
-    text = "G0 A10\nG53 G0 A-1\nG0 X5\nG53 G0 Z0\nG28 A0\nM2\n"
+    text = "G0 A10\nG53 G0 A20\nG0 X5\nG53 G0 Z0\nG28 A14\nM2\n"
     job = job_of(tmp_path, machine, text)
     run = simulate_job(job)
     ends = [
@@ -165,7 +165,7 @@ def test_a_rotary_move_first_leaves_x_y_z_at_the_start(
         for section, motion in zip(job.sections, run.motions, strict=True)
     ]
     starts = {name: number for name, (number, _) in place.items()}
-    wanted = [{"a": -6.0}, {"x": 5.0, "z": 30.0}, {"a": -5.0}]
+    wanted = [{"a": 15.0}, {"x": 5.0, "z": 30.0}, {"a": -5.0}]
     for found, moved in zip(ends, wanted, strict=True):
         for name in path:
             assert found[name][0] == pytest.approx(starts[name], abs=1e-5)
