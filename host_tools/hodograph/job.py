@@ -9,7 +9,7 @@ them. `stream` makes its sections by `SectionMaker` too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -271,13 +271,15 @@ def load_job(
 
 def work_frame(machine: Machine) -> WorkFrame:
     """Where a toolpath lies in a machine, and where it starts."""
-    letters = [*AXES[:3], *(axis.name.lower() for axis in machine.path_axes[3:])]
-    offset = dict(zip(letters, machine.offset_mm, strict=False))
-    start = dict(zip(letters, machine.start_mm, strict=False))
-    return WorkFrame(_position(offset), _position(start))
+    return WorkFrame(_position(machine, machine.offset_mm), _position(machine, machine.start_mm))
 
 
-def _position(by_letter: Mapping[str, float]) -> Position:
+def _position(machine: Machine, numbers: Sequence[float]) -> Position:
+    """A position from one number for each axis of the path. The first three axes are x, y and z whatever their names;
+    the numbers of axes after them count if their names are a, b and c.
+    """
+    drawn, names = numbers[:3], [axis.name.lower() for axis in machine.path_axes[3:]]
+    by_letter = dict(zip(names, numbers[3:], strict=False)) | dict(zip(AXES, drawn, strict=False))
     x, y, z, a, b, c = (by_letter.get(letter, 0.0) for letter in AXES)
     return (x, y, z, a, b, c)
 
@@ -514,6 +516,7 @@ class SectionMaker:
 
     def _check_travel(self, section: Section, fitted: FittedPath, machine: Machine) -> None:
         """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""
+        self._check_standing(section, machine)
         curve, reference = fitted.curve, section.reference
         coefficients, given = curve.position_coefficients, reference.point
         if curve.extra_axes:
@@ -529,15 +532,33 @@ class SectionMaker:
             )
             if not out.any():
                 continue
-            programmed = given[1:, k] + offset
+            programmed = given[:, k] + offset
             beyond = (programmed < axis.travel_min_mm) | (programmed > axis.travel_max_mm)
+            keys = "offset_mm or start_mm" if beyond[0] else "offset_mm"
+            beyond = beyond[1:]
             chord = _chord_of(fitted, int(np.argmax(out)))
             line = section.reference.line[int(np.argmax(beyond)) if beyond.any() else chord]
             raise PlanError(
                 f"{self.file}:{line}: {axis.name} goes to {low.min():.6g} … {high.max():.6g} {axis.unit} with the work "
                 f"offset, its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} {axis.unit}: "
-                "change [work] offset_mm, or the program"
+                f"change [work] {keys}, or the program"
             )
+
+    def _check_standing(self, section: Section, machine: Machine) -> None:
+        """Raises PlanError, naming the line, where axes before those of the program stand outside their travel: the
+        toolpath starts there.
+        """
+        axes = self.machine.path_axes[: machine.first_axis]
+        for axis, own, offset in zip(
+            axes, section.stands_at or (), self.machine.offset_mm, strict=False
+        ):
+            at = own + offset
+            if not axis.travel_min_mm - _ROUNDING_MM <= at <= axis.travel_max_mm + _ROUNDING_MM:
+                raise PlanError(
+                    f"{self.file}:{section.reference.line[0]}: {axis.name} stands at {at:.6g} {axis.unit} with the "
+                    f"work offset, its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} {axis.unit}: change "
+                    "[work] start_mm or offset_mm"
+                )
 
 
 def _motion_limits(machine: Machine) -> MotionLimits:

@@ -221,7 +221,7 @@ def machine_of(file: Path, contents: Mapping[str, Any]) -> Machine:
         stop_time_ms=controller.integer("stop_time_ms", 250, low=1, high=60_000),
         start_tolerance_mm=controller.number("start_tolerance_mm", 0.005, low=1e-6, high=10),
         offset_mm=_place(work, "offset_mm", max(len(path), PLANE_AXES)),
-        start_mm=_place(work, "start_mm", max(len(path), PLANE_AXES)),
+        start_mm=_start(work, path),
         supervision=_supervision(root),
         axes=path + tuple(axis for axis in given if axis not in path),
         path_count=len(path),
@@ -265,6 +265,18 @@ def _place(work: Table, key: str, count: int) -> tuple[float, ...]:
     if not work.has(key):
         return (0.0,) * count
     return work.vector(key, count, low=-4096, high=4096)
+
+
+def _start(work: Table, path: tuple[Axis, ...]) -> tuple[float, ...]:
+    """`start_mm`. Raises InputError: it is not 0 for an axis that no toolpath moves."""
+    start = _place(work, "start_mm", max(len(path), PLANE_AXES))
+    for axis, number in zip(path[SPACE_AXES:], start[SPACE_AXES:], strict=False):
+        if number and axis.name.lower() not in AXES[SPACE_AXES:]:
+            raise work.error(
+                "start_mm",
+                f"is {number:g} for axis {axis.name}: toolpaths move only a, b and c after z, give 0 for others",
+            )
+    return start
 
 
 def _period(bus: Table) -> int:

@@ -13,7 +13,7 @@ import pytest
 
 from hodograph.cli.main import main
 from hodograph.config import Machine, load_machine
-from hodograph.errors import InputError
+from hodograph.errors import InputError, PlanError
 from hodograph.job import DEFAULT_TOLERANCE_MM, Job, load_job, work_frame
 from hodograph.job_simulation import simulate_job
 from hodograph.stream.journal import machine_mark
@@ -69,7 +69,12 @@ def ends(text: str) -> list[tuple[float, ...]]:
         ("G10 L2 P1 R90\nG28 Z3", (100.0, -40.0, 0.0, 5.0)),
         ("G0 Z#<_abs_z>", (100.0, -40.0, -60.0, 5.0)),
         ("G0 X5\nG53 G0 X#<_abs_x> Y[#<_abs_y> + 1]", (105.0, -39.0, -30.0, 5.0)),
-        ("G20 G0 Z1\nG53 G0 X#<_abs_y> Z[#<_abs_z> + 1]", (-40.0, -40.0, 20.8, 5.0)),
+        ("G20 G0 Z1\nG53 G0 X#<_abs_y> Z[#<_abs_z> + 1] A#<_abs_a>", (-40.0, -40.0, 20.8, 5.0)),
+        ("G20 G91 G0 X1\nG28 Z1", (125.4, -40.0, 0.0, 5.0)),
+        ("#1=#<_abs_z>\nG0 Z50\nG90 G53 G0 Z#1", (100.0, -40.0, -30.0, 5.0)),
+        ("G91\no1 while [#<_abs_z> lt 0]\nG0 Z10\no1 endwhile", (100.0, -40.0, 0.0, 5.0)),
+        ("G10 L20 P1 X0 Z7\nG0 Z9\nG53 G0 X1", (1.0, -40.0, -28.0, 5.0)),
+        ("G81 X1 Y1 Z-1 R2 F100\nG28 Z5\nX4", (104.0, -39.0, -28.0, 5.0)),
     ],
 )
 def test_machine_positions_of_a_program(text: str, end: tuple[float, ...]) -> None:
@@ -114,6 +119,75 @@ def test_names_of_axes_give_the_places_of_their_numbers() -> None:
     assert work_frame(replace(plane, offset_mm=(1.0, 2.0))).offset == (1.0, 2.0, 0.0, 0.0, 0.0, 0.0)
 
 
+def test_the_first_three_axes_are_x_y_z_whatever_their_names() -> None:
+    """An axis after them with the name z does not move with Z."""
+    four = load_machine(EXAMPLES / "machines" / "mill_five_axes.toml")
+    x, y, z, a, c = four.axes
+    axes = (x, y, replace(z, name="w"), replace(a, name="z"), c)
+    named = replace(four, axes=axes, offset_mm=(1.0, 2.0, 3.0, 4.0, 5.0))
+    assert work_frame(named).offset == (1.0, 2.0, 3.0, 0.0, 0.0, 5.0)
+
+
+def test_an_axis_that_no_toolpath_moves_has_no_start(tmp_path: Path) -> None:
+    text = (EXAMPLES / "machines" / "mill_five_axes.toml").read_text()
+    text = text.replace("../drives/", f"{EXAMPLES}/drives/")
+    text = text.replace('"a", "c"]', '"u", "c"]').replace('name = "a"', 'name = "u"')
+    for start in ("0", "4"):
+        own = text.replace("[work]\n", f"[work]\nstart_mm = [1, 2, 3, {start}, 5]\n")
+        (tmp_path / f"{start}.toml").write_text(own)
+    assert load_machine(tmp_path / "0.toml").start_mm == (1.0, 2.0, 3.0, 0.0, 5.0)
+    with pytest.raises(InputError, match="start_mm is 4 for axis u"):
+        load_machine(tmp_path / "4.toml")
+
+
+@pytest.mark.parametrize("path", [("x", "y", "z", "a"), ("x", "y", "z", "c", "a")])
+def test_a_rotary_move_first_leaves_x_y_z_at_the_start(
+    tmp_path: Path, path: tuple[str, ...]
+) -> None:
+    """With one axis after z, its program moves z too; with two, it moves them alone, in the order of the path."""
+    place = {"x": (1.0, 100.0), "y": (2.0, -40.0), "z": (20.0, -30.0), "a": (3.0, 5.0)}
+    place["c"] = (4.0, -9.0)
+    five = load_machine(EXAMPLES / "machines" / "mill_five_axes.toml")
+    by_name = {axis.name: axis for axis in five.axes}
+    machine = replace(
+        five,
+        axes=tuple(by_name[name] for name in path),
+        path_count=len(path),
+        start_mm=tuple(place[name][0] for name in path),
+        offset_mm=tuple(place[name][1] for name in path),
+    )
+    text = "G0 A10\nG53 G0 A20\nG0 X5\nG53 G0 Z0\nG28 A14\nM2\n"
+    job = job_of(tmp_path, machine, text)
+    run = simulate_job(job)
+    ends = [
+        dict(zip(path, section.places(motion.cmd_mm[[0, -1]]).T, strict=True))
+        for section, motion in zip(job.sections, run.motions, strict=True)
+    ]
+    starts = {name: number for name, (number, _) in place.items()}
+    wanted = [{"a": 15.0}, {"x": 5.0, "z": 30.0}, {"a": -5.0}]
+    for found, moved in zip(ends, wanted, strict=True):
+        for name in path:
+            assert found[name][0] == pytest.approx(starts[name], abs=1e-5)
+        starts |= moved
+        for name in path:
+            assert found[name][1] == pytest.approx(starts[name], abs=1e-5)
+    sections = list(StreamReader(tmp_path / "part.ngc", machine, 0.01, ReadOptions()).sections())
+    assert sections[0].standing_mm == tuple(place[n][0] for n in path[: len(path) - 2])
+
+
+def test_axes_that_stand_outside_their_travel_are_refused(tmp_path: Path) -> None:
+    """Also where a toolpath moves rotary axes alone."""
+    five = load_machine(EXAMPLES / "machines" / "mill_five_axes.toml")
+    machine = replace(five, start_mm=(0.0, 0.0, 3000.0, 0.0, 0.0))
+    with pytest.raises(PlanError, match=r"part.ngc:2: z stands at 3000 mm.*start_mm"):
+        job_of(tmp_path, machine, "G90\nG0 A10\n")
+
+
+def test_g53_outside_the_travel_names_its_line(tmp_path: Path, mill: Machine) -> None:
+    with pytest.raises(PlanError, match=r"part.ngc:2: z goes to .* 2500 .*offset_mm, or"):
+        job_of(tmp_path, mill, "G0 X5\nG53 G0 Z2500\n")
+
+
 def test_without_a_machine_file_all_is_0(tmp_path: Path) -> None:
     (tmp_path / "part.ngc").write_text("G53 G0 X3\n")
     first = next(read_toolpath(tmp_path / "part.ngc", ReadOptions()))
@@ -146,4 +220,6 @@ def test_a_start_outside_the_travel_is_refused(
     (tmp_path / "part.ngc").write_text("G0 X5\n")
     words = ["import", str(tmp_path / "part.ngc"), "--machine", str(tmp_path / "mill.toml")]
     assert main(words) == 3
-    assert "part.ngc:1: z goes to 3000" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "part.ngc:1: z goes to 3000" in told
+    assert "change [work] offset_mm or start_mm" in told
