@@ -56,7 +56,8 @@ USERS = re.compile(
 )
 EFFECTS = re.compile(
     r"\b(pure|main\s+loop|timer|contexts?|threads?|I/O|ticks?|interrupts?|lock|reset|constants?|plain\s+data|macros"
-    r"|changes|reads?|writes?|receives?|sends?|starts|prints?|waits?|returns|ends|keeps|opens|draws|makes|measures|executed|started|written)\b",
+    r"|changes|reads?|writes?|receives?|sends?|starts|prints?|waits?|returns|ends|keeps|opens|draws|makes|measures"
+    r"|executed|started|written)\b",
     re.IGNORECASE,
 )
 

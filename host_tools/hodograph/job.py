@@ -503,6 +503,7 @@ class SectionMaker:
             limits=Limits(zones=zones),
             machine_file=None,
         )
+        self._check_standing(section, machine)
         self._check_travel(section, fitted, machine)
         places = fitted.arc_length_at(np.array([event.place_mm for event in section.events]))
         events = tuple(
@@ -516,7 +517,6 @@ class SectionMaker:
 
     def _check_travel(self, section: Section, fitted: FittedPath, machine: Machine) -> None:
         """Raises PlanError, naming the line, where the curve leaves the travel of an axis."""
-        self._check_standing(section, machine)
         curve, reference = fitted.curve, section.reference
         coefficients, given = curve.position_coefficients, reference.point
         if curve.extra_axes:
@@ -535,9 +535,11 @@ class SectionMaker:
             programmed = given[:, k] + offset
             beyond = (programmed < axis.travel_min_mm) | (programmed > axis.travel_max_mm)
             keys = "offset_mm or start_mm" if beyond[0] else "offset_mm"
-            beyond = beyond[1:]
-            chord = _chord_of(fitted, int(np.argmax(out)))
-            line = section.reference.line[int(np.argmax(beyond)) if beyond.any() else chord]
+            ends_beyond = beyond[1:]
+            chord = int(np.argmax(ends_beyond))
+            if not ends_beyond.any():
+                chord = _chord_of(fitted, int(np.argmax(out)))
+            line = section.reference.line[chord]
             raise PlanError(
                 f"{self.file}:{line}: {axis.name} goes to {low.min():.6g} … {high.max():.6g} {axis.unit} with the work "
                 f"offset, its travel is {axis.travel_min_mm:g} … {axis.travel_max_mm:g} {axis.unit}: "

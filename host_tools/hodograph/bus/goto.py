@@ -21,7 +21,7 @@ from ..program import ProgramOptions, StopTerms, compile_path, encode
 from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
-from .sdo.controller import BOOT, OFF, READY, Controller
+from .sdo.controller import OFF, Controller
 from .sdo.objects import ACTUAL, OVERRIDE
 
 GOTO_FEED_MM_S = 100.0
@@ -39,7 +39,6 @@ QUICK_ABOVE_MM = 50.0
 """Stops of longer moves in space are searched with few trials. All trials would take up to 36 s of processor time and
 make stops at most 8 % shorter.
 """
-
 TRAVEL_SLACK_MM = 0.1
 """How far outside of its travel an axis may stand when its drive is switched on, mm or degrees."""
 
@@ -134,10 +133,7 @@ def require_inside_travel(controller: Controller, machine: Machine) -> None:
     """Call it before drives are switched on: a drive outside of its software limits moves to them at once, without a
     ramp. An axis may stand there after a limit switch. Raises RefusedError, naming the axis.
     """
-    state = controller.state()
-    if state == BOOT:
-        state = controller.wait_for((OFF, READY), 10.0)
-    if state != OFF:
+    if controller.state_after_boot() != OFF:
         return
     for number, axis in enumerate(machine.axes, 1):
         at = controller.read(ACTUAL, number) / axis.counts_per_unit

@@ -66,9 +66,8 @@ LONGEST_UPLOAD = 256 * 1024
 
 PATIENCE_S = (3.0, 6.0, 12.0, 20.0)
 """How long another client of the SDO channel waits for the end of the transfer of a program, by attempt. It would give
-up after TURN_WAIT_S, so a later attempt would end its job."""
-_SEGMENTS_UNWATCHED = 64
-"""Segments between two looks whether another client waits."""
+up after TURN_WAIT_S, and a `run` would end by that.
+"""
 
 Command = Callable[[Controller], None]
 
@@ -315,17 +314,12 @@ class _Others:
     def __init__(self, controller: Controller, patience_s: float) -> None:
         self._controller = controller
         self._patience_s = patience_s
-        self._unwatched = 0
         self._since_s: float | None = None
         self.gave_way = False
         """Whether `wait_too_long` was true."""
 
     def wait_too_long(self) -> bool:
         """Call it at each segment."""
-        self._unwatched += 1
-        if self._unwatched < _SEGMENTS_UNWATCHED:
-            return False
-        self._unwatched = 0
         now_s = self._controller.clock.now_s()
         if not self._controller.is_wanted():
             self._since_s = None

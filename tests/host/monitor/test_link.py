@@ -17,7 +17,6 @@ from hodograph.bus.address import BusAddress, parse_address
 from hodograph.bus.sdo.channel_lock import TURN_WAIT_S, Turns
 from hodograph.bus.sdo.stream_channel import ENDED, OPEN
 from hodograph.errors import BusyError, HodographError
-from hodograph.monitor import link as link_module
 from hodograph.monitor.link import PATIENCE_S, Link, is_stop
 from hodograph.monitor.session import _require_alive
 
@@ -110,11 +109,8 @@ def test_a_program_that_could_not_be_fetched_is_fetched_at_the_next_look() -> No
     assert bench.shown == [IMAGE]
 
 
-def test_another_client_that_waits_too_long_breaks_off_the_reading(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_another_client_that_waits_too_long_breaks_off_the_reading() -> None:
     """The reading of a large program takes longer than other commands wait: it must not end a `run`."""
-    monkeypatch.setattr(link_module, "_SEGMENTS_UNWATCHED", 1)
     bench = Bench()
     bench.controller.wanted = True
     for attempt, patience_s in enumerate(PATIENCE_S, 1):
@@ -129,10 +125,7 @@ def test_another_client_that_waits_too_long_breaks_off_the_reading(
     assert (bench.shown, bench.controller.given) == ([None], given), "said once, not read again"
 
 
-def test_a_client_that_waits_a_little_does_not_break_off_the_reading(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(link_module, "_SEGMENTS_UNWATCHED", 1)
+def test_a_client_that_waits_a_little_does_not_break_off_the_reading() -> None:
     bench = Bench()
     for place in range(0, len(IMAGE), 28):
         bench.controller.happens[place] = lambda: setattr(bench.controller, "wanted", True)

@@ -325,11 +325,14 @@ class Controller(Node):
                 f"{self.who()} is {STATES.get(state, state)}: wait until the axes stand, or hodograph stop"
             )
 
+    def state_after_boot(self) -> int:
+        """The state. Waits while it is boot: until the drives are configured. Raises as `wait_for`."""
+        state = self.state()
+        return self.wait_for((OFF, READY), 10.0) if state == BOOT else state
+
     def enable(self) -> None:
         """Switches the drives on; returns at standstill, ready."""
-        state = self.state()
-        if state == BOOT:
-            state = self.wait_for((OFF, READY), 10.0)
+        state = self.state_after_boot()
         if state in (OFF, FAULT_STATE):  # refused in a fault, with the reason
             self.command(ENABLE)
         self.wait_for((READY,), 10.0)

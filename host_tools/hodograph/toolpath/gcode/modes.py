@@ -40,9 +40,9 @@ class SplineBuilder:
 class Modes:
     """The state after a block. It begins as in LinuxCNC: G17 G21 G40 G49 G54 G64 G80 G90 G91.1 G94 G97 G99.
 
-    `position` is the path position; `unit_mm` is the length of a program unit. `motion`: ten times
-    the number of the active G-code (800: G80). `feed_word` is the last F as it was programmed, and `feed_unit_mm` is
-    `unit_mm` when that F was programmed. `spline_handle`: control point from which a G5 without I and J continues.
+    `position` is the path position; `unit_mm` is the length of a program unit. `motion`: ten times the number of the
+    active G-code (800: G80). `feed_word` is the last F as it was programmed, and `feed_unit_mm` is `unit_mm` when that
+    F was programmed. `spline_handle`: control point from which a G5 without I and J continues.
     """
 
     position: Position = ORIGIN
