@@ -82,6 +82,16 @@ static enum machine_refusal job_refusal(const struct controller *controller, enu
                                                                        : MACHINE_ACCEPTED;
 }
 
+/* A host that prepares a start names the stop commands that it knows of: one that comes meanwhile is not lost. Under
+ * the lock. */
+static enum machine_refusal stopped_refusal(const struct controller *controller)
+{
+    const uint32_t expected = controller->values.stop_commands.expected;
+    return expected == STOP_COMMANDS_ANY || expected == controller->machine.stop_commands
+               ? MACHINE_ACCEPTED
+               : MACHINE_STOPPED;
+}
+
 /* Reading all pieces takes long, so it happens before the lock. */
 static enum machine_refusal start(struct controller *controller, int64_t from_q40_mm)
 {
@@ -92,8 +102,14 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
         return refusal;
     }
     port_lock();
-    controller->machine.unhomed_allowed = controller->values.start_without_homing.allowed != 0u;
-    refusal = machine_start(&controller->machine, &prepared, start_counts);
+    refusal = stopped_refusal(controller);
+    if (refusal == MACHINE_ACCEPTED) {
+        controller->machine.unhomed_allowed = controller->values.start_without_homing.allowed != 0u;
+        refusal = machine_start(&controller->machine, &prepared, start_counts);
+    }
+    if (refusal == MACHINE_ACCEPTED) {
+        controller->machine.outputs_stay = controller->values.outputs_at_standstill.stay_at_end != 0u;
+    }
     port_unlock();
     if (refusal == MACHINE_ACCEPTED && stream_is_open(&controller->stream)) {
         stream_started(&controller->stream);
@@ -213,8 +229,10 @@ static enum machine_refusal execute(struct controller *controller, enum command 
         refusal = starts_program(command) ? attempt_start(controller, command, name, number)
                                           : dispatch(controller, command);
     }
-    if (starts_program(command)) { /* the permission is valid for one attempt, also a refused one */
+    if (starts_program(command)) { /* these are valid for one attempt, also a refused one */
         controller->values.start_without_homing.allowed = 0;
+        controller->values.stop_commands.expected = STOP_COMMANDS_ANY;
+        controller->values.outputs_at_standstill.stay_at_end = 0;
     }
     return refusal;
 }

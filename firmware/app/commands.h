@@ -26,6 +26,9 @@ enum command {
     COMMAND_HOME = 10,      /* homes the axes that have a homing method */
 };
 
+/* Object 0x2057 sub 2: a start is not refused for stop commands that the host does not know of. */
+#define STOP_COMMANDS_ANY UINT32_MAX
+
 /* What a start names (object 0x2056): another client may have replaced it since the host last read it. */
 enum start_name {
     START_ANY,     /* nothing: the open job, else the active program */

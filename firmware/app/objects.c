@@ -124,6 +124,13 @@ static uint64_t object_read_unhomed(struct controller *controller, const struct 
     return controller->machine.unhomed_axes;
 }
 
+static uint64_t object_read_stop_commands(struct controller *controller,
+                                          const struct od_entry *entry)
+{
+    (void)entry;
+    return controller->machine.stop_commands;
+}
+
 /* ---- Commands ---- */
 
 static uint32_t object_write_command(struct controller *controller, const struct od_entry *entry,
@@ -395,6 +402,8 @@ static const struct object objects[] = {
     {0x2050, 0x2050, 1, 6, OWN, object_read_configuration, object_write_confirmation, NULL, NULL},
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
     {0x2056, 0x2056, 1, 3, OWN, NULL, object_write_start, NULL, NULL},
+    {0x2057, 0x2057, 1, 1, SHARED, object_read_stop_commands, NULL, NULL, NULL},
+    {0x2058, 0x2058, 1, 5, SHARED, object_read_set_outputs, object_write_set_outputs, NULL, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
     {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},

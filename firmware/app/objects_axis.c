@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/objects_axis.h (see there): handlers of objects that have one value for each axis, for the table in
- * objects.c. Called by objects.c only. Main loop, under the lock. Changes nothing. */
+ * objects.c, and of the outputs. Called by objects.c only. Main loop; reads under the lock. Changes the outputs at
+ * standstill only, for which it takes the lock. */
 #include "app/objects_axis.h"
 
 #include "canopen/cob.h"
 #include "canopen/pdo_map.h"
+#include "canopen/sdo_abort.h"
+#include "port/port.h"
 
 static const struct axis *axis_of(const struct controller *controller, const struct od_entry *entry)
 {
@@ -176,11 +179,36 @@ uint64_t object_read_outputs_mapping(struct controller *controller, const struct
     return outputs_entry(outputs, entry->sub - 1u);
 }
 
+static uint64_t outputs_value(const struct path_outputs_values *values, uint8_t sub)
+{
+    if (sub <= 2u) {
+        return (values->digital >> (8u * (sub - 1u))) & 0xFFu;
+    }
+    return (uint64_t)(int64_t)values->analogue[sub - 3u];
+}
+
 uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry)
 {
-    const struct path_outputs_values *sent = &controller->tick.outputs.sent;
+    return outputs_value(&controller->tick.outputs.sent, entry->sub);
+}
+
+uint64_t object_read_set_outputs(struct controller *controller, const struct od_entry *entry)
+{
+    return outputs_value(&controller->machine.motion.outputs.values, entry->sub);
+}
+
+uint32_t object_write_set_outputs(struct controller *controller, const struct od_entry *entry,
+                                  uint64_t number)
+{
+    port_lock();
+    struct path_outputs_values values = controller->machine.motion.outputs.values;
     if (entry->sub <= 2u) {
-        return (sent->digital >> (8u * (entry->sub - 1u))) & 0xFFu;
+        const unsigned shift = 8u * (entry->sub - 1u);
+        values.digital = (uint16_t)((values.digital & ~(0xFFu << shift)) | number << shift);
+    } else {
+        values.analogue[entry->sub - 3u] = (int16_t)number;
     }
-    return (uint64_t)(int64_t)sent->analogue[entry->sub - 3u];
+    const bool possible = machine_set_outputs(&controller->machine, &values);
+    port_unlock();
+    return possible ? SDO_OK : SDO_ABORT_STATE;
 }

@@ -14,6 +14,12 @@ void path_outputs_clear(struct path_outputs *outputs)
     memset(outputs, 0, sizeof *outputs);
 }
 
+void path_outputs_set(struct path_outputs *outputs, const struct path_outputs_values *values)
+{
+    path_outputs_clear(outputs);
+    outputs->values = *values;
+}
+
 /* Reads the place of event number `next`, if it exists. */
 static void read_next(struct path_outputs *outputs, const struct program *program)
 {

@@ -37,6 +37,9 @@ struct path_outputs {
 /* All outputs off, and no events. Any context. */
 void path_outputs_clear(struct path_outputs *outputs);
 
+/* These outputs, and no events. Main loop with the tick held off. */
+void path_outputs_set(struct path_outputs *outputs, const struct path_outputs_values *values);
+
 /* Outputs at an arc length: all off, then switched by the events at or before it. A negative arc length is that of a
  * program before its first setpoint. Main loop; linear in the number of events. */
 void path_outputs_begin(struct path_outputs *outputs, const struct program *program,

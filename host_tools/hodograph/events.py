@@ -49,12 +49,22 @@ def events_of(events: Iterable[Event]) -> Events:
     return np.array(sorted((tuple(one) for one in events), key=lambda one: one[0]), dtype=EVENT)
 
 
-class SwitchedOutputs:
-    """The state of the outputs after events, from all off."""
+class OutputValues(NamedTuple):
+    """Levels of the digital outputs, one bit each, and values of the analogue ones, as on the bus."""
 
-    def __init__(self) -> None:
-        self._levels = 0
-        self._analogue: dict[int, Event] = {}
+    digital: int = 0
+    analogue: tuple[int, ...] = (0,) * ANALOGUES
+
+
+class SwitchedOutputs:
+    """The state of the outputs after events, from all off or from the given ones."""
+
+    def __init__(self, begin: OutputValues | None = None) -> None:
+        values = begin or OutputValues()
+        self._levels = values.digital
+        self._analogue = {
+            i: Event(0, ANALOGUE, i, 0, value) for i, value in enumerate(values.analogue) if value
+        }
 
     def act(self, events: Events) -> None:
         """Applies events in their order."""
@@ -63,6 +73,14 @@ class SwitchedOutputs:
                 self._levels = (self._levels & ~event.mask) | event.value
             else:
                 self._analogue[event.channel] = event
+
+    @property
+    def at_rest(self) -> OutputValues:
+        """The outputs at standstill, where a value in proportion to the feed is 0."""
+        value = [0] * ANALOGUES
+        for event in self._analogue.values():
+            value[event.channel] = event.value if event.kind == ANALOGUE else 0
+        return OutputValues(self._levels, tuple(value))
 
     def begin(self) -> Events:
         """Events at arc length 0 that bring outputs from all off to this state."""

@@ -24,7 +24,13 @@ from .equal_sections import EqualSections, SharedPrograms
 from .errors import InputError, PlanError
 from .feed import FeedRequest, FeedZone, Limits
 from .feed.request import GREATEST_FEED_MM_S, LEAST_FEED_MM_S, OPTIMAL
-from .job_outputs import SectionCommands, is_output, programmed_feeds, section_events
+from .job_outputs import (
+    SectionCommands,
+    is_output,
+    job_events,
+    programmed_feeds,
+    with_spindle_waits,
+)
 from .section_pipeline import SectionPipeline
 from .toolpath.files import ReadOptions, is_gcode, read_toolpath, replaced_feed_mm_s
 from .toolpath.fit.fitting import FittedPath, Tolerance, fit
@@ -265,8 +271,10 @@ def load_job(
     maker = SectionMaker(file, machine, replaced_feed_mm_s(file, reading), notes, EqualSections())
     sections = tuple(made for section in path.sections for made in maker.made(section))
     notes += _ignored_commands(path, file, machine.outputs)
-    sections = _with_outputs(sections, path.after, machine, file, notes)
-    return Job(file, machine, sections, path.after, tuple(notes), perf_counter() - begin)
+    after = path.after
+    if machine.outputs is not None:
+        sections, after = _with_outputs(sections, after, machine.outputs, file, notes)
+    return Job(file, machine, sections, after, tuple(notes), perf_counter() - begin)
 
 
 def work_frame(machine: Machine) -> WorkFrame:
@@ -288,7 +296,8 @@ def toolpath_commands(
     file: Path, machine: Machine, reading: ReadOptions, notes: list[str]
 ) -> Iterator[Command]:
     """The commands of a file; notes of the reader of a drawing or of points are added to `notes`. Raises InputError."""
-    for command in read_toolpath(file, reading, work_frame(machine)):
+    commands = read_toolpath(file, reading, work_frame(machine))
+    for command in with_spindle_waits(commands, machine.outputs):
         if isinstance(command, Message) and not is_gcode(file):
             place = f"{file}:{command.line}" if command.line else str(file)
             notes.append(f"{place}: {command.text}")
@@ -299,19 +308,18 @@ def toolpath_commands(
 def _with_outputs(
     sections: tuple[JobSection, ...],
     after: tuple[Command, ...],
-    machine: Machine,
+    outputs: Outputs,
     file: Path,
     notes: list[str],
-) -> tuple[JobSection, ...]:
-    """The sections, with the switched outputs as events of their programs."""
-    if machine.outputs is None:
-        return sections
-    commands = [section_commands(one) for one in sections]
-    every = section_events(commands, after, machine.outputs, file, notes)
-    return tuple(
+) -> tuple[tuple[JobSection, ...], tuple[Command, ...]]:
+    """The sections, with the switched outputs as events of their programs, and the commands after them."""
+    made = job_events([section_commands(one) for one in sections], after, outputs, file, notes)
+    switching = [
         replace(one, pipeline=replace(one.pipeline, given_events=events))
-        for one, events in zip(sections, every, strict=True)
-    )
+        for one, events in zip(sections, made.events, strict=True)
+    ]
+    switching[0] = replace(switching[0], before=made.before)
+    return tuple(switching), made.after
 
 
 def _turning_bound(bound_deg: float | None) -> dict[str, object]:

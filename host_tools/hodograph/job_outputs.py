@@ -4,9 +4,10 @@ its sections' programs. Used by job, stream/output_check and stream/reading. No 
 
 A command within a section acts at its place on the curve. A command at rest acts with the first setpoint of the next
 section. If a dwell, a tool change or a program stop follows it at the same rest, it acts with the last setpoint of the
-section before, so that it has acted when the wait begins. The end of the program switches spindle and coolant off with
-the last setpoint, as M5 and M9 do; other outputs stay. Each program begins with all outputs off, so each section first
-repeats what is on.
+section before, so that it has acted when the wait begins. Before the first section, and after the first wait at the end
+of the toolpath, no program is there to do so: the host switches these outputs at standstill (`SwitchedAtRest`). The end
+of the program switches spindle and coolant off, as M5 and M9 do; other outputs stay. Each program begins with all
+outputs off, so each section first repeats what is on.
 
 In laser mode after M4, the output for S is proportional to the feed. Wherever the programmed feed changes, an event
 sets the factor that gives S at that feed.
@@ -14,7 +15,7 @@ sets the factor that gives S at that feed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
@@ -23,7 +24,7 @@ import numpy as np
 
 from .config.outputs import Channel, Outputs
 from .errors import InputError
-from .events import DIGITAL, Event, Events, events_of
+from .events import DIGITAL, Event, Events, SwitchedOutputs, events_of
 from .fixed_point import nearest_q40
 from .toolpath.fit.fitting import FittedPath
 from .toolpath.moves import (
@@ -36,6 +37,7 @@ from .toolpath.moves import (
     ProgramStop,
     Rotation,
     Spindle,
+    SwitchedAtRest,
     ToolChange,
 )
 
@@ -90,26 +92,55 @@ def is_output(command: Command, outputs: Outputs | None) -> bool:
     return isinstance(command, DigitalOutput | AnalogOutput)
 
 
-def section_events(
+def with_spindle_waits(commands: Iterable[Command], outputs: Outputs | None) -> Iterator[Command]:
+    """The commands, with the wait of the machine file (`spindle_wait_s`) where the spindle starts or turns over."""
+    wait_s = 0.0 if outputs is None else outputs.codes.spindle_wait_s
+    turns = Rotation.STOPPED
+    for command in commands:
+        yield command
+        if isinstance(command, Spindle):
+            if wait_s and command.rotation not in (Rotation.STOPPED, turns):
+                yield Dwell(command.line, wait_s)
+            turns = command.rotation
+
+
+@dataclass(frozen=True)
+class JobEvents:
+    """Outputs of a whole toolpath.
+
+    events  of each section's program
+    before  commands at rest before the first section, with what the host switches
+    after   the same at the end of the toolpath
+    """
+
+    events: list[Events]
+    before: tuple[Command, ...]
+    after: tuple[Command, ...]
+
+
+def job_events(
     sections: Sequence[SectionCommands],
     after: tuple[Command, ...],
     outputs: Outputs,
     file: Path,
     notes: list[str],
-) -> list[Events]:
-    """The events of each section's program; `notes` grows by one line if outputs are switched and then switched again
-    after a wait, before the axes move. Raises InputError: the machine lacks an output, or a value is too large.
+) -> JobEvents:
+    """The outputs of a toolpath of at least one section; `notes` grows by one line if outputs are switched and then
+    switched again after a wait, before the axes move. Raises InputError: the machine lacks an output, or a value is too
+    large.
     """
     maker = EventMaker(outputs, file)
+    begin = maker.before_first(sections[0].before)
     found = []
     for i, section in enumerate(sections):
         last = i + 1 == len(sections)
         following = after if last else sections[i + 1].before
         own = maker.section(section, following, is_first=i == 0, is_last=last)
         found.append(events_of([*own.repeated, *own.events]))
+    end = maker.after_last(after)
     if maker.lost:
         notes.append(without_effect(file, maker.lost[0], len(maker.lost) - 1))
-    return found
+    return JobEvents(found, begin, end)
 
 
 def without_effect(file: Path, line: int, others: int = 0) -> str:
@@ -129,11 +160,23 @@ class SectionEvents:
     events: list[Event]
 
 
-def _split(commands: tuple[Command, ...], *, is_first: bool) -> tuple[list[Command], list[Command]]:
-    """Commands before the first wait, and those from it on. Before the first section all count as after the wait."""
+Commands = tuple[Command, ...]
+
+
+def _at_first_wait(commands: Commands, *, is_last: bool = False) -> tuple[Commands, Commands]:
+    """Commands before the first wait, which act at the end of the section before them, and those from it on. Without a
+    wait all act at the start of the next section, or at the end if there is none.
+    """
     waits = [i for i, command in enumerate(commands) if isinstance(command, WAITS)]
-    at = 0 if is_first or not waits else waits[0]
-    return list(commands[:at]), list(commands[at:])
+    at = waits[0] if waits else len(commands) if is_last else 0
+    return commands[:at], commands[at:]
+
+
+def _after_last_wait(commands: Commands) -> tuple[Commands, Commands]:
+    """Commands up to the last wait, and those after it."""
+    waits = [i + 1 for i, command in enumerate(commands) if isinstance(command, WAITS)]
+    at = waits[-1] if waits else 0
+    return commands[:at], commands[at:]
 
 
 @dataclass
@@ -157,19 +200,39 @@ class EventMaker:
         is_first: bool = False,
         is_last: bool = False,
     ) -> SectionEvents:
-        """The events of the next section, or part of one.
+        """The events of the next section, or part of one. Before the first one call `before_first`, after the last one
+        `after_last`.
 
         after  the commands at rest after it
 
         Raises InputError: the machine lacks an output, or a value is too large.
         """
         repeated = self._repeated()
-        _, late = _split(section.before, is_first=is_first)
+        late = (_after_last_wait if is_first else _at_first_wait)(section.before)[1]
         begin = [*self._at_feeds(section.feeds[:1]), *self.changed(0, late)]
         moving = self._within(section)
         end_q40 = nearest_q40(section.length_mm)
-        early = list(after) if is_last else _split(after, is_first=False)[0]
+        early = _at_first_wait(after, is_last=is_last)[0]
         return SectionEvents(repeated, [*begin, *moving, *self.changed(end_q40, early)])
+
+    def before_first(self, commands: Commands) -> Commands:
+        """Commands at rest before the first section, with what the host switches before the waits."""
+        waited, late = _after_last_wait(commands)
+        return (*self._at_rest(waited), *late)
+
+    def after_last(self, commands: Commands) -> Commands:
+        """Commands at rest after the last section, with what the host switches from the first wait on."""
+        early, late = _at_first_wait(commands, is_last=True)
+        return (*early, *self._at_rest(late))
+
+    def _at_rest(self, commands: Commands) -> Iterator[Command]:
+        """The commands, each that switches outputs followed by the outputs from there on."""
+        for command in commands:
+            yield command
+            if self.changed(0, [command]):
+                state = SwitchedOutputs()
+                state.act(events_of(self._repeated()))
+                yield SwitchedAtRest(command.line, state.at_rest)
 
     def _within(self, section: SectionCommands) -> list[Event]:
         """Events of commands and of changes of the feed, in the order of their places."""

@@ -19,14 +19,24 @@ import numpy as np
 from .bus.capture.setpoint_check import SetpointJumpError
 from .bus.diagnostics.texts import STATES
 from .bus.goto import goto
-from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
+from .bus.outputs import set_outputs
+from .bus.run import (
+    BusRun,
+    Progress,
+    RunSession,
+    analysed,
+    bring_up,
+    record_program,
+)
 from .bus.sdo.controller import FAULT_STATE, READY
-from .errors import BusError, PlanError, RunError
+from .config import Machine
+from .errors import PlanError, RunError
+from .events import OutputValues
 from .job import Job, JobSection
 from .job_simulation import JobMotion
 from .native import NativeProgram
 from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
-from .toolpath.moves import Command, Dwell, Message, ProgramStop, ToolChange
+from .toolpath.moves import Command, Dwell, Message, ProgramStop, SwitchedAtRest, ToolChange
 
 _CHECK_S = 0.1
 """Time between two checks of the bus, in a dwell and while the operator is awaited."""
@@ -39,7 +49,7 @@ class NoRoomError(PlanError):
 
 
 BusCheck = Callable[[], None]
-"""Waits 0.1 s. Raises RunError for a fault, BusError when the drives are off or the controller is gone."""
+"""Waits 0.1 s. Raises RunError for a fault, a stop, or drives that are off; BusError when the controller is gone."""
 
 Operator = Callable[[str, BusCheck], None]
 """Shows the operator why the job stops (file, line, code), and returns when the job may continue.
@@ -136,12 +146,26 @@ def run_job(
 
     record  file for the frames; a job with several sections writes one file each: NAME.1.log, NAME.2.log, …
 
-    A job ends at a fault, a stop, or a setpoint step beyond the limits. If a section reaches its end but its recording
-    differs from its program (a hold, a feed override), the job continues and raises this error at its end.
+    A job ends at a fault, a stop (also one at rest), or a setpoint step beyond the limits. If a section reaches its end
+    but its recording differs from its program (a hold, a feed override), the job continues and raises this error at its
+    end.
     Raises RefusedError, BusError and RunError, naming file and line.
     """
+    bring_up(at, made.job.machine, made.kernel)
+    with at.controller.ending_at_stops():
+        return _run_sections(at, made, operator, progress, record, unhomed=unhomed)
+
+
+def _run_sections(
+    at: RunSession,
+    made: PreparedJob,
+    operator: Operator,
+    progress: Progress | None,
+    record: Path | None,
+    *,
+    unhomed: bool,
+) -> JobRun:
     job = made.job
-    bring_up(at, job.machine, made.kernel)
     runs: list[BusRun] = []
     failure: RunError | None = None
     passed = 0
@@ -152,7 +176,10 @@ def run_job(
         # No move, unless an operator moved the axes during the stop.
         _to_start(at, section, made, program, unhomed)
         own = None if progress is None else _shifted(progress, passed)
-        recorded = record_program(at, job.machine, program.image, own, unhomed=unhomed)
+        more = goes_off_at_end(job.machine) and (number < len(job.sections) or bool(job.after))
+        recorded = record_program(
+            at, job.machine, program.image, own, unhomed=unhomed, outputs_stay=more
+        )
         _require_end(at, section, made, program, place)
         passed += program.ticks
         report_messages(at, job.file, [command for _, command in section.events])
@@ -165,6 +192,7 @@ def run_job(
         except RunError as error:
             failure = failure or RunError(f"{place}: {error}")
     execute_at_rest(at, job.file, job.after, operator)
+    end_outputs(at, job.machine)
     if failure is not None:
         raise failure
     motion = JobMotion(job, tuple(run.motion for run in runs), made.planning_s)
@@ -218,10 +246,25 @@ def execute_at_rest(
     """Executes the commands at a rest in their order. Commands for which the machine has no device are skipped."""
     for command in commands:
         report_messages(at, file, [command])
+        if isinstance(command, SwitchedAtRest):
+            set_outputs(at.controller, command.values)
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
         for line, code in operator_stops_of([command]):
             operator(f"{file}:{line}: {code}", lambda: _check_bus(at, _CHECK_S))
+
+
+def goes_off_at_end(machine: Machine) -> bool:
+    """Whether the outputs of a machine go off at the end of a job."""
+    return machine.outputs is not None and machine.outputs.off_at_end
+
+
+def end_outputs(at: RunSession, machine: Machine) -> None:
+    """Switches the outputs off at the end of a job, on a machine that has this configured. The end of the last program
+    did not, if the job went on at rest after it.
+    """
+    if goes_off_at_end(machine):
+        set_outputs(at.controller, OutputValues())
 
 
 def report_messages(at: RunSession, file: Path, commands: Sequence[Command]) -> None:
@@ -238,14 +281,15 @@ def _dwell(at: RunSession, duration_s: float) -> None:
 
 
 def _check_bus(at: RunSession, wait_s: float) -> None:
-    """Waits at rest. Raises RunError for a fault, BusError: the drives are off, or the controller is gone."""
+    """Waits at rest. Raises RunError for a fault, a stop, or drives that are off; BusError: the controller is gone."""
     if at.rig is not None:
         at.rig.check()
     state = at.controller.state()
     if state not in (READY, FAULT_STATE):
-        raise BusError(
+        raise RunError(
             f"{at.controller.who()} is in state {STATES.get(state, state)} at a rest of the job: another command has "
             "moved the axes or switched the drives off, so the job ends here: see hodograph status"
         )
     at.controller.wait_for((READY,), 0.0)
+    at.controller.require_no_stop()
     at.controller.clock.sleep(wait_s)

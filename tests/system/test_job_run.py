@@ -187,7 +187,7 @@ def test_drives_that_are_switched_off_in_a_dwell_end_the_job(
         clock.sleep(2.0)
         begun_s = clock.now_s()
         bench.controller.command(DISABLE)
-        assert command.wait() == 4
+        assert command.wait() == 6
         assert clock.now_s() - begun_s < 10.0
         assert "at a rest of the job: another command has moved the axes or switched" in command.err
     assert bench.controller.targets(2)[1] == 0

@@ -282,6 +282,71 @@ static void test_a_named_start_without_a_program(void)
     TEST_ASSERT_EQUAL_INT(MACHINE_NO_PROGRAM, app_bench_read(&bench, 0x2003, 4));
 }
 
+/* ---- Object 0x2057: stop commands between the check of the host and its start ---- */
+
+static void expect_stops(uint32_t expected)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2057, 2, expected, 4));
+}
+
+static void test_a_start_after_a_stop_that_the_host_does_not_know(void)
+{
+    static const unsigned stops[] = {COMMAND_STOP, COMMAND_QUICK_STOP, COMMAND_DISABLE};
+    for (unsigned i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        ready();
+        const uint32_t before = (uint32_t)app_bench_read(&bench, 0x2057, 1);
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, stops[i]));
+        TEST_ASSERT_NOT_EQUAL_UINT32(before, app_bench_read(&bench, 0x2057, 1));
+        if (stops[i] != COMMAND_STOP) {
+            (void)app_bench_until(&bench, MACHINE_OFF, 3000);
+            app_bench_make_ready(&bench);
+        }
+        expect_stops(before);
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_START));
+        TEST_ASSERT_EQUAL_INT(MACHINE_STOPPED, app_bench_read(&bench, 0x2003, 4));
+        TEST_ASSERT_EQUAL_INT(MACHINE_READY, machine()->state);
+        /* the number is valid for one start */
+        TEST_ASSERT_EQUAL_HEX32(UINT32_MAX, app_bench_read(&bench, 0x2057, 2));
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
+    }
+}
+
+static void test_a_start_that_knows_all_stops(void)
+{
+    ready();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_STOP));
+    expect_stops((uint32_t)app_bench_read(&bench, 0x2057, 1));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_START));
+    TEST_ASSERT_EQUAL_HEX32(UINT32_MAX, app_bench_read(&bench, 0x2057, 2));
+}
+
+/* ---- Drives of axes outside their travel ---- */
+
+static void limit_travel(int32_t least_counts, int32_t most_counts)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2006, 1, (uint32_t)least_counts, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2007, 1, (uint32_t)most_counts, 4));
+    (void)app_bench_until(&bench, MACHINE_OFF, 3000);
+}
+
+static void test_no_drive_is_switched_on_outside_its_travel(void)
+{
+    const int32_t slack = (int32_t)config_tolerance_counts(&bench.controller.config, 0);
+    static const int32_t side[] = {-1, 1};
+    for (unsigned i = 0; i < 2u; ++i) {
+        off();
+        const int32_t at = bench.drives[0].position_counts;
+        const int32_t beyond = at + side[i] * (slack + 1);
+        limit_travel(side[i] < 0 ? at - 1000000 : beyond, side[i] < 0 ? beyond : at + 1000000);
+        TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_command(&bench, COMMAND_ENABLE));
+        TEST_ASSERT_EQUAL_INT(MACHINE_OUTSIDE_TRAVEL, app_bench_read(&bench, 0x2003, 4));
+        TEST_ASSERT_EQUAL_INT(MACHINE_OFF, machine()->state);
+        const int32_t near = at + side[i] * slack;
+        limit_travel(side[i] < 0 ? at - 1000000 : near, side[i] < 0 ? near : at + 1000000);
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_command(&bench, COMMAND_ENABLE));
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -290,5 +355,8 @@ int main(void)
     RUN_TEST(test_a_named_start_starts_that_program_only);
     RUN_TEST(test_a_named_start_that_is_refused_ends_the_permission);
     RUN_TEST(test_a_named_start_without_a_program);
+    RUN_TEST(test_a_start_after_a_stop_that_the_host_does_not_know);
+    RUN_TEST(test_a_start_that_knows_all_stops);
+    RUN_TEST(test_no_drive_is_switched_on_outside_its_travel);
     return UNITY_END();
 }

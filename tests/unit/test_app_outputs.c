@@ -470,6 +470,110 @@ static void test_module_without_its_controller_switches_off(void)
     TEST_ASSERT_EQUAL_INT16(0, analogue(2));
 }
 
+/* ---- Outputs at standstill (0x2058) ---- */
+
+static uint32_t set_outputs(uint8_t sub, uint32_t value)
+{
+    return app_bench_write(&bench, 0x2058, sub, value, sub <= 2u ? 1u : 2u);
+}
+
+static void set_lamp_and_speed(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, set_outputs(4, (uint16_t)-321));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, set_outputs(1, LAMP));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, set_outputs(2, VALVE >> 8));
+    app_bench_periods(&bench, 3);
+    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    TEST_ASSERT_EQUAL_INT16(-321, analogue(1));
+}
+
+static void test_outputs_at_standstill(void)
+{
+    make_ready();
+    set_lamp_and_speed();
+    TEST_ASSERT_EQUAL_INT(LAMP, app_bench_read(&bench, 0x2058, 1));
+    TEST_ASSERT_EQUAL_INT(VALVE >> 8, app_bench_read(&bench, 0x2058, 2));
+    TEST_ASSERT_EQUAL_INT(-321, app_bench_read(&bench, 0x2058, 4));
+    app_bench_periods(&bench, 500);
+    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    command(COMMAND_START); /* the program has LAMP on, VALVE and the second analogue output off */
+    while (digital() != LAMP) { /* never off in between */
+        app_bench_period(&bench);
+        TEST_ASSERT_BITS_HIGH(LAMP, digital());
+    }
+    run_to_the_end();
+}
+
+static void test_outputs_at_standstill_end_with_a_stop(void)
+{
+    static const unsigned stops[] = {COMMAND_STOP, COMMAND_QUICK_STOP, COMMAND_DISABLE};
+    for (unsigned i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        setUp();
+        make_ready();
+        set_lamp_and_speed();
+        command(stops[i]);
+        app_bench_periods(&bench, 3);
+        TEST_ASSERT_EQUAL_HEX16(0, digital());
+        TEST_ASSERT_EQUAL_INT16(0, analogue(1));
+    }
+    setUp();
+    configure(4, KEPT_AT_STOP, 1);
+    make_ready();
+    set_lamp_and_speed();
+    command(COMMAND_STOP);
+    app_bench_periods(&bench, 3);
+    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+}
+
+static void test_outputs_at_standstill_need_it(void)
+{
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, set_outputs(1, LAMP)); /* drives off */
+    make_ready();
+    start();
+    app_bench_periods(&bench, 100);
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, set_outputs(2, VALVE >> 8));
+    check_place();
+    run_to_the_end();
+}
+
+/* Outputs of a motion in a job of the host stay at its end; those of the next one, which does not say so, go off. */
+static void test_outputs_stay_at_the_end_once(void)
+{
+    configure(4, OFF_AT_END, 1);
+    make_ready();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, 1, 1));
+    start();
+    (void)app_bench_until(&bench, MACHINE_READY, 1000);
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital());
+    TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2058, 6));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2011, 0, (uint64_t)um(4000), 8));
+    command(COMMAND_START_FROM);
+    (void)app_bench_until(&bench, MACHINE_RUNNING, 10);
+    (void)app_bench_until(&bench, MACHINE_READY, 1000);
+    app_bench_periods(&bench, 2);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+    set_lamp_and_speed(); /* OFF_AT_END concerns the end alone */
+}
+
+static void test_outputs_that_stay_at_the_end_go_off_at_a_stop(void)
+{
+    for (uint32_t kept = 0; kept <= KEPT_AT_STOP; ++kept) {
+        setUp();
+        configure(4, OFF_AT_END | kept, 1);
+        make_ready();
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, 1, 1));
+        start();
+        app_bench_periods(&bench, 250);
+        command(COMMAND_STOP);
+        app_bench_periods(&bench, 2);
+        TEST_ASSERT_EQUAL_HEX16(kept != 0u ? LAMP | VALVE : 0u, digital());
+        (void)app_bench_until(&bench, MACHINE_READY, 1000);
+        app_bench_periods(&bench, 2);
+        TEST_ASSERT_EQUAL_HEX16(0, digital());
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -480,6 +584,11 @@ int main(void)
     RUN_TEST(test_proportional_value_follows_the_feed);
     RUN_TEST(test_stop_and_quick_stop);
     RUN_TEST(test_end_and_disable);
+    RUN_TEST(test_outputs_at_standstill);
+    RUN_TEST(test_outputs_at_standstill_end_with_a_stop);
+    RUN_TEST(test_outputs_at_standstill_need_it);
+    RUN_TEST(test_outputs_stay_at_the_end_once);
+    RUN_TEST(test_outputs_that_stay_at_the_end_go_off_at_a_stop);
     RUN_TEST(test_start_from_a_place_has_all_events_before_it);
     RUN_TEST(test_delay_by_ticks);
     RUN_TEST(test_module_that_is_lost_stops_the_machine);

@@ -68,6 +68,8 @@ enum machine_refusal {
     MACHINE_NOT_IN_TIME = 16,   /* drives are real, and the port does not guarantee ticks in time */
     MACHINE_JOB_STARTED = 19,   /* a job starts once, at its beginning */
     MACHINE_OTHER_PROGRAM = 20, /* not the program or job that the start names */
+    MACHINE_STOPPED = 21,        /* a stop was commanded since the host prepared this start */
+    MACHINE_OUTSIDE_TRAVEL = 22, /* an axis is outside its travel: its drive would move it there */
 };
 
 #define MACHINE_SETTLE_TICKS 200u  /* after the last setpoint */
@@ -125,6 +127,9 @@ struct machine {
     /* homing was interrupted: the drives have to be configured anew after the quick stop */
     bool mode_left;
     bool unhomed_allowed; /* the next start is accepted although axes are not homed */
+    /* the outputs stay on at the end of this motion, whatever the configuration: the host's job goes on after it */
+    bool outputs_stay;
+    uint32_t stop_commands; /* stop, quick stop and disable commands since power-on */
     /* bit i: axis i + 1 has a homing method, and was not homed when this program started */
     uint8_t unhomed_axes;
 };
@@ -136,7 +141,9 @@ void machine_init(struct machine *machine, const struct config *config);
 
 enum machine_refusal machine_enable(struct machine *machine);
 enum machine_refusal machine_disable(struct machine *machine);
-/* Never refused; without effect when nothing runs. From ENABLING it leads back to OFF, HOMING ends by a quick stop. */
+/* Never refused. Where nothing runs it switches the outputs off (unless they are configured to stay) and counts as a
+ * stop command, which ends a job of the host at its rest. From ENABLING it leads back to OFF, HOMING ends by a quick
+ * stop. */
 enum machine_refusal machine_request_stop(struct machine *machine);
 /* Never refused: all drives that are on brake by their own ramps (0x6085), then OFF. In FAULT it replaces a stop along
  * the path. Without effect if the drives are off. */
@@ -164,6 +171,10 @@ bool machine_take_over(struct machine *machine, const struct chunk *next,
  * before machine_end_homing, which then changes nothing. */
 enum machine_refusal machine_begin_homing(struct machine *machine);
 void machine_end_homing(struct machine *machine);
+
+/* Outputs at standstill with the drives on (READY), until the next start. False: not now, or there is no I/O module.
+ * Main loop, under the lock. */
+bool machine_set_outputs(struct machine *machine, const struct path_outputs_values *values);
 
 /* The feed override, 0 ... 200 per cent, at any time. Under the lock. */
 void machine_override(struct machine *machine, uint32_t percent);

@@ -20,11 +20,30 @@ static enum machine_refusal not_available(const struct machine *machine)
     return machine->state == MACHINE_BOOT ? MACHINE_DRIVES_MISSING : MACHINE_ACCEPTED;
 }
 
+/* Encoder noise and rounding beyond the travel, as the start tolerance allows it for a start. A drive that is switched
+ * on farther outside moves to its software limit (0x607D) at once, without a ramp. */
+static bool any_outside_travel(const struct machine *machine)
+{
+    const struct config *config = &machine->config;
+    for (uint32_t i = 0; i < config->axis_count; ++i) {
+        const int64_t position_counts = machine->axes[i].position_counts;
+        const int64_t slack_counts = config_tolerance_counts(config, i);
+        if (position_counts < config->travel_min_counts[i] - slack_counts ||
+            position_counts > config->travel_max_counts[i] + slack_counts) {
+            return true;
+        }
+    }
+    return false;
+}
+
 enum machine_refusal machine_enable(struct machine *machine)
 {
     const enum machine_refusal refusal = not_available(machine);
     if (refusal != MACHINE_ACCEPTED || machine->state != MACHINE_OFF) {
         return refusal;
+    }
+    if (any_outside_travel(machine)) {
+        return MACHINE_OUTSIDE_TRAVEL;
     }
     machine_command(machine, CIA402_GOAL_ENABLED);
     machine->ticks_left = MACHINE_ENABLE_TICKS;
@@ -34,6 +53,7 @@ enum machine_refusal machine_enable(struct machine *machine)
 
 enum machine_refusal machine_disable(struct machine *machine)
 {
+    machine->stop_commands++;
     if (machine->state == MACHINE_HOMING) {
         return machine_quick_stop(machine);
     }
@@ -50,6 +70,7 @@ enum machine_refusal machine_disable(struct machine *machine)
 
 enum machine_refusal machine_quick_stop(struct machine *machine)
 {
+    machine->stop_commands++;
     if (machine->state == MACHINE_FAULT) {
         if (machine->fault_phase == MACHINE_FAULT_BRAKING) {
             machine_fault_quick(machine);
@@ -66,6 +87,7 @@ enum machine_refusal machine_quick_stop(struct machine *machine)
 
 enum machine_refusal machine_request_stop(struct machine *machine)
 {
+    machine->stop_commands++;
     if (machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
         machine->state == MACHINE_HELD) {
         motion_stop(&machine->motion);
@@ -74,6 +96,9 @@ enum machine_refusal machine_request_stop(struct machine *machine)
         return machine_disable(machine);
     } else if (machine->state == MACHINE_HOMING) {
         return machine_quick_stop(machine);
+    } else if (machine->state == MACHINE_READY &&
+               (machine->config.outputs.behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) == 0u) {
+        path_outputs_clear(&machine->motion.outputs);
     }
     return MACHINE_ACCEPTED;
 }
@@ -139,6 +164,15 @@ void machine_end_homing(struct machine *machine)
         machine_command(machine, CIA402_GOAL_OFF);
         machine->state = MACHINE_OFF;
     }
+}
+
+bool machine_set_outputs(struct machine *machine, const struct path_outputs_values *values)
+{
+    const bool possible = machine->state == MACHINE_READY && machine->config.outputs.node != 0u;
+    if (possible) {
+        path_outputs_set(&machine->motion.outputs, values);
+    }
+    return possible;
 }
 
 void machine_override(struct machine *machine, uint32_t percent)

@@ -26,7 +26,18 @@ static enum outputs_mode follow_or(bool follow, enum outputs_mode otherwise)
     return follow ? OUTPUTS_FOLLOW : otherwise;
 }
 
-static enum outputs_mode mode_of(const struct machine *machine)
+/* Whether this is the first tick after a motion whose end switches the outputs off. A host can switch them on again at
+ * standstill. */
+static bool ends_now(enum machine_state before, const struct machine *machine)
+{
+    if (before == MACHINE_READY ||
+        (machine->config.outputs.behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u) {
+        return false;
+    }
+    return before != MACHINE_RUNNING || !machine->outputs_stay;
+}
+
+static enum outputs_mode mode_of(enum machine_state before, const struct machine *machine)
 {
     const uint32_t behaviour = machine->config.outputs.behaviour;
     switch (machine->state) {
@@ -40,7 +51,7 @@ static enum outputs_mode mode_of(const struct machine *machine)
     case MACHINE_STOPPING:
         return follow_or((behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) != 0u, OUTPUTS_CLEARED);
     case MACHINE_READY:
-        return follow_or((behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u, OUTPUTS_CLEARED);
+        return follow_or(!ends_now(before, machine), OUTPUTS_CLEARED);
     case MACHINE_BOOT: /* the configuration of a module begins with its outputs off */
         return OUTPUTS_CLEARED;
     default:
@@ -87,7 +98,8 @@ static void follow_path(struct motion *motion)
 
 void outputs_step(struct outputs *outputs, struct machine *machine, bool synced)
 {
-    const enum outputs_mode mode = mode_of(machine);
+    const enum outputs_mode mode = mode_of(outputs->state_before, machine);
+    outputs->state_before = machine->state;
     if (mode != OUTPUTS_CLEARED) {
         follow_path(&machine->motion);
     }

@@ -47,6 +47,9 @@ _MARGIN_TICKS = 50
 _REST_TICKS = 10
 """Time recorded before the start: `hodograph identify` needs the rest before a motion."""
 
+FULL_OVERRIDE = 100
+"""Feed override with which programs and jobs begin, per cent."""
+
 Progress = Callable[[int], None]
 
 
@@ -136,15 +139,16 @@ def run_program(
     if start is None:
         start = NativeProgram(image).counts_at(kernel, machine.path_counts)
     bring_up(at, whole, kernel)
-    goto(at.controller, whole, start, unhomed=unhomed)
-    recorded = record_program(at, machine, image, progress, unhomed=unhomed)
+    with at.controller.ending_at_stops():
+        goto(at.controller, whole, start, unhomed=unhomed)
+        recorded = record_program(at, machine, image, progress, unhomed=unhomed)
     return analysed(at, machine, image, kernel, recorded, record)
 
 
-def bring_up(at: RunSession, machine: Machine, kernel: str) -> None:
-    """Configures the controller, sets the override to 100 % and switches the drives on."""
+def bring_up(at: RunSession, machine: Machine, kernel: str, override: int = FULL_OVERRIDE) -> None:
+    """Configures the controller, sets the feed override (per cent) and switches the drives on."""
     at.controller.configure(machine, kernel)
-    at.controller.override(100)
+    at.controller.override(override)
     require_inside_travel(at.controller, machine)
     at.controller.enable()
 
@@ -171,8 +175,10 @@ def record_program(
     progress: Progress | None = None,
     *,
     unhomed: bool = False,
+    outputs_stay: bool = False,
 ) -> Recorded:
-    """Uploads a program at whose start the axes stand, starts it, and waits until they stand again.
+    """Uploads a program at whose start the axes stand, starts it, and waits until they stand again. `outputs_stay`:
+    also on a machine whose outputs go off at the end of a program.
 
     Raises RefusedError, BusError, and RunError for a fault.
     """
@@ -181,7 +187,7 @@ def record_program(
     with Recorder(controller.address) as recorder:
         _await_syncs(controller, _REST_TICKS)
         begun_s = controller.clock.now_s()
-        controller.start(unhomed=unhomed, image=image)
+        controller.start(unhomed=unhomed, image=image, outputs_stay=outputs_stay)
         _follow(at, progress)
         took_s = controller.clock.now_s() - begun_s
         after = settling_ticks(machine.period_us) + REACHED_AFTER + _MARGIN_TICKS

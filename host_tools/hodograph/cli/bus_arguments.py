@@ -24,6 +24,8 @@ from .options import (
 
 _JOBS = 2
 """Processes that prepare a streamed job."""
+_FULL_OVERRIDE = 100
+"""Feed override with which a job begins, unless another one is given; per cent."""
 
 
 def _upload(command: Command) -> None:
@@ -110,6 +112,13 @@ def _stream(command: Command) -> None:
         metavar="RECORDING",
         help="keep all frames of the bus meanwhile: .log (candump), .asc or .blf",
     )
+    stream.add_argument(
+        "--override",
+        type=options.percentage,
+        default=_FULL_OVERRIDE,
+        metavar="PERCENT",
+        help="feed override with which it begins, also the move to the start (default 100)",
+    )
     options.unhomed(stream)
     stream.add_argument("--machine", type=Path, metavar="FILE", help="machine file")
     options.toolpath(stream)
@@ -137,7 +146,9 @@ def _pace(parser: ArgumentParser) -> None:
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
     # A job that does not fit the controller's memory is streamed, with the defaults of `stream`.
-    run.set_defaults(from_line=None, from_mm=None, journal=None, jobs=_JOBS)
+    run.set_defaults(
+        from_line=None, from_mm=None, journal=None, jobs=_JOBS, override=_FULL_OVERRIDE
+    )
     options.file(run, many=True, what=f"path file (TOML), or {options.TOOLPATH}")
     options.unhomed(run)
     options.machine(run)
@@ -346,6 +357,24 @@ def _override(command: Command) -> None:
     options.node(override)
 
 
+def _output(command: Command) -> None:
+    output = command("output", "switch outputs by hand at standstill, or print them")
+    output.add_argument(
+        "file", metavar="FILE", type=Path, help="machine file, or a path file that names one"
+    )
+    output.add_argument(
+        "assignments",
+        metavar="NAME=VALUE",
+        nargs="*",
+        help="valve=on, valve=off, power=30: the drives are switched on, and the outputs stay until the next start, "
+        "a stop or a fault (default: print the outputs)",
+    )
+    options.machine(output)
+    options.bus(output)
+    options.kernel(output)
+    options.json(output)
+
+
 def _status(command: Command) -> None:
     status = command("status", "print the state of controller, drives, program and bus")
     options.bus(status)
@@ -381,6 +410,7 @@ OPERATING = (
     _configure,
     _quick_stop,
     _override,
+    _output,
     _status,
 )
 

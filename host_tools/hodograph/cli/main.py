@@ -32,7 +32,7 @@ _NO_SPACE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _MODULES = {
     **dict.fromkeys(("init", "schema"), "start_commands"),
     **dict.fromkeys(("spline", "feed", "compile", "inspect", "simulate"), "path_commands"),
-    **dict.fromkeys(("upload", "goto", "rig"), "motion_commands"),
+    **dict.fromkeys(("upload", "goto", "output", "rig"), "motion_commands"),
     "run": "run_command",
     "stream": "stream_command",
     **dict.fromkeys(("start", "stop", "hold", "resume", "override"), "bus_commands"),
@@ -71,7 +71,18 @@ _AWAITED = frozenset(
             "report",
         ),
         *("paper", "tune", "identify", "upload", "goto", "run", "stream", "campaign", "faults"),
-        *("demo", "latency", "scan", "check", "configure", "home", "start", "hold", "stop"),
+        *(
+            "demo",
+            "latency",
+            "scan",
+            "check",
+            "configure",
+            "home",
+            "output",
+            "start",
+            "hold",
+            "stop",
+        ),
     )
 )
 """Commands whose running time a terminal shows; the others end at once, or at Ctrl-C."""

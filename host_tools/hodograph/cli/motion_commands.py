@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Commands that plan and then use a controller: upload, goto, rig; and the text for the result of a run. Started by
-cli/main. Used by cli/action_commands, cli/demo_command, cli/replay_command and cli/run_command. Reads files, starts
-processes, reads and writes objects of the controller by SDO, and prints to stdout and stderr.
+"""Commands that use a controller and a machine file: upload, goto, output, rig; and the text for the result of a run.
+Started by cli/main. Used by cli/action_commands, cli/demo_command, cli/replay_command and cli/run_command. Reads files,
+starts processes, reads and writes objects of the controller by SDO, and prints to stdout and stderr.
 """
 
 from __future__ import annotations
@@ -13,13 +13,16 @@ from pathlib import Path
 
 from ..bus.goto import goto as goto_point
 from ..bus.goto import require_inside_travel
+from ..bus.outputs import outputs_of, set_outputs
 from ..bus.own_bus import bus_address, opened_bus
 from ..bus.run import BusRun, rig_until_interrupted
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.status import loaded_program
 from ..bustime import require_fit
 from ..config import SPACE_AXES, Machine, load_machine, read_toml
+from ..config.outputs import assigned
 from ..errors import InputError
+from ..events import SwitchedOutputs, events_of
 from ..machine_limits import program_limits
 from ..names import is_toolpath
 from ..native import NativeProgram
@@ -107,6 +110,30 @@ def goto(options: Namespace) -> None:
     )
 
 
+def output(options: Namespace) -> None:
+    """hodograph output."""
+    address = bus_address(options.bus)
+    machine = machine_of(options.file, options.machine)
+    if machine.outputs is None:
+        raise InputError(f"{machine.file}: has no [outputs]: the machine switches none")
+    wanted = [assigned(text, machine.outputs) for text in options.assignments]
+    with reached(address, machine.node, machine.bitrate, options.wait) as controller:
+        if wanted:
+            require_fit(machine)
+            controller.require_standing()
+            controller.configure(machine, options.kernel or machine.kernel)
+            require_inside_travel(controller, machine)
+            controller.enable()
+            state = SwitchedOutputs(outputs_of(controller))
+            state.act(events_of(wanted))
+            set_outputs(controller, state.at_rest)
+        values = outputs_of(controller)
+    if options.json:
+        print_json({one.name: one.level(values) for one in machine.outputs.channels})
+    else:
+        print_rows([(one.name, one.level_text(values)) for one in machine.outputs.channels])
+
+
 def _given_point(options: Namespace, machine: Machine) -> list[int]:
     """The point of --to and --z in counts. Raises InputError: the machine cannot reach it."""
     to = [*options.to, *([] if options.z is None else [options.z])]
@@ -166,5 +193,6 @@ def rig(options: Namespace) -> None:
 COMMANDS = {
     "upload": upload,
     "goto": goto,
+    "output": output,
     "rig": rig,
 }

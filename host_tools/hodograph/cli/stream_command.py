@@ -269,7 +269,7 @@ def _run(
         plan = None if begin is None else stack.enter_context(planned(begin))
         recording = stack.enter_context(recorded(options.record, job.machine, address))
         at = stack.enter_context(session(job.machine, address, options))
-        bring_up(at, job.machine, kernel)
+        bring_up(at, job.machine, kernel, options.override)
         if isinstance(start, Nearest):
             _require_at(at, job.machine, start, unhomed=options.unhomed)
         if begin is None:
@@ -295,6 +295,7 @@ def _run(
             unhomed=options.unhomed,
             slow=_free_rate(job.machine, address),
             recording=recording,
+            override=options.override,
         )
         done = sender.run()
         for line in plan.notes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import floor, isfinite, log10, nan
 
 from ..errors import InputError
 from ..events import (
@@ -20,6 +21,7 @@ from ..events import (
     VALUE_LOW,
     Event,
     Events,
+    OutputValues,
 )
 from ..fixed_point import MM_PER_Q40
 from .table import Table
@@ -64,6 +66,20 @@ class Channel:
             )
         return Event(place_q40, PROPORTIONAL, self.number, 0, gain)
 
+    def level(self, values: OutputValues) -> bool | float:
+        """Its present state: whether it is on, or the value of an analogue output in its unit."""
+        if self.digital:
+            return bool(values.digital >> self.number & 1)
+        decimals = max(floor(log10(abs(self.scale))), 0)  # of one step on the bus
+        return round(values.analogue[self.number] / self.scale, decimals)
+
+    def level_text(self, values: OutputValues) -> str:
+        """Its present state in words."""
+        level = self.level(values)
+        if isinstance(level, bool):
+            return "on" if level else "off"
+        return f"{level:g} {self.unit}".rstrip()
+
 
 @dataclass(frozen=True)
 class CodeOutputs:
@@ -75,6 +91,7 @@ class CodeOutputs:
     mist, flood      M7, M8
     laser_mode       after M4 `speed` is in proportion to the feed: S at the feed of the block, 0 in rapid moves. S then
                      changes in motion
+    spindle_wait_s   wait at rest after the spindle is switched on, or over to its other direction
     """
 
     spindle: Channel | None = None
@@ -83,11 +100,18 @@ class CodeOutputs:
     mist: Channel | None = None
     flood: Channel | None = None
     laser_mode: bool = False
+    spindle_wait_s: float = 0.0
 
     @property
     def has_spindle(self) -> bool:
         """Whether M3, M4 and M5 switch an output."""
         return self.spindle is not None or self.speed is not None
+
+    def restart_wait_s(self, values: OutputValues) -> float:
+        """The wait before the axes move where a job begins with these outputs."""
+        turns = self.spindle is not None and values.digital >> self.spindle.number & 1
+        turns = turns or (self.speed is not None and values.analogue[self.speed.number] != 0)
+        return self.spindle_wait_s if turns else 0.0
 
     @property
     def has_coolant(self) -> bool:
@@ -147,6 +171,23 @@ class Outputs:
         raise InputError(f'{where}: the machine has no output "{name}"; it has {names}')
 
 
+def assigned(text: str, outputs: Outputs) -> Event:
+    """The event of NAME=on, NAME=off or NAME=NUMBER. Raises InputError."""
+    name, _, value = text.partition("=")
+    channel = outputs.channel(name, text)
+    if channel.digital:
+        if value not in ("on", "off"):
+            raise InputError(f"{text}: {name} is a digital output: give {name}=on or {name}=off")
+        return channel.switched(0, value == "on")
+    try:
+        number = float(value)
+    except ValueError:
+        number = nan
+    if not isfinite(number):
+        raise InputError(f"{text}: {name} is an analogue output: give {name}=NUMBER")
+    return channel.valued(0, number, text)
+
+
 _OUTPUTS = (
     "node",
     "delay_ticks",
@@ -161,7 +202,7 @@ _OUTPUTS = (
 )
 _CHANNEL = ("digital", "analogue", "scale", "unit")
 _CODES = ("spindle", "spindle_reverse", "speed", "mist", "flood")
-_LASER_MODE = "laser_mode"
+_LASER_MODE, _SPINDLE_WAIT = "laser_mode", "spindle_wait_s"
 
 
 def read_outputs(root: Table, taken: tuple[int, ...]) -> Outputs | None:
@@ -196,7 +237,9 @@ def read_outputs(root: Table, taken: tuple[int, ...]) -> Outputs | None:
         off_in_hold=table.flag("off_in_hold", False),
         vendor=table.integer("vendor", 0, low=0, high=2**32 - 1),
         product=table.integer("product", 0, low=0, high=2**32 - 1),
-        codes=_codes(table.table("gcode", (*_CODES, _LASER_MODE), required=False), found),
+        codes=_codes(
+            table.table("gcode", (*_CODES, _LASER_MODE, _SPINDLE_WAIT), required=False), found
+        ),
     )
 
 
@@ -214,7 +257,12 @@ def _codes(table: Table, channels: tuple[Channel, ...]) -> CodeOutputs:
     laser_mode = table.flag(_LASER_MODE, False)
     if laser_mode and "speed" not in found:
         raise table.error(_LASER_MODE, 'needs an analogue output for the power: add speed = "NAME"')
-    return CodeOutputs(**found, laser_mode=laser_mode)
+    wait_s = table.number(_SPINDLE_WAIT, 0.0, low=0.0, high=600.0)
+    if wait_s and laser_mode:
+        raise table.error(_SPINDLE_WAIT, "is for spindles, and laser_mode is on: remove one")
+    if wait_s and not found.keys() & {"spindle", "speed"}:
+        raise table.error(_SPINDLE_WAIT, 'needs an output of the spindle: add spindle = "NAME"')
+    return CodeOutputs(**found, laser_mode=laser_mode, spindle_wait_s=wait_s)
 
 
 def _channel(channels: Table, name: str) -> Channel:

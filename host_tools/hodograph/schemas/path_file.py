@@ -104,7 +104,15 @@ def outputs() -> Schema:
         "mist": "Digital output: M7",
         "flood": "Digital output: M8",
     }
-    laser = {"properties": {"laser_mode": {"const": True}}, "required": ["laser_mode"]}
+    of_laser = {
+        "if": {"properties": {"laser_mode": {"const": True}}, "required": ["laser_mode"]},
+        "then": {"required": ["speed"], "properties": {"spindle_wait_s": {"const": 0}}},
+    }
+    positive = {"exclusiveMinimum": 0}
+    of_wait = {
+        "if": {"properties": {"spindle_wait_s": positive}, "required": ["spindle_wait_s"]},
+        "then": {"anyOf": [{"required": ["spindle"]}, {"required": ["speed"]}]},
+    }
     return parts.table(
         "An I/O module by CiA 401, whose outputs paths switch",
         {
@@ -125,10 +133,13 @@ def outputs() -> Schema:
                 | {
                     "laser_mode": parts.flag(
                         "M4: speed in proportion to the feed, as a laser", False
-                    )
+                    ),
+                    "spindle_wait_s": parts.number(
+                        "Wait after the spindle starts or turns over, s", 0.0, 600.0, 0.0
+                    ),
                 },
                 (),
-                {"if": laser, "then": {"required": ["speed"]}},
+                {"allOf": [of_laser, of_wait]},
             ),
         },
         ("node", "channel"),

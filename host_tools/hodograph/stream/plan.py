@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
 from ..errors import InputError, PlanError, RunError, SectionPlanError
-from ..events import SwitchedOutputs
+from ..events import Events, OutputValues, SwitchedOutputs, events_after
 from ..fixed_point import MM_PER_Q40
+from ..job_outputs import WAITS
 from ..names import STANDARD_INPUT, is_toolpath
 from ..toolpath.files import ReadOptions
-from ..toolpath.moves import Command, Dwell, ProgramStop, ToolChange
+from ..toolpath.moves import Command, Dwell, ProgramStop, SwitchedAtRest, ToolChange
 from .chunk import Chunk, Rest, parse
 from .chunks import JobPlace, SectionChunks
 from .geometry import begun_with, blocks_from, switching
@@ -361,6 +362,8 @@ class JobPlan:
             block = next(blocks, None) if number >= self._begin.section else None
             if block is not None:
                 before = () if begin_q40 else (*carried, *section.before)
+                if number == self._begin.section and (begin_q40 or number > first):
+                    before = _switched_first(section, before, switched.at_rest, block.events)
                 made = PlannedSection(
                     number, file, section.first_line, before, standing_mm=section.standing_mm
                 )
@@ -471,6 +474,28 @@ class _GreatestRate:
         if time_s >= _RATE_S:
             size = store.end_of(last) - store.end_of(self._first)
             self.worst = max(self.worst, size / time_s)
+
+
+def _switched_first(
+    section: StreamSection, before: tuple[Command, ...], values: OutputValues, events: Events
+) -> tuple[Command, ...]:
+    """Commands at rest where a job begins within a toolpath, at this section or inside it. The outputs of this place
+    have to be on before a wait; the program of the section switches them with its first setpoint only.
+
+    values  of the outputs there
+    events  of the path from there on
+    """
+    outputs = section.machine.outputs
+    if outputs is None:
+        return before
+    moving = SwitchedOutputs(values)
+    moving.act(events_after(events, 0)[0])
+    codes = outputs.codes
+    wait_s = min(codes.restart_wait_s(values), codes.restart_wait_s(moving.at_rest))
+    waits = (Dwell(section.first_line, wait_s),) if wait_s else ()
+    if not waits and not any(isinstance(one, WAITS) for one in before):
+        return before
+    return (SwitchedAtRest(section.first_line, values), *waits, *before)
 
 
 def rest_of(commands: Sequence[Command], *, stops: bool) -> Rest:

@@ -190,6 +190,8 @@ class StreamReader:
                 yield from (_Part(made) for made in sections.made(divided.section))
                 continue
             for made, final in _with_final(sections.made(divided.section)):
+                if first:
+                    made = replace(made, before=events.before_first(made.before))
                 own = events.section(
                     section_commands(made),
                     divided.after if final else (),
@@ -199,7 +201,11 @@ class StreamReader:
                 if events.lost and not noted:  # the first one only: the axes move meanwhile
                     self.notes.append(without_effect(self.file, events.lost[0]))
                     noted = True
-                yield _Part(made, events_of(own.events))
+                if divided.is_last and final:
+                    self.after = events.after_last(self.after)
+                # A controller's job begins with all outputs off; the host has switched those before the first section.
+                begun = own.repeated if first else []
+                yield _Part(made, events_of([*begun, *own.events]))
                 first = False
 
     def _divided(self) -> Iterator[_Divided]:

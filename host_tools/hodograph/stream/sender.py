@@ -17,7 +17,7 @@ import numpy as np
 
 from ..bus.capture.bus_recording import BusRecording
 from ..bus.goto import goto
-from ..bus.run import RunSession
+from ..bus.run import FULL_OVERRIDE, RunSession
 from ..bus.sdo.controller import BOOT, OFF, READY
 from ..bus.sdo.follow import Follower
 from ..bus.sdo.objects import BUSY, OVERRIDE, RESUME
@@ -34,7 +34,14 @@ from ..bus.sdo.stream_channel import (
 from ..config import Machine
 from ..errors import HodographError, PlanError, RefusedError, RunError
 from ..fixed_point import nearest_q40
-from ..job_run import Operator, execute_at_rest, operator_stops_of, report_messages
+from ..job_run import (
+    Operator,
+    end_outputs,
+    execute_at_rest,
+    goes_off_at_end,
+    operator_stops_of,
+    report_messages,
+)
 from ..native.program import NativeLimits, NativeProgram
 from ..pipeline import program_start_counts
 from .chunk import Chunk
@@ -65,9 +72,6 @@ _START_AHEAD_S, _START_WAIT_S = 2.0, 1.0
 
 _LONG_WAIT_S = 1.0
 """Longest wait for the plan to report whether a job is long."""
-
-_FULL = 100
-"""Feed override with which a job begins."""
 
 _IN_TIME = 0.7
 """A chunk is in time if its transfer takes at most this share of the motion that was sent before it."""
@@ -115,6 +119,7 @@ class Sender:
     progress   called a few times a second while it moves
     recording  recorder of the bus; None: the bus is not recorded
     slow       bytes per second that the bus has for chunks; None: not limited
+    override   feed override in per cent with which the job begins
     """
 
     at: RunSession
@@ -127,6 +132,7 @@ class Sender:
     unhomed: bool = False
     slow: float | None = None
     recording: BusRecording | None = None
+    override: int = FULL_OVERRIDE
     _next: int = 0
     _bytes: int = 0
     _motion_s: float = 0.0
@@ -137,9 +143,9 @@ class Sender:
     _journal_s: float = field(default=-1e9)
     _kept_s: float = field(default=-1e9)
     _underrun_s: float = field(default=-1e9)
-    _percent: int = _FULL
+    _percent: int = field(init=False)
     """The feed override to which the job was lowered."""
-    _operators_percent: int = _FULL
+    _operators_percent: int = field(init=False)
     """The feed override before that."""
     _sending_s: float = 0.0
     """Time that the transfers of `_bytes` took."""
@@ -153,12 +159,22 @@ class Sender:
     _unplanned: HodographError | None = None
     """The error that ended the planning. What was sent before it is still executed."""
 
+    def __post_init__(self) -> None:
+        self._percent = self._greatest_percent
+        self._operators_percent = self.override
+
+    @property
+    def _greatest_percent(self) -> int:
+        """The feed override that the bus has to carry, unless it is lowered: an operator may raise it to 100 %."""
+        return max(FULL_OVERRIDE, self.override)
+
     def run(self) -> StreamedJob:
         """Sends the whole job and returns at its end. Raises RefusedError, BusError, RunError, and errors of planning
         once the motion has come to rest. Any exception first stops the axes on their path, unless nothing was started.
         """
         try:
-            done = self._run()
+            with self.at.controller.ending_at_stops():
+                done = self._run()
         except BaseException as error:
             self.at.controller.stop_after(error)
             with suppress(HodographError):
@@ -178,6 +194,7 @@ class Sender:
             execute_at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
         else:
             self.at.note("nothing of the job is left")
+        end_outputs(self.at, self.machine)
         if self.journal is not None:
             self.journal.update(done=True)
         took_s = self.at.controller.clock.now_s() - begun_s
@@ -296,7 +313,9 @@ class Sender:
                 raise self._unplanned
             if not started and sent and (all_sent or self._may_start(first_s)):
                 self._slow_down()
-                controller.start(unhomed=self.unhomed, job=self._job_number)
+                # Another job of the controller may follow: the end of all is that of this command.
+                stay = goes_off_at_end(self.machine)
+                controller.start(unhomed=self.unhomed, job=self._job_number, outputs_stay=stay)
                 started = True
 
     def _may_start(self, first_s: float) -> bool:
@@ -427,7 +446,7 @@ class Sender:
         apply to later programs.
         """
         controller = self.at.controller
-        if self._percent >= _FULL or controller.state() in BUSY:
+        if self._percent >= self._greatest_percent or controller.state() in BUSY:
             return
         if controller.read(OVERRIDE, 1) == self._percent:
             controller.override(self._operators_percent)

@@ -19,6 +19,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from ..events import OutputValues
+
 AXES = "xyzabc"
 """Names of the axes, in the order of a `Position`."""
 
@@ -258,6 +260,17 @@ class ProgramEnd:
 Move = StraightMove | ArcMove | SplineMove
 """A command that moves the axes; each has `line`, `end` and `feed`."""
 
+
+@dataclass(frozen=True, slots=True)
+class SwitchedAtRest:
+    """The outputs of the machine from here on, at a rest where no section's program switches them. No reader makes it:
+    job_outputs does, after the commands that switch outputs.
+    """
+
+    line: int
+    values: OutputValues
+
+
 Command = (
     Move
     | PathMode
@@ -273,5 +286,6 @@ Command = (
     | Message
     | ProgramStop
     | ProgramEnd
+    | SwitchedAtRest
 )
 """One element of a toolpath."""

@@ -12,9 +12,12 @@ import pytest
 
 from hodograph.config import Machine, load_machine
 from hodograph.errors import InputError
+from hodograph.events import Event, SwitchedOutputs, events_of
 from hodograph.job import Job, load_job
+from hodograph.stream.plan import JobFiles, JobPlan, Place
 from hodograph.stream.reading import StreamReader
 from hodograph.toolpath.files import ReadOptions
+from hodograph.toolpath.moves import Command, Dwell, SwitchedAtRest
 
 ROOT = Path(__file__).parents[3]
 MACHINES = ROOT / "examples" / "machines"
@@ -78,11 +81,115 @@ def test_each_section_repeats_what_is_on(tmp_path: Path, machine: Machine) -> No
 def test_outputs_before_a_dwell_belong_to_the_end_of_the_motion_before_it(
     tmp_path: Path, machine: Machine
 ) -> None:
+    """Before the first motion the host switches them; the first program repeats them."""
     text = "M64 P1\nG4 P0.1\nG1 X10\nM64 P0\nG4 P0.5\nM65 P0\nG1 X20"
     assert events(job(tmp_path, machine, text)) == [
         [(0.0, 1, 0, 2, 2), (10.0, 1, 0, 1, 1)],
         [(0.0, 1, 0, 3, 3), (0.0, 1, 0, 1, 0)],
     ]
+
+
+def at_rest(commands: tuple[Command, ...]) -> list[tuple[int, ...] | float]:
+    """What happens at a rest, in its order: digital outputs and the first analogue one, and dwells in s."""
+    found: list[tuple[int, ...] | float] = []
+    for one in commands:
+        if isinstance(one, SwitchedAtRest):
+            found.append((one.values.digital, one.values.analogue[0]))
+        elif isinstance(one, Dwell):
+            found.append(one.duration_s)
+    return found
+
+
+def streamed(found: Job, machine: Machine) -> tuple[tuple[Command, ...], list[Event], StreamReader]:
+    """Commands before the first section, the events of the first one, and the reader at the end of the file."""
+    reader = StreamReader(found.file, machine, 0.01, ReadOptions())
+    sections = [(one, list(one.blocks)) for one in reader.sections()]
+    first, blocks = sections[0]
+    return first.before, [Event._make(one) for one in blocks[0].events.tolist()], reader
+
+
+OPENINGS = [
+    ("M3 S40\nG4 P2\nG1 X10", [(4, 13107), 2.0], [(4, 4), (0, 13107)]),
+    ("G4 P2\nM3 S40\nG1 X10", [2.0], [(4, 4), (0, 13107)]),
+    ("M64 P0\nG4 P2\nM65 P0\nG4 P3\nG1 X10", [(1, 0), 2.0, (0, 0), 3.0], []),
+    ("M64 P0\nG4 P2\nM64 P1\nG1 X10", [(1, 0), 2.0], [(1, 1), (2, 2)]),
+    ("M3 S40\nM0\nM64 P0\nG4 P2\nM5\nG1 X10", None, [(1, 1), (4, 0), (0, 0)]),
+    ("M64 P0\nG1 X10", [], [(1, 1)]),
+]
+
+
+@pytest.mark.parametrize(("text", "rest", "begin"), OPENINGS)
+def test_outputs_before_a_wait_at_the_start_of_a_file(
+    tmp_path: Path,
+    machine: Machine,
+    text: str,
+    rest: list[tuple[int, ...] | float] | None,
+    begin: list[tuple[int, int]],
+) -> None:
+    """A spindle turns before the axes move. In a job, and in the streamed one."""
+    found = job(tmp_path, machine, text)
+    before, first, _ = streamed(found, machine)
+    own = [Event._make(one) for one in found.sections[0].pipeline.events.tolist()]
+    assert before == found.sections[0].before
+    assert first == own
+    assert rest is None or at_rest(before) == rest
+    state = SwitchedOutputs()
+    state.act(events_of([one for one in own if one.place_q40 == 0]))
+    wanted = SwitchedOutputs()
+    wanted.act(events_of(Event(0, 1 if mask else 2, 0, mask, value) for mask, value in begin))
+    assert state.at_rest == wanted.at_rest
+
+
+ENDINGS = [
+    ("M3 S40\nG1 X10\nM64 P0\nG4 P1\nM65 P0\nG4 P2", [1.0, (4, 13107), 2.0, (0, 0)]),
+    ("G1 X10\nM64 P0\nG4 P1", [1.0]),
+    ("M3 S40\nG1 X10", []),
+    ("M3 S40\nG1 X10\nM0", [(0, 0)]),
+]
+
+
+@pytest.mark.parametrize(("text", "rest"), ENDINGS)
+def test_outputs_after_a_wait_at_the_end_of_a_file(
+    tmp_path: Path, machine: Machine, text: str, rest: list[tuple[int, ...] | float]
+) -> None:
+    found = job(tmp_path, machine, text)
+    assert at_rest(found.after) == rest
+    assert streamed(found, machine)[2].after == found.after
+
+
+def test_a_wait_for_the_spindle(tmp_path: Path, machine: Machine) -> None:
+    """Where it starts or turns over; not where its speed changes or where it turns already."""
+    text = "M3 S40\nG1 X5\nS50\nG1 X10\nM3\nG1 X15\nM4\nG1 X20\nM5\nG1 X25\nM3\nG1 X30"
+    assert machine.outputs is not None
+    codes = replace(machine.outputs.codes, spindle_wait_s=4.0)
+    waiting = replace(machine, outputs=replace(machine.outputs, codes=codes))
+    found = job(tmp_path, waiting, text)
+    assert found.dwell_s == 12.0
+    assert at_rest(found.sections[0].before) == [(4, 13107), 4.0]
+    assert job(tmp_path, machine, text).dwell_s == 0.0
+
+
+def test_a_job_that_begins_within_a_toolpath_switches_on_first(
+    tmp_path: Path, machine: Machine
+) -> None:
+    """At a section that a wait precedes, and inside a section while the spindle turns."""
+    assert machine.outputs is not None
+    codes = replace(machine.outputs.codes, spindle_wait_s=4.0)
+    waiting = replace(machine, outputs=replace(machine.outputs, codes=codes))
+    found = job(tmp_path, machine, "M3 S40\nG1 X10\nM64 P0\nG4 P1\nG1 X20\nM5\nG1 X30")
+    on = (5, 13107)
+    for place, plain, long in (
+        (Place(1, 0), [on, 1.0], [on, 4.0, 1.0]),
+        (Place(1, 5 * MM), [], [on, 4.0]),
+        (Place(2, 5 * MM), [], []),
+        (Place(2, 0), [], []),
+    ):
+        for one, wanted in ((machine, plain), (waiting, long)):
+            files = JobFiles((found.file,), one, 0.01, ReadOptions())
+            with JobPlan(files, 16 * 1024, 1, place) as plan:
+                item = plan.item(0, 60.0)
+                assert item is not None
+                assert at_rest(item[0].before) == wanted
 
 
 def test_spindle_words_that_the_machine_file_maps(tmp_path: Path, machine: Machine) -> None:
@@ -208,8 +315,8 @@ def test_the_end_of_the_program_switches_off_what_the_same_rest_switches_on(
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ("M64 P0\nG4 P1\nM65 P0\nG1 X10", 3),
-        ("G1 X10\nM64 P0\nG4 P1\nM65 P0", 4),
+        ("M64 P0\nG4 P1\nM65 P0\nG1 X10", None),
+        ("G1 X10\nM64 P0\nG4 P1\nM65 P0", None),
         ("G1 X10\nM64 P0\nG4 P1\nM65 P0\nG4 P1\nM64 P0\nG4 P1\nM65 P0\nG1 X20", 6),
         ("G1 X10\nM64 P0\nG4 P1\nM65 P0\nG1 X20", None),
         ("G1 X10\nM64 P0\nM65 P0\nG4 P1\nG1 X20", None),

@@ -66,17 +66,20 @@ from .objects import (
     READY,
     REFUSED_MOVING,
     REFUSED_OTHER,
+    REFUSED_STOPPED,
     RESET,
     RESTORE_DEFAULTS,
     RESUME,
     RUNNING,
     SAVE,
+    SET_OUTPUTS,
     START,
     START_FROM,
     START_POSITION,
     STATE,
     STATISTICS,
     STOP,
+    STOP_COMMANDS,
     STORE,
     TARGET,
     UNHOMED_START,
@@ -103,6 +106,7 @@ __all__ = [
     "CommandRefusedError",
     "Controller",
     "connect",
+    "lacks_object",
 ]
 
 POLL_S = 0.02
@@ -115,6 +119,8 @@ class Controller(Node):
 
     moved: bool = False
     """Whether a command of this connection may have set axes in motion."""
+    _stops: int | None = None
+    """Stop commands at the beginning of a job; None: no job, or the controller does not count them."""
 
     # -- configuration ------------------------------------------------------------------------
 
@@ -345,6 +351,7 @@ class Controller(Node):
         unhomed: bool = False,
         image: bytes | None = None,
         job: int | None = None,
+        outputs_stay: bool = False,
     ) -> None:
         """Starts the program, or the streamed job, after waiting while the controller reports that axes still move.
 
@@ -352,8 +359,10 @@ class Controller(Node):
         unhomed  also if axes with a homing method are not homed
         image    the program that was uploaded to be started; None: any
         job      number of the streamed job to be started; None: any
+        outputs_stay  also on a machine whose outputs go off at the end of a program
 
         Raises InputError: the path does not have the place. Raises RefusedError: another program or job is there.
+        Raises RunError: a stop command came since `ending_at_stops` began.
         """
         if from_mm is not None:
             self._require_place(from_mm)
@@ -361,7 +370,11 @@ class Controller(Node):
         deadline = self.clock.now_s() + wait_s
         while True:
             if unhomed:
-                self.write(UNHOMED_START, 1, 1)  # for one attempt
+                self.write(UNHOMED_START, 1, 1)  # for one attempt, as the next two
+            if self._stops is not None:
+                self.write(STOP_COMMANDS, 2, self._stops)
+            if outputs_stay:
+                self.write(SET_OUTPUTS, _STAY_AT_END, 1)
             try:
                 with self.turn():
                     self._start(START if from_mm is None else START_FROM, image, job)
@@ -369,6 +382,8 @@ class Controller(Node):
             except CommandRefusedError as error:
                 if error.reason == REFUSED_OTHER:
                     raise RefusedError(self._other_text()) from error
+                if error.reason == REFUSED_STOPPED:
+                    raise RunError(self._stopped_text()) from error
                 moving = self.state() in MOVING
                 if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
@@ -405,6 +420,29 @@ class Controller(Node):
             raise InputError(
                 f"start from {arc_length_mm:.9g} mm: the path has arc lengths from 0 to {length_mm:.9g} mm"
             )
+
+    @contextmanager
+    def ending_at_stops(self) -> Iterator[None]:
+        """For the length of a job: a stop command of any client also ends it where the axes stand, for example in a
+        dwell. Then no start succeeds, and `require_no_stop` raises.
+        """
+        try:
+            self._stops = self.read(STOP_COMMANDS, 1)
+        except RefusedError as error:
+            if not lacks_object(error):
+                raise
+        try:
+            yield
+        finally:
+            self._stops = None
+
+    def require_no_stop(self) -> None:
+        """Raises RunError: a stop command came since `ending_at_stops` began."""
+        if self._stops is not None and self.read(STOP_COMMANDS, 1) != self._stops:
+            raise RunError(self._stopped_text())
+
+    def _stopped_text(self) -> str:
+        return f"{self.who()}: a stop was commanded while the axes stood: the job ends here"
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand."""
@@ -492,6 +530,8 @@ _TWICE = (ENABLE, DISABLE, RESET)
 """Commands that may be given again: the second one changes nothing more."""
 _NAMED_PROGRAM, _NAMED_JOB = {START: 1, START_FROM: 2}, 3
 """Subindices of NAMED_START."""
+_STAY_AT_END = 6
+"""Subindex of SET_OUTPUTS."""
 _PREFIX = 16
 """Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")
@@ -504,6 +544,12 @@ class CommandRefusedError(RefusedError):
     def __init__(self, message: str, reason: int) -> None:
         super().__init__(message)
         self.reason = reason
+
+
+def lacks_object(error: RefusedError) -> bool:
+    """Whether an object is missing: the controller is of an older minor version."""
+    cause = error.__cause__
+    return isinstance(cause, SdoAbortedError) and cause.code in NO_OBJECT
 
 
 @contextmanager

@@ -23,7 +23,8 @@ TIMING, PROGRAM_MEMORY = 0x2040, 0x2041
 GEAR_MOTOR, GEAR_SHAFT, MISSED_TPDOS, BOOT_TROUBLE, DRIVE_STATE = range(0x2022, 0x2027)
 STORE, RESTORE_DEFAULTS = 0x1010, 0x1011
 CONFIGURATION_STATE, EXPECTED_VENDOR, EXPECTED_PRODUCT, EXPECTED_REVISION = range(0x2050, 0x2054)
-NODE_NUMBER, UNHOMED_START, NAMED_START, STREAM = 0x2054, 0x2055, 0x2056, 0x2060
+NODE_NUMBER, UNHOMED_START, NAMED_START, STOP_COMMANDS = range(0x2054, 0x2058)
+SET_OUTPUTS, STREAM = 0x2058, 0x2060
 
 SAVE, LOAD = int.from_bytes(b"save", "little"), int.from_bytes(b"load", "little")
 """The values to write to STORE and RESTORE_DEFAULTS (CiA 301)."""
@@ -42,7 +43,7 @@ MOVING = (*ON_PATH, STOPPING)
 """States in which a program runs or is held."""
 BUSY = (*MOVING, HOMING, QUICK_STOPPING)
 """States in which axes move, or may."""
-REFUSED_MOVING, REFUSED_OTHER = 3, 20
+REFUSED_MOVING, REFUSED_OTHER, REFUSED_STOPPED = 3, 20, 21
 
 Object = tuple[int, int | None]
 """Index and sub-index, None for an object without."""

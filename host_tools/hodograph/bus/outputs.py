@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: MIT
+"""Outputs at standstill (object 0x2058): switches and reads the outputs of the I/O module while no program runs. Used
+by job_run and cli/motion_commands. Reads and writes objects of the controller by SDO.
+"""
+
+from __future__ import annotations
+
+from ..errors import RefusedError
+from ..events import ANALOGUES, OutputValues
+from .diagnostics.texts import STATES
+from .sdo.controller import Controller, lacks_object
+from .sdo.objects import READY, SET_OUTPUTS
+
+_FIRST_ANALOGUE = 3
+"""Subindex of the first analogue output; digital outputs are subs 1 and 2."""
+
+
+def set_outputs(controller: Controller, values: OutputValues) -> None:
+    """Switches the outputs at standstill, with the drives on. They stay until the next start, a stop or a fault.
+    Analogue outputs come first, so that a spindle has its speed when it is switched on.
+
+    Raises RefusedError: axes move, the drives are off, there is no I/O module, or the firmware cannot do this.
+    """
+    try:
+        for i, value in enumerate(values.analogue):
+            controller.write(SET_OUTPUTS, _FIRST_ANALOGUE + i, value)
+        for sub in (1, 2):
+            controller.write(SET_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
+    except RefusedError as error:
+        raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
+
+
+def _reason(controller: Controller, error: RefusedError) -> str:
+    if lacks_object(error):
+        return "its firmware cannot switch outputs at standstill: update it"
+    state = controller.state()
+    if state != READY:
+        return (
+            f"is {STATES.get(state, state)}: outputs are switched at standstill, with the drives on"
+        )
+    return f"has no I/O module in its configuration: {error}"
+
+
+def outputs_of(controller: Controller) -> OutputValues:
+    """The outputs as a program, or `set_outputs`, has switched them last."""
+    digital = controller.read(SET_OUTPUTS, 1) | controller.read(SET_OUTPUTS, 2) << 8
+    analogue = (controller.read(SET_OUTPUTS, _FIRST_ANALOGUE + i) for i in range(ANALOGUES))
+    return OutputValues(digital, tuple(analogue))
