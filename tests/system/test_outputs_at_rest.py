@@ -16,6 +16,8 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.sdo.controller import OFF, READY
 from hodograph.bus.sdo.objects import OUTPUTS, QUICK_STOP, STOP
 from hodograph.cli.main import main
+from hodograph.config import load_machine
+from hodograph.config.outputs import Outputs
 
 SPINDLE, VALVE = 0b100, 0b001
 """Digital outputs of dispenser.toml."""
@@ -39,10 +41,16 @@ def machine(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The dispenser, with outputs that go off at the end."""
     file = tmp_path_factory.mktemp("machine") / "machine.toml"
     text = (EXAMPLES / "machines" / "dispenser.toml").read_text()
-    assert "off_at_end = false" in text or "off_at_end" not in text
     text = text.replace("../drives", str(EXAMPLES / "drives"))
-    file.write_text(text.replace("[outputs]\n", "[outputs]\noff_at_end = true\n"))
+    file.write_text(text.replace("node = 16\n", "node = 16\noff_at_end = true\n"))
+    assert load_outputs(file).off_at_end
     return file
+
+
+def load_outputs(file: Path) -> Outputs:
+    outputs = load_machine(file).outputs
+    assert outputs is not None
+    return outputs
 
 
 @pytest.fixture
