@@ -3,6 +3,8 @@
 
 Where `make` builds both (HODOGRAPH_BUILT_BY_MAKE=1), nothing is compiled: the module lies beside its sources then, and
 the programs in build/bin.
+
+Run by pip and by `make dist`. Starts compilers; writes what they make to the build folder of setuptools.
 """
 
 import os

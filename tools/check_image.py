@@ -3,9 +3,9 @@
 """check_image.py [--soft-float] IMAGE: checks that a linked image keeps the rules of docs/reference/architecture.md.
 
 Run by make after each link. Starts the binary utilities, writes nothing. An image has no heap, no double arithmetic, no
-64-bit division, no float without an FPU, with one no instruction on floats outside the float kernel, and its worst
-stack fits the stack of its linker script. A line for each breach; exit status 1 then. --soft-float is for images that
-compare.
+64-bit division of the compiler's library, no float without an FPU, with one no instruction on floats outside the float
+kernel, and its worst stack fits the stack of its linker script. A line for each breach; exit status 1 then.
+--soft-float is for images that compare.
 """
 
 from __future__ import annotations

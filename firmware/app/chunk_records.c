@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/chunk_records.h (see there): the coefficient records of a job in chunks, made ahead of the tick. Used
- * by app/stream. Main loop; takes the machine's lock where it is needed. Changes its struct and the port's memory for
- * records. */
+ * by app/stream. Main loop; takes the machine's lock where it is needed. Changes its struct, the port's memory for
+ * records, and which of them the motion of the machine uses. */
 #include "app/chunk_records.h"
 
 #include "core/kernel.h"

@@ -5,8 +5,8 @@
  * the main loop stalls for longer than that, the tick has no point: fault 0x6100, and the drives stop by their own
  * ramps.
  *
- * Used by app/stream. Main loop; takes the machine's lock where it is needed. Changes its struct and the port's memory
- * for records.
+ * Used by app/stream. Main loop; takes the machine's lock where it is needed. Changes its struct, the port's memory for
+ * records, and which of them the motion of the machine uses.
  */
 #ifndef APP_CHUNK_RECORDS_H
 #define APP_CHUNK_RECORDS_H

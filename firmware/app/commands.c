@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/commands.h (see there): the commands of objects 0x2001 and 0x2056. Called by app/objects and
- * app/controller. Main loop; command_urgent_request in the receive interrupt. */
+ * app/controller. Main loop, outside the lock, which it takes; commands_execute_urgent within the lock,
+ * command_urgent_request in the receive interrupt. Changes the controller and its machine; sends nothing itself. */
 #include "app/commands.h"
 
 #include <string.h>

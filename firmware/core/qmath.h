@@ -193,7 +193,8 @@ static inline int32_t qmath_clamp32(int64_t a)
     return low == a ? low : (int32_t)((uint32_t)(a >> 63) ^ (uint32_t)INT32_MAX);
 }
 
-/* floor(a / b), b not 0: for targets without a 64-bit division. At most four 32-bit divisions, no loop. */
+/* floor(a / b), b not 0. By at most three 32-bit divisions: the time of the compiler library's 64-bit division
+ * depends on its operands, so an image must not have it (tools/check_image). */
 uint64_t qmath_div_u64(uint64_t a, uint64_t b);
 
 /* The same, rounded up; a + b below 2^64. */

@@ -103,7 +103,8 @@ $(call NOTE,$(BUILD)/firmware/$(1)/obj/list,$(TARGET_SRC))
 endef
 $(foreach t,$(TARGETS) $(BOARDS),$(eval $(call TARGET_RULES,$(t))))
 
-# What each image is asked after it is linked: no heap, no double, no soft float, no 64-bit division; a stack that fits.
+# What each image is asked after it is linked: no heap, no double, no soft float, no 64-bit division of the compiler's
+# library; a stack that fits.
 IMAGE_CHECK := tools/check_image.py firmware/targets/stack.toml $(addprefix tools/analysis/,effects.py forbidden.py image.py stack.py)
 
 # A board's linker script may lie in the folder of its port; an image that wants another memory has one of its own.

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * The kernels that are linked: fixed always, float and double unless HODOGRAPH_KERNEL_FLOAT or HODOGRAPH_KERNEL_DOUBLE is
- * 0. By default a Cortex-M has float where its FPU has single precision, and no double; every other target has all three.
+ * 0. By default a Cortex-M has float where its FPU has single precision, and no double; every other target has all three. Compiled into the library, in
+ * place of firmware/core/kernels_all.c; used by core/kernel. Constant data.
  */
 #include "hodograph/kernel.h"
 

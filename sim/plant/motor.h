@@ -7,8 +7,8 @@
  *
  * Over one step of h seconds with constant volts the solution is linear in the state and in the
  * volts; motor_init computes its coefficients once, by power series (no libm, so they have the same
- * bits everywhere). Derivation: docs/theory/drives.md section 13. All functions are pure; call them from
- * any context.
+ * bits everywhere). Derivation: docs/theory/drives.md section 13. Any thread. No I/O: the functions change only the
+ * structs that they are given.
  */
 #ifndef HODOGRAPH_PLANT_MOTOR_H
 #define HODOGRAPH_PLANT_MOTOR_H

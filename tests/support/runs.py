@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Compares `run --json` on a bus with `simulate --json` without one, for the same motion. Used by tests/system. Starts
-simulated machines.
+"""Compares the output of `run --json` on a bus with that of `simulate --json`, for the same motion. Used by
+tests/system, which makes both outputs. No I/O.
 """
 
 from __future__ import annotations

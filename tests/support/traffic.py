@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Traffic of a machine as the bus would show it, made from `simulate`. Used by the tests of the live page. No I/O."""
+"""Traffic of a machine as the bus would show it, made from `simulate`. Used by the tests of the live page. Reads an
+example.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def test_the_counts_of_a_run_are_those_of_the_next() -> None:
 
 
 def test_a_tick_does_one_thing_with_the_override() -> None:
-    """docs/validation/wcet.md: none that begins a ramp goes on with one, or does a step of a search."""
+    """docs/validation/wcet.md: a *begins* tick has no step of a ramp or of a search."""
     counter = Counter(BUILD, TARGETS["an386"], functions=True)
     programs = b"".join(worst_case.image(a) for a in worst_case.ADVERSARIES)
     counts = counter.count("float", programs, worst_case.restless())

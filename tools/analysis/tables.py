@@ -307,11 +307,11 @@ def worst_of(rows: Iterable[Figures]) -> int:
 
 
 _KINDS = {
-    "steady": "steady, or found to be",
-    "moves": "the override changes",
-    "chooses": "chooses",
-    "looks": "evaluates a window",
-    "begins": "begins a ramp",
+    "steady": "*steady*",
+    "moves": "*ramp*",
+    "chooses": "*decides*",
+    "looks": "*searches*",
+    "begins": "*begins*",
 }
 
 

@@ -4,7 +4,7 @@
  * is sent. Used by app/machine and app/tick.
  *
  * Guarded by the port's lock: written by the receive and timer interrupts, read by the main loop in a critical section.
- * Positions in counts.
+ * Positions in counts. No I/O.
  */
 #ifndef APP_MACHINE_AXIS_H
 #define APP_MACHINE_AXIS_H

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A recording as a bus would give it, made of a simulated run and noise. Used by the tests of this folder. No I/O."""
+"""A recording as a bus would give it, made of a simulated run and noise. Used by the tests of this folder. Reads
+path and machine files of the examples.
+"""
 
 from __future__ import annotations
 
