@@ -124,7 +124,9 @@ class Controller:
         self._node.command(RESUME)
 
     def stop(self) -> None:
-        """Controlled stop: waits for the standstill on the path; the program ends. Without effect at standstill."""
+        """Controlled stop: waits for the standstill on the path; the program ends. At standstill it ends a job of
+        another client that rests, and switches the outputs off.
+        """
         self._node.stop_and_wait()
 
     def reset(self) -> bool:
@@ -168,7 +170,7 @@ class Controller:
         operator   is called with the place and the code where the job waits for the operator (M0, M1, tool change), and
                    returns when the job may continue. None: such a job is refused before anything moves
 
-        All sections are planned before the first one moves. A fault, a stop or a hold ends the job. Raises InputError,
+        All sections are planned before the first one moves. A fault, a stop (also at rest) or a hold ends the job. Raises InputError,
         PlanError, and the errors of `run`.
         """
         made = prepared(job._job, job.machine._file.kernel)

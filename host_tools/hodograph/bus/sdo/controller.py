@@ -445,8 +445,8 @@ class Controller(Node):
         return f"{self.who()}: a stop was commanded while the axes stood: the job ends here"
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
-        """Controlled stop on the path; returns when the axes stand."""
-        self.command(STOP)  # without effect at standstill
+        """Controlled stop on the path; returns when the axes stand. At standstill it switches the outputs off."""
+        self.command(STOP)
         self.wait_for((BOOT, OFF, READY), wait_s)
 
     def stop_after(self, error: BaseException) -> None:
