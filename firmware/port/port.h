@@ -11,8 +11,8 @@
  *   main loop  main(): everything that may wait
  * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each
  * other nor a critical section of the main loop, so data shared with the main loop needs no other
- * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
- * `receive`.) On Linux one thread stands for both interrupts.
+ * guard. (A board whose timer interrupt may preempt its receive interrupt masks the timer interrupt around each call of
+ * `receive`; port_lock() is for the main loop only.) On Linux one thread stands for both interrupts.
  *
  * Errors: 0 or a negative PORT_ERR_... Only port_wait() sleeps. port_lock() waits for a handler that runs (Linux).
  * port_store_erase() and port_store_write() return when the memory has finished, which takes 22 ms for a page of the
@@ -144,9 +144,9 @@ void port_progress(void);
 
 uint32_t port_store_size(unsigned bank); /* bytes of a bank; equal in a pair */
 
-/* Erases a bank, its last 16 bytes first; then writes go in ascending order. One gap is allowed: before the last 16
- * bytes, which are written at once. Written data can be read at multiples of 8 bytes, and after the last write. 0 or
- * PORT_ERR_STORE. */
+/* port_store_erase: erases a bank, its last 16 bytes first. port_store_write: the caller writes at ascending offsets
+ * without gaps. Only before the last 16 bytes, which it writes by one call, there may be a gap. Between two writes the
+ * data below the last whole multiple of 8 bytes can be read, after the last write all. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 
