@@ -96,11 +96,12 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us);
  * the timer has already loaded that interval. Main loop, in a critical section. */
 void port_tick_period(uint32_t period_us);
 
-/* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
- * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler: all drives have
- * answered), at the latest until guard_us after the start of the present tick. It is late if this is after its due
- * time. While the host as a whole stalls the guard time does not run. At fast pace the next tick starts, if `hurry`, as
- * soon as port_tick_ready() is called. A board, whose timer knows nothing but the clock, ignores both. */
+/* For simulated drives, which run on a host that may stall, and can be faster than the clock. A tick that calls
+ * port_tick_await() makes the next tick wait for port_tick_ready(), which the receive handler calls when all drives have
+ * answered. The wait ends guard_us after the start of the present tick at the latest; while the host as a whole stalls,
+ * this time does not run. If the wait goes beyond the due time of the next tick, that tick is late. At fast pace, and if
+ * `hurry`, the next tick starts as soon as port_tick_ready() is called, before its due time. A board, whose timer knows
+ * nothing but the clock, ignores both calls. */
 void port_tick_await(uint32_t guard_us, bool hurry); /* timer */
 void port_tick_ready(void);                          /* receive */
 
