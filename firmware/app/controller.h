@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * controller: CANopen node 1: connects machine, tick, protocol objects and port. Used by app/main.c. The functions
- * start the port, send frames, and change the one controller.
+ * controller: the controller as a CANopen node: connects machine, tick, protocol objects and port. Used by app/main.c.
+ * The functions start the port, send frames, and change the one controller.
  *
  *     static struct controller controller;        the only instance lives in main
  *     controller_init(&controller, port_node_id());

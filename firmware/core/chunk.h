@@ -36,7 +36,11 @@
 #define CHUNK_REST_OPTIONAL 2u /* an optional one */
 #define CHUNK_REST_TICKS    8u /* the shortest rest before a chunk with flag REST */
 #define CHUNK_TIME_UNKNOWN  UINT32_MAX
-/* With this number of shared pieces, that of the longest window, look-ahead never delays the takeover. */
+/* Pieces of the longest look-ahead window (core/override_plan.h). With so many shared pieces a ramp that keeps the
+ * bounds of a window evaluated before the shared part ends before the joint, and does not delay the takeover. Two kinds
+ * of ramps may still end after the joint: those for which no window is long enough, which keep the least bounds of the
+ * program, and those whose window was evaluated in the shared part. They delay the takeover until their own end, or
+ * until the rest at the end of the tail. */
 #define CHUNK_SHARED_PIECES 16u
 
 struct chunk {

@@ -62,9 +62,9 @@ struct feed_override {
     int64_t left_q30;                 /* ticks at override 1 until the deadline */
 };
 
-/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42),
- * running, override 100 %. period_us: 1000, 2000, 4000 or 8000. Reads all pieces: main loop only. The program must not
- * change. */
+/* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42 of
+ * core/program_time.h, which the shared library does not export), running, override 100 %. period_us: 1000, 2000, 4000
+ * or 8000. Reads all pieces: main loop only. The program must not change. */
 void feed_override_begin(struct feed_override *f, const struct program *p, uint32_t period_us,
                          uint64_t time_q42_s);
 
@@ -112,8 +112,9 @@ int feed_override_may_take_over(const struct feed_override *f, const struct inte
 /* Takes over: from the next tick on the motion follows the next chunk, which chunk_check has accepted after the one
  * under way. `window` has records of it for the same kernel.
  *   in motion                 Accepted if all setpoints up to the joint are those of the program under way, bit for
- *                             bit. So refused during a path stop, after the joint, while a ramp is searched, and on a
- *                             ramp that was decided with pieces after the joint.
+ *                             bit. So refused during a path stop, after the joint, and while the override is constant
+ *                             but not yet at its command. On a ramp: refused while the next ramp is searched, above
+ *                             the guaranteed override, and if the ramp may end after the joint.
  *   at standstill             (held, or at the end of the tail) The motion continues from the same arc length, with the
  *                             override from 0, when it is running and the place is found.
  *   a chunk beginning at rest At the end of its predecessor, while running. The next tick gives its first setpoint.

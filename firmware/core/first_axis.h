@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * first_axis: which axes of a machine a program moves (docs/reference/protocol.md 1.1.1). Axis i of the program is axis
- * first_axis + i of the machine's path. All others hold their position. 0: a path of x, y, z and the extra axes. More
- * than 0: a path of rotary axes alone, whose unit of length is the degree. Used by firmware/app, core/chunk,
+ * first_axis + i of the machine's path. All others hold their position. 0: a path that moves x, y
+ * or z. More than 0: only extra axes move; if they are rotary, its unit of length is the degree. Used by firmware/app, core/chunk,
  * core/program_check and sim/offline/offline. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_FIRST_AXIS_H

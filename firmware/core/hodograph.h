@@ -13,6 +13,7 @@
  *               (or coefficients_make and coefficients_attach: by a sink, for flash)
  *               interpolator_begin           the cursor on the curve
  *               feed_override_begin          the motion: at rest, at a program time, override 100 %
+ *               feedforward_begin            of each axis, where drives take offsets
  *   tick        feed_override_next           the next setpoint, as a point in mm
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
@@ -36,7 +37,12 @@
  *               feed_override_take_over *    1: the next chunk is the program under way
  *               coefficient_cache_used       after this 1
  *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
- *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us   state at the last setpoint
+ *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us, _saturated, _actual_q30
+ *                                            state at the last setpoint; they need the tick held off, too
+ *   main loop, as needed, with an interpolator that no motion uses:
+ *               interpolator_seek, interpolator_at, interpolator_at_q42, interpolator_at_arc_length   points of the path
+ *               interpolator_ends            its first and last point
+ *               program_segment_get, program_piece_get, program_stop_get, program_ticks   what the image contains
  *
  * ## Context
  *

@@ -11,8 +11,8 @@
  *   main loop  main(): everything that may wait
  * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each
  * other nor a critical section of the main loop, so data shared with the main loop needs no other
- * guard. (A board whose timer interrupt may preempt its receive interrupt takes the lock around
- * `receive`.) On Linux one thread stands for both interrupts.
+ * guard. (A board whose timer interrupt may preempt its receive interrupt masks the timer interrupt around each call of
+ * `receive`; port_lock() is for the main loop only.) On Linux one thread stands for both interrupts.
  *
  * Errors: 0 or a negative PORT_ERR_... Only port_wait() sleeps. port_lock() waits for a handler that runs (Linux).
  * port_store_erase() and port_store_write() return when the memory has finished, which takes 22 ms for a page of the
@@ -96,11 +96,12 @@ int port_start(const struct port_handlers *handlers, uint32_t period_us);
  * the timer has already loaded that interval. Main loop, in a critical section. */
 void port_tick_period(uint32_t period_us);
 
-/* Simulated drives run on a host that may stall, and can be faster than the clock. After a tick that calls
- * port_tick_await() the next one waits until port_tick_ready() is called (from the receive handler: all drives have
- * answered), at the latest until guard_us after the start of the present tick. It is late if this is after its due
- * time. While the host as a whole stalls the guard time does not run. At fast pace the next tick starts, if `hurry`, as
- * soon as port_tick_ready() is called. A board, whose timer knows nothing but the clock, ignores both. */
+/* For simulated drives, which run on a host that may stall, and can be faster than the clock. A tick that calls
+ * port_tick_await() makes the next tick wait for port_tick_ready(), which the receive handler calls when all drives have
+ * answered. The wait ends guard_us after the start of the present tick at the latest; while the host as a whole stalls,
+ * this time does not run. If the wait goes beyond the due time of the next tick, that tick is late. At fast pace, and if
+ * `hurry`, the next tick starts as soon as port_tick_ready() is called, before its due time. A board, whose timer knows
+ * nothing but the clock, ignores both calls. */
 void port_tick_await(uint32_t guard_us, bool hurry); /* timer */
 void port_tick_ready(void);                          /* receive */
 
@@ -144,9 +145,9 @@ void port_progress(void);
 
 uint32_t port_store_size(unsigned bank); /* bytes of a bank; equal in a pair */
 
-/* Erases a bank, its last 16 bytes first; then writes go in ascending order. One gap is allowed: before the last 16
- * bytes, which are written at once. Written data can be read at multiples of 8 bytes, and after the last write. 0 or
- * PORT_ERR_STORE. */
+/* port_store_erase: erases a bank, its last 16 bytes first. port_store_write: the caller writes at ascending offsets
+ * without gaps. Only before the last 16 bytes, which it writes by one call, there may be a gap. Between two writes the
+ * data below the last whole multiple of 8 bytes can be read, after the last write all. 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 

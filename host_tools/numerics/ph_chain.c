@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements numerics/ph_chain.h (see there). Called by host_tools/hodograph/native. Writes the caller's arrays only;
- * any thread. */
+/* Implements numerics/ph_chain.h (see there): places by arc length on a chain of Pythagorean-hodograph segments, and
+ * derivatives there. Called by host_tools/hodograph/native. Writes the caller's arrays only; any thread. */
 #include "numerics/ph_chain.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* scaling: bus counts per mm of a simulated drive, from encoder resolution 0x608F, gear ratio 0x6091 and feed constant
  * 0x6092 (CiA 402-2). Each function checks a write to one object, applies it to the axis, and returns an SDO abort code
- * or SDO_OK; the dictionary stores the value of the object afterwards. Used by node/drive_od. All in one context.
- * Changes the axis that it is given; no I/O.
+ * or SDO_OK; the dictionary stores the value of the object afterwards. Used by node/drive_od. The one thread of
+ * hodograph-drive. Changes the axis that it is given; no I/O.
  */
 #ifndef NODE_SCALING_H
 #define NODE_SCALING_H

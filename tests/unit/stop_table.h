@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* stop_table: the stop table of an image that a test has made, with the bounds that the check requires. Used by the
- * other images of this folder. Changes the image only. */
+/* stop_table: the stop table of a program image that a test has made, with the bounds that core/stop_check requires.
+ * Used by app_image.c, chunk_image.c, chunked.c and override_program.c of this folder. Changes the image and the header
+ * of the opened program; no I/O. */
 #ifndef TESTS_UNIT_STOP_TABLE_H
 #define TESTS_UNIT_STOP_TABLE_H
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * drive_configuration: the operations that configure one drive, or the I/O module, in their order: reads and writes of
- * its object dictionary (CiA 301, CiA 402-2, docs/reference/protocol.md section 2). The table in drive_configuration.c
- * has a row for each object or PDO. drive_boot executes the operations.
+ * its object dictionary (CiA 301, CiA 402-2, docs/reference/protocol.md section 3.1). The table in
+ * drive_configuration.c has a row for each object or PDO. drive_boot executes the operations.
  *
  *     drive_configuration_begin(&configuration, &config, axis, &properties);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/stm32g4/irq.h (see there): the two interrupts of the controller, and the port's lock. Used by
- * port_stm32g4.c and vectors.c. Main loop, except the handlers and irq_period (tick). Switches the interrupts on and
- * off by cpu, tick_timer and fdcan, and calls the handlers of the application. */
+ * port_stm32g4.c and vectors.c. Main loop, except the handlers. Switches the interrupts on and off by cpu, tick_timer
+ * and fdcan, and calls the handlers of the application. */
 #include "port/stm32g4/irq.h"
 
 #include "port/stm32g4/cpu.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * irq: the two interrupts of the controller, and how they exclude each other. Used by port_stm32g4.c and vectors.c.
- * Main loop, except the handlers and irq_period (tick). Switches the interrupts on and off by cpu, tick_timer and
- * fdcan, and calls the handlers of the application.
+ * Main loop, except the handlers. Switches the interrupts on and off by cpu, tick_timer and fdcan, and calls the
+ * handlers of the application.
  *
  *     TIM2        priority 1: the tick
  *     FDCAN1 IT0  priority 2: frames that came, the next ones to send, bus-off
@@ -25,7 +25,7 @@ void irq_start(struct fdcan *can, const struct port_handlers *handlers, uint32_t
 /* Both off. Main loop. */
 void irq_stop(void);
 
-/* From the next tick on. Main loop, or the tick. */
+/* From the next tick on. Main loop, in a critical section. */
 void irq_period(uint32_t period_us);
 
 /* Number of ticks since irq_start. Main loop. */
