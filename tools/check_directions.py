@@ -117,7 +117,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("native.override_headroom", "native.quadratic_program"),
     },
     "config": {"errors", "names", "events", "feed", "spline", "fixed_point"},
-    "toolpath": {"errors", "names", "spline", "native"},
+    "toolpath": {"errors", "names", "events", "spline", "native"},
     "native": {"errors", "names", "events", "config", "native.library", "fixed_point"},
     "program": {"errors", "names", "events", "spline", "feed", "native", "fixed_point"},
     "simulate": {"errors", "names", "events", "config", "native", "program", "fixed_point"},
@@ -144,6 +144,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         "fixed_point",
     },
     "bus": {
+        "events",
         "bus.address",
         "bus.clock",
         "bus.diagnostics",
@@ -183,7 +184,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "job_simulation": {"errors", "job", "simulate"},
     "job_view": {"job", "toolpath"},
     "job_run": {
-        *("errors", "config", "native", "program", "bus", "toolpath"),
+        *("errors", "events", "config", "native", "program", "bus", "toolpath"),
         *("job", "job_simulation"),
     },
     "stream": {

@@ -13,6 +13,7 @@
  *               (or coefficients_make and coefficients_attach: by a sink, for flash)
  *               interpolator_begin           the cursor on the curve
  *               feed_override_begin          the motion: at rest, at a program time, override 100 %
+ *               (program_time_at_q42: the program time of an arc length, to start inside the path)
  *               feedforward_begin            of each axis, where drives take offsets
  *   tick        feed_override_next           the next setpoint, as a point in mm
  *               counts_from_q40_mm           the same in counts, for the bus
@@ -154,6 +155,7 @@ extern "C" {
 #include "core/kernel.h"
 #include "core/program.h"
 #include "core/program_check.h"
+#include "core/program_time.h"
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* program_time: the program time at which a program reaches an arc length: the inverse of F, for a start inside the
- * program. Used by app/machine/motion. Pure, main loop. */
+ * program. Used by app/machine/motion, and by applications that take the core as a library. Pure, main loop. */
 #ifndef HODOGRAPH_CORE_PROGRAM_TIME_H
 #define HODOGRAPH_CORE_PROGRAM_TIME_H
 

@@ -414,3 +414,8 @@ def test_a_part_of_a_section_begins_where_it_is_asked_for(tmp_path: Path, machin
         points = stream.run(60_000, until_rest=True)
     length_q40 = round(sum(block.curve.length_mm for block in blocks) * 2**40)
     assert abs(int(points["arc_length_q40_mm"][-1]) - length_q40) < 2**12
+
+
+def test_the_shared_pieces_are_those_of_the_core() -> None:
+    header = (Path(__file__).parents[3] / "firmware" / "core" / "chunk.h").read_text()
+    assert f"#define CHUNK_SHARED_PIECES {LEAST_SHARED_PIECES}u\n" in header
