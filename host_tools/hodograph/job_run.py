@@ -28,9 +28,9 @@ from .bus.run import (
     bring_up,
     record_program,
 )
-from .bus.sdo.controller import FAULT_STATE, READY
+from .bus.sdo.controller import FAULT_STATE, READY, Controller
 from .config import Machine
-from .errors import PlanError, RunError
+from .errors import PlanError, RefusedError, RunError
 from .events import OutputValues
 from .job import Job, JobSection
 from .job_simulation import JobMotion
@@ -151,8 +151,8 @@ def run_job(
     end.
     Raises RefusedError, BusError and RunError, naming file and line.
     """
-    bring_up(at, made.job.machine, made.kernel)
     with at.controller.ending_at_stops():
+        bring_up(at, made.job.machine, made.kernel)
         return _run_sections(at, made, operator, progress, record, unhomed=unhomed)
 
 
@@ -247,7 +247,7 @@ def execute_at_rest(
     for command in commands:
         report_messages(at, file, [command])
         if isinstance(command, SwitchedAtRest):
-            set_outputs(at.controller, command.values)
+            _switch(at.controller, command.values)
         if isinstance(command, Dwell):
             _dwell(at, command.duration_s)
         for line, code in operator_stops_of([command]):
@@ -264,7 +264,19 @@ def end_outputs(at: RunSession, machine: Machine) -> None:
     did not, if the job went on at rest after it.
     """
     if goes_off_at_end(machine):
-        set_outputs(at.controller, OutputValues())
+        _switch(at.controller, OutputValues())
+
+
+def _switch(controller: Controller, values: OutputValues) -> None:
+    """Switches the outputs at a rest. Raises RunError: a stop came, perhaps just before. Then they are on again, until
+    the job that ends stops too (`stop_after`).
+    """
+    try:
+        set_outputs(controller, values)
+    except RefusedError:
+        controller.require_no_stop()  # a quick stop has switched the drives off
+        raise
+    controller.require_no_stop()
 
 
 def report_messages(at: RunSession, file: Path, commands: Sequence[Command]) -> None:

@@ -13,11 +13,17 @@ import pytest
 from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
+from hodograph.bus.run import RunSession, bring_up
 from hodograph.bus.sdo.controller import OFF, READY
-from hodograph.bus.sdo.objects import OUTPUTS, QUICK_STOP, STOP
+from hodograph.bus.sdo.objects import DISABLE, ENABLING, OUTPUTS, QUICK_STOP, STOP
+from hodograph.cli.bus_commands import stopping
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.config.outputs import Outputs
+from hodograph.errors import RunError
+from hodograph.events import OutputValues
+from hodograph.job_run import BusCheck, execute_at_rest
+from hodograph.toolpath.moves import SwitchedAtRest
 
 SPINDLE, VALVE = 0b100, 0b001
 """Digital outputs of dispenser.toml."""
@@ -130,6 +136,79 @@ def test_a_stop_in_a_dwell_of_a_run_ends_it(
         assert bench.controller.read(OUTPUTS, 1) == 0
         assert process.wait() == 6, process.err
     assert bench.controller.targets(1) == [6_000_000]
+
+
+def test_an_error_before_the_first_move_switches_the_outputs_off(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    """Here standard input ends at a program stop. No axis has moved."""
+    file = job(tmp_path, "F6000\nM3 S40\nM0\nG1 X6\nM30\n")
+    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
+    with running(clock, "stream", *words, name="stream") as command:
+        assert SPINDLE in [one for one, _ in outputs_meanwhile(bench, clock, command)]
+        assert command.wait() == 2, command.err
+    clock.sleep(0.1)
+    assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+def test_outputs_that_are_on_at_the_start_of_a_short_section_are_recorded(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    """The frame of the outputs is sent once in 64 ticks while they stay as they are."""
+    file = job(tmp_path, "F6000\nM3 S40\nG4 P0.2\nG1 X0.01\nG4 P0.2\nG1 X0\nM30\n")
+    assert main(["run", file, "--machine", str(machine)]) == 0
+
+
+@pytest.mark.parametrize("command", [STOP, QUICK_STOP, DISABLE])
+def test_a_stop_just_before_outputs_are_switched_ends_the_job(
+    bench: Bench, command: int, machine: Path
+) -> None:
+    """The outputs that were switched on after it go off with the job."""
+    at = RunSession(bench.controller, None, None)
+    on = SwitchedAtRest(3, OutputValues(VALVE))
+
+    def no_operator(_: str, __: BusCheck) -> None: ...
+
+    def stopped() -> None:
+        with stopping(at.controller), at.controller.ending_at_stops():
+            bring_up(at, bench.machine, "fixed")
+            at.controller.command(command)
+            execute_at_rest(at, machine, [on], no_operator)
+
+    with pytest.raises(RunError, match="a stop was commanded"):
+        stopped()
+    bench.clock.sleep(0.1)
+    assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+def test_a_stop_while_the_drives_are_switched_on_ends_the_job(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    with running(clock, "run", job(tmp_path), "--machine", str(machine), name="run") as command:
+        while bench.controller.state() != ENABLING:
+            clock.sleep(0.001)
+        bench.controller.command(STOP)
+        begun_s = clock.now_s()
+        assert command.wait() == 6, command.err
+        assert "a stop was commanded" in command.err
+    assert clock.now_s() < begun_s + 1.0
+
+
+def test_the_end_of_a_file_is_executed_where_it_ends(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    """Not at the start of the next one; its messages name its own file."""
+    first, second = tmp_path / "first.ngc", tmp_path / "second.ngc"
+    first.write_text("F6000\nG1 X6\nG4 P0.3\n(MSG,glue)\nM64 P0\nG4 P0.3\nM65 P0\nM30\n")
+    second.write_text("F6000\nG4 P0.3\nG1 X2\nM30\n")
+    words = (str(first), str(second), "--machine", str(machine))
+    journal = str(tmp_path / "stream.json")
+    with running(clock, "stream", *words, "--journal", journal, name="stream") as command:
+        seen = outputs_meanwhile(bench, clock, command)
+        assert command.wait() == 0, command.err
+        assert f"{first}:4: glue" in command.err
+    assert seen == [(0, 0), (VALVE, 6000), (0, 6000)]
+    assert bench.controller.targets(1) == [2_000_000]
 
 
 def test_switching_by_hand(

@@ -516,13 +516,15 @@ static void test_outputs_at_standstill_end_with_a_stop(void)
         TEST_ASSERT_EQUAL_HEX16(0, digital());
         TEST_ASSERT_EQUAL_INT16(0, analogue(1));
     }
-    setUp();
-    configure(4, KEPT_AT_STOP, 1);
-    make_ready();
-    set_lamp_and_speed();
-    command(COMMAND_STOP);
-    app_bench_periods(&bench, 3);
-    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    for (uint32_t at_end = 0; at_end <= OFF_AT_END; at_end += OFF_AT_END) {
+        setUp();
+        configure(4, KEPT_AT_STOP | at_end, 1);
+        make_ready();
+        set_lamp_and_speed();
+        command(COMMAND_STOP);
+        app_bench_periods(&bench, 3);
+        TEST_ASSERT_EQUAL_HEX16(at_end != 0u ? 0 : LAMP | VALVE, digital());
+    }
 }
 
 static void test_outputs_at_standstill_need_it(void)
@@ -554,6 +556,23 @@ static void test_outputs_stay_at_the_end_once(void)
     app_bench_periods(&bench, 2);
     TEST_ASSERT_EQUAL_HEX16(0, digital());
     set_lamp_and_speed(); /* OFF_AT_END concerns the end alone */
+}
+
+/* Also if a feed hold begins where the motion is over: the job of the host goes on. */
+static void test_outputs_stay_at_an_end_in_a_hold(void)
+{
+    configure(4, OFF_AT_END, 1);
+    make_ready();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, 1, 1));
+    start();
+    while (!motion_over(&bench.controller.machine.motion)) {
+        app_bench_period(&bench);
+    }
+    command(COMMAND_HOLD);
+    TEST_ASSERT_EQUAL_INT(MACHINE_HOLDING, bench.controller.machine.state);
+    (void)app_bench_until(&bench, MACHINE_READY, 1000);
+    app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+    TEST_ASSERT_EQUAL_HEX16(LAMP, digital());
 }
 
 static void test_outputs_that_stay_at_the_end_go_off_at_a_stop(void)
@@ -588,6 +607,7 @@ int main(void)
     RUN_TEST(test_outputs_at_standstill_end_with_a_stop);
     RUN_TEST(test_outputs_at_standstill_need_it);
     RUN_TEST(test_outputs_stay_at_the_end_once);
+    RUN_TEST(test_outputs_stay_at_an_end_in_a_hold);
     RUN_TEST(test_outputs_that_stay_at_the_end_go_off_at_a_stop);
     RUN_TEST(test_start_from_a_place_has_all_events_before_it);
     RUN_TEST(test_delay_by_ticks);

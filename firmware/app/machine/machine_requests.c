@@ -85,6 +85,14 @@ enum machine_refusal machine_quick_stop(struct machine *machine)
     return MACHINE_ACCEPTED;
 }
 
+/* Whether the outputs stay on at a stop at standstill. It also ends the job whose end would switch them off. */
+static bool outputs_stay_at_stop(const struct machine *machine)
+{
+    const uint32_t behaviour = machine->config.outputs.behaviour;
+    return (behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) != 0u &&
+           (behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u;
+}
+
 enum machine_refusal machine_request_stop(struct machine *machine)
 {
     machine->stop_commands++;
@@ -96,8 +104,7 @@ enum machine_refusal machine_request_stop(struct machine *machine)
         return machine_disable(machine);
     } else if (machine->state == MACHINE_HOMING) {
         return machine_quick_stop(machine);
-    } else if (machine->state == MACHINE_READY &&
-               (machine->config.outputs.behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) == 0u) {
+    } else if (machine->state == MACHINE_READY && !outputs_stay_at_stop(machine)) {
         path_outputs_clear(&machine->motion.outputs);
     }
     return MACHINE_ACCEPTED;

@@ -27,14 +27,15 @@ static enum outputs_mode follow_or(bool follow, enum outputs_mode otherwise)
 }
 
 /* Whether this is the first tick after a motion whose end switches the outputs off. A host can switch them on again at
- * standstill. */
+ * standstill. A feed hold that begins just before the end changes nothing. */
 static bool ends_now(enum machine_state before, const struct machine *machine)
 {
     if (before == MACHINE_READY ||
         (machine->config.outputs.behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u) {
         return false;
     }
-    return before != MACHINE_RUNNING || !machine->outputs_stay;
+    const bool at_end = before == MACHINE_RUNNING || before == MACHINE_HOLDING;
+    return !at_end || !machine->outputs_stay;
 }
 
 static enum outputs_mode mode_of(enum machine_state before, const struct machine *machine)

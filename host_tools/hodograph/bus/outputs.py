@@ -21,6 +21,7 @@ def set_outputs(controller: Controller, values: OutputValues) -> None:
 
     Raises RefusedError: axes move, the drives are off, there is no I/O module, or the firmware cannot do this.
     """
+    controller.acted = True
     try:
         for i, value in enumerate(values.analogue):
             controller.write(SET_OUTPUTS, _FIRST_ANALOGUE + i, value)

@@ -46,6 +46,10 @@ _MARGIN_TICKS = 50
 """Ticks recorded beyond the necessary ones, so that late answers differ from lost ones."""
 _REST_TICKS = 10
 """Time recorded before the start: `hodograph identify` needs the rest before a motion."""
+_OUTPUTS_TICKS = 80
+"""The same on a machine with outputs: outputs that are on at rest are in the recording, which has one frame of them in
+64 ticks.
+"""
 
 FULL_OVERRIDE = 100
 """Feed override with which programs and jobs begin, per cent."""
@@ -138,8 +142,8 @@ def run_program(
     whole = on or machine
     if start is None:
         start = NativeProgram(image).counts_at(kernel, machine.path_counts)
-    bring_up(at, whole, kernel)
     with at.controller.ending_at_stops():
+        bring_up(at, whole, kernel)
         goto(at.controller, whole, start, unhomed=unhomed)
         recorded = record_program(at, machine, image, progress, unhomed=unhomed)
     return analysed(at, machine, image, kernel, recorded, record)
@@ -185,7 +189,7 @@ def record_program(
     controller = at.controller
     controller.upload(image)
     with Recorder(controller.address) as recorder:
-        _await_syncs(controller, _REST_TICKS)
+        _await_syncs(controller, _REST_TICKS if machine.outputs is None else _OUTPUTS_TICKS)
         begun_s = controller.clock.now_s()
         controller.start(unhomed=unhomed, image=image, outputs_stay=outputs_stay)
         _follow(at, progress)

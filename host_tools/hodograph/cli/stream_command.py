@@ -269,6 +269,7 @@ def _run(
         plan = None if begin is None else stack.enter_context(planned(begin))
         recording = stack.enter_context(recorded(options.record, job.machine, address))
         at = stack.enter_context(session(job.machine, address, options))
+        stack.enter_context(at.controller.ending_at_stops())
         bring_up(at, job.machine, kernel, options.override)
         if isinstance(start, Nearest):
             _require_at(at, job.machine, start, unhomed=options.unhomed)

@@ -89,12 +89,21 @@ class PlanRests:
         return str(self.count) if self.first is None else f"{self.count}, the first at {self.first}"
 
 
+@dataclass(frozen=True)
+class Ending:
+    """Commands at rest at the end of a file that is followed by another one."""
+
+    file: Path
+    commands: tuple[Command, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class PlannedSection:
     """A section of the plan.
 
     number       in the job, over all files
     before       commands at rest before it
+    ending       those at the end of the file before, where the axes stand before they move to this section
     start_q40    arc length of the controller's job at its start
     rest         what the controller does at rest before it; None: a job of the controller begins with it
     standing_mm  positions of the axes before those of its programs, without the work offset
@@ -107,6 +116,7 @@ class PlannedSection:
     start_q40: int = 0
     rest: Rest | None = None
     standing_mm: tuple[float, ...] = ()
+    ending: Ending | None = None
 
 
 class _EndedError(Exception):
@@ -247,7 +257,8 @@ class JobPlan:
     def _wait_s(self, section: PlannedSection) -> float:
         """Standstill before a section in s, without the time of program stops."""
         if section.rest is None:
-            return dwell_s(section.before)
+            ending_s = 0.0 if section.ending is None else dwell_s(section.ending.commands)
+            return ending_s + dwell_s(section.before)
         period_us = self._job.machine.period_us
         return 1e-6 * period_us * section.rest.ticks(period_us)
 
@@ -336,22 +347,24 @@ class JobPlan:
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         """The chunks of all files, with their sections and their new motion in s."""
         number = 0
+        ending: Ending | None = None
         for file in self._job.files:
-            carried, self.after = self.after, ()
+            self.after = ()
             if is_toolpath(file):
-                number = yield from self._toolpath(file, number, carried)
+                number = yield from self._toolpath(file, number, ending)
                 if self._ending:
                     return
             else:
-                yield from self._paths(file, number, carried)
+                yield from self._paths(file, number, ending)
                 number += len(load_paths(file))
+            ending = Ending(file, self.after)
 
     def _toolpath(
-        self, file: Path, number: int, carried: tuple[Command, ...]
+        self, file: Path, number: int, ending: Ending | None
     ) -> Generator[tuple[PlannedSection, Chunk, float], None, int]:
         """The chunks of a toolpath, the first section of which is `number`. Returns the number after the last.
 
-        carried  commands at rest before its first section, from the file before
+        ending  of the file before
         """
         place: JobPlace | None = None
         first = number
@@ -361,11 +374,16 @@ class JobPlan:
             blocks = blocks_from(section.blocks, begin_q40 * MM_PER_Q40, switched)
             block = next(blocks, None) if number >= self._begin.section else None
             if block is not None:
-                before = () if begin_q40 else (*carried, *section.before)
+                before = () if begin_q40 else section.before
                 if number == self._begin.section and (begin_q40 or number > first):
                     before = _switched_first(section, before, switched.at_rest, block.events)
                 made = PlannedSection(
-                    number, file, section.first_line, before, standing_mm=section.standing_mm
+                    number,
+                    file,
+                    section.first_line,
+                    before,
+                    standing_mm=section.standing_mm,
+                    ending=None if begin_q40 else ending,
                 )
                 if place is None:
                     first = number
@@ -386,7 +404,7 @@ class JobPlan:
                 place = yield from self._chunks_of(made, chunks)
             elif not self._skip(section, switched):
                 return number
-            carried = ()
+            ending = None
             number += 1
         self.after = reader.after
         return number
@@ -421,7 +439,7 @@ class JobPlan:
         return ParallelReader(reader) if self._processes > 1 else reader
 
     def _paths(
-        self, file: Path, number: int, carried: tuple[Command, ...]
+        self, file: Path, number: int, ending: Ending | None
     ) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         """The paths of a path file as sections, the first with this number."""
         begin = self._begin
@@ -431,9 +449,10 @@ class JobPlan:
         for made in job.chunks(first, begin_q40):
             header = made.chunk.header
             before, start_q40 = made.before, header.job_start_q40
+            own = None
             if header.rest is None:
-                before, start_q40 = () if header.job_start_q40 else (*carried, *before), 0
-                carried = ()
+                before, start_q40 = () if header.job_start_q40 else before, 0
+                own, ending = None if header.job_start_q40 else ending, None
             section = PlannedSection(
                 number + header.line - 1,
                 file,
@@ -442,6 +461,7 @@ class JobPlan:
                 start_q40,
                 header.rest,
                 made.standing_mm,
+                own,
             )
             yield section, made.chunk, made.duration_s
 

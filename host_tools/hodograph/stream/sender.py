@@ -238,6 +238,8 @@ class Sender:
 
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
         """Sends sections that the controller runs as one job, beginning with this one."""
+        if section.ending is not None:
+            execute_at_rest(self.at, section.ending.file, section.ending.commands, self.operator)
         self._to_start(section, chunk)
         execute_at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(section, chunk)

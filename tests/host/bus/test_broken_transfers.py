@@ -93,7 +93,7 @@ def test_a_start_is_not_given_again(
     Spoilt(monkeypatch, COMMAND, [None])
     if state == RUNNING:
         controller.command(START)
-        assert controller.moved
+        assert controller.acted
         return
     with pytest.raises(BusError, match="did not answer a command"):
         controller.command(START)

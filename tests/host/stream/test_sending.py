@@ -378,7 +378,7 @@ def test_a_journal_has_one_writer(tmp_path: Path) -> None:
 class Stopped:
     """A session whose controller notes that it was stopped."""
 
-    moved = True
+    acted = True
     stop_after = Controller.stop_after
 
     def __init__(self, controller: object = None) -> None:
@@ -397,7 +397,7 @@ class Stopped:
 def stops_after(monkeypatch: pytest.MonkeyPatch, error: BaseException, *, moved: bool) -> int:
     """How often a job that ends with the error stops the axes."""
     at: Any = Stopped()
-    at.moved = moved
+    at.acted = moved
     nothing: Any = None
 
     def fail(_: Sender) -> None:

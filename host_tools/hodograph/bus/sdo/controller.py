@@ -117,8 +117,8 @@ ROUNDING_MM = 1e-6
 class Controller(Node):
     """A connection to the controller node; made by `connect`."""
 
-    moved: bool = False
-    """Whether a command of this connection may have set axes in motion."""
+    acted: bool = False
+    """Whether a command of this connection may have set axes in motion, or switched outputs at standstill."""
     _stops: int | None = None
     """Stop commands at the beginning of a job; None: no job, or the controller does not count them."""
 
@@ -149,6 +149,7 @@ class Controller(Node):
         if state == READY:
             self.command(DISABLE)
             self.wait_for((OFF, BOOT), 5.0)
+            self._expect_no_stop()
         for key, value in different:
             self.write(*key, value)
 
@@ -218,7 +219,7 @@ class Controller(Node):
 
     def _give(self, command: int, index: int, sub: int | None, value: int) -> None:
         """A command, given by writing this value to an object."""
-        moved, self.moved = self.moved, self.moved or command in _SETS_IN_MOTION
+        acted, self.acted = self.acted, self.acted or command in _SETS_IN_MOTION
         try:
             if command in AT_ONCE:
                 self.write_at_once(index, value)
@@ -228,7 +229,7 @@ class Controller(Node):
             if error.code in BROKEN:
                 self._require_executed(command, error)
                 return
-            self.moved = moved
+            self.acted = acted
             if index == NAMED_START and error.code in NO_OBJECT:
                 raise
             reason = self.read(FAULT, 4)
@@ -337,11 +338,11 @@ class Controller(Node):
         return self.wait_for((OFF, READY), 10.0) if state == BOOT else state
 
     def enable(self) -> None:
-        """Switches the drives on; returns at standstill, ready."""
+        """Switches the drives on; returns at standstill, ready. Raises RunError: a stop within `ending_at_stops`."""
         state = self.state_after_boot()
         if state in (OFF, FAULT_STATE):  # refused in a fault, with the reason
             self.command(ENABLE)
-        self.wait_for((READY,), 10.0)
+        self.wait_for((READY,), 10.0, self.require_no_stop)
 
     def start(
         self,
@@ -424,17 +425,25 @@ class Controller(Node):
     @contextmanager
     def ending_at_stops(self) -> Iterator[None]:
         """For the length of a job: a stop command of any client also ends it where the axes stand, for example in a
-        dwell. Then no start succeeds, and `require_no_stop` raises.
+        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on; one
+        within another one is without effect.
         """
-        try:
-            self._stops = self.read(STOP_COMMANDS, 1)
-        except RefusedError as error:
-            if not lacks_object(error):
-                raise
+        before = self._stops
+        if before is None:
+            try:
+                self._stops = self.read(STOP_COMMANDS, 1)
+            except RefusedError as error:
+                if not lacks_object(error):
+                    raise
         try:
             yield
         finally:
-            self._stops = None
+            self._stops = before
+
+    def _expect_no_stop(self) -> None:
+        """After a command of this connection that the controller counts as a stop: it does not end the job."""
+        if self._stops is not None:
+            self._stops = self.read(STOP_COMMANDS, 1)
 
     def require_no_stop(self) -> None:
         """Raises RunError: a stop command came since `ending_at_stops` began."""
@@ -450,10 +459,11 @@ class Controller(Node):
         self.wait_for((BOOT, OFF, READY), wait_s)
 
     def stop_after(self, error: BaseException) -> None:
-        """Stops the axes after an error or an interrupt. After an error without a motion of this connection nothing is
-        stopped: what moves then is the motion of another command.
+        """Stops the axes after an error or an interrupt, and switches outputs off. If this connection has not begun a
+        motion and has not switched outputs, nothing is stopped after an error: what moves then is the motion of another
+        command.
         """
-        if isinstance(error, HodographError) and not self.moved:
+        if isinstance(error, HodographError) and not self.acted:
             return
         with interrupts_ignored(), suppress(HodographError):
             self.stop_and_wait()
