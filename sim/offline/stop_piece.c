@@ -159,6 +159,7 @@ void stop_piece_fill(const struct stop_setting *setting, const struct program *p
     program_piece_get(p, i, &from);
     piece->seconds = stop_piece_powers(&from, c);
     piece->suspect = 0;
+    piece->first_fails = 0;
     piece->suspect_override = (struct stop_overridden){0, 0, -1};
     piece->suspect_before = (struct stop_overridden){0, 0, 0};
     piece->left_s = left_s;

@@ -44,6 +44,7 @@ struct stop_piece {
     uint32_t suspect;                        /* the instant at which a limit was broken last, */
     struct stop_overridden suspect_override; /* and the same at other feed overrides, */
     struct stop_overridden suspect_before;   /* and where a stop that replaces another broke one */
+    int first_fails;                         /* 1: the first test (stop_verdict.h) failed last */
     struct stop_piece *close;                /* the same piece with more instants */
 };
 

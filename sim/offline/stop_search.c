@@ -22,7 +22,9 @@ struct choice {
     double cost_s, longest_s, mean_s, worst_s, first_s;
 };
 
-/* Takes the codes if they are better; `strict`: at all overrides, and at more instants. */
+/* Takes the codes if they are better; `strict`: at all overrides, and at more instants. The state in which other codes
+ * broke a limit last is evaluated first, except where the first test failed last: it then usually fails again, and costs
+ * less than a brake that keeps the limits. */
 static int better(const struct stop_setting *setting, struct stop_piece *piece, const int codes[3],
                   double after_s, int strict, struct choice *best)
 {
@@ -31,10 +33,14 @@ static int better(const struct stop_setting *setting, struct stop_piece *piece, 
     if (!stop_within(piece, codes) || !stop_numbers_of(setting, codes, &numbers)) {
         return 0;
     }
-    if ((strict && !stop_suspect_keeps(setting, piece, &numbers)) ||
-        !stop_times_of(setting, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s ||
-        !stop_all_keep(setting, piece, &times, &numbers) ||
-        (strict && !stop_strictly(setting, piece, codes))) {
+    if (strict && !piece->first_fails && !stop_suspect_keeps(setting, piece, &numbers)) {
+        return 0;
+    }
+    if (!stop_times_of(setting, piece, &numbers, after_s, &times) || times.cost_s >= best->cost_s) {
+        return 0;
+    }
+    piece->first_fails = !stop_all_keep(setting, piece, &times, &numbers);
+    if (piece->first_fails || (strict && !stop_strictly(setting, piece, codes))) {
         return 0;
     }
     memcpy(best->codes, codes, sizeof best->codes);

@@ -204,10 +204,8 @@ def derivative_bounds(duration_q32_s: Int, c_q40: Int) -> tuple[Real, Real, Real
 
 def part_bounds(duration_q32_s: Int, c_q40: Int, order: int, halvings: int) -> Real:
     """Bernstein coefficients (M, 2^halvings, n) of a derivative of F (1 to 3) over equal parts of each piece."""
-    parts = derivative_bounds(duration_q32_s, c_q40)[order - 1][:, None, :]
-    for _ in range(halvings):
-        parts = _halved(parts).reshape(parts.shape[0], -1, parts.shape[-1])
-    return parts
+    parts = _halved(derivative_bounds(duration_q32_s, c_q40)[order - 1], halvings)
+    return np.asarray(parts.T)
 
 
 def derivative_extremes(
@@ -222,11 +220,8 @@ def derivative_extremes(
     lows, highs = [], []
     for plain in derivative_bounds(duration_q32_s, c_q40):
         low, high = plain.min(axis=1), plain.max(axis=1)
-        parts = plain[curved]
-        for _ in range(halvings):
-            parts = _halved(parts)
-        axes = tuple(range(1, parts.ndim))
-        low[curved], high[curved] = parts.min(axis=axes), parts.max(axis=axes)
+        parts = _halved(plain[curved], halvings)
+        low[curved], high[curved] = parts.min(axis=(0, 1)), parts.max(axis=(0, 1))
         lows.append(low)
         highs.append(high)
     return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])
@@ -242,13 +237,10 @@ def distance_excess(duration_q32_s: Int, c_q40: Int, halvings: int = 4) -> Real:
     distance[:, 1:] = np.cumsum(feed, axis=1) * (seconds / DEGREE)[:, None]
     low, high = np.minimum(distance[:, -1], 0.0), np.maximum(distance[:, -1], 0.0)
     curved = np.flatnonzero(c_q40[:, 1:].any(axis=1))
-    parts = distance[curved]
-    for _ in range(halvings):
-        parts = _halved(parts)
-    axes = tuple(range(1, parts.ndim))
+    parts = _halved(distance[curved], halvings)
     excess: Real = np.zeros(len(seconds))
     excess[curved] = np.maximum(
-        low[curved] - parts.min(axis=axes), parts.max(axis=axes) - high[curved]
+        low[curved] - parts.min(axis=(0, 1)), parts.max(axis=(0, 1)) - high[curved]
     )
     return excess
 
@@ -315,18 +307,22 @@ def _parts(shape: Real, middle: Real) -> tuple[Real, Real]:
     return shape * power, after * (1.0 - middle[:, None]) ** k
 
 
-def _halved(coefficients: Real) -> Real:
-    """Bernstein coefficients (…, n) on both halves of the interval, (…, 2, n); de Casteljau.
+def _halved(coefficients: Real, times: int) -> Real:
+    """Bernstein coefficients (M, n) of M polynomials after a number of halvings of their interval: (n, 2^times, M); de
+    Casteljau. The polynomials are the last axis, so that each operation of numpy is one long loop.
 
     Own code, since scipy's BPoly cannot subdivide: equally close bounds from its values would take 65 times as long.
     """
-    n = coefficients.shape[-1]
-    out = np.empty((*coefficients.shape[:-1], 2, n))
-    level = coefficients
-    for k in range(n):
-        out[..., 0, k], out[..., 1, n - 1 - k] = level[..., 0], level[..., -1]
-        level = 0.5 * (level[..., 1:] + level[..., :-1])
-    return out
+    parts: Real = np.ascontiguousarray(coefficients.T)[:, None, :]
+    for _ in range(times):
+        n, count, size = parts.shape
+        out = np.empty((n, count, 2, size))
+        level = parts
+        for k in range(n):
+            out[k, :, 0], out[n - 1 - k, :, 1] = level[0], level[-1]
+            level = 0.5 * (level[1:] + level[:-1])
+        parts = out.reshape(n, 2 * count, size)
+    return parts
 
 
 def _to_bernstein(degree: int) -> Real:

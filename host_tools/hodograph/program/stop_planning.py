@@ -353,14 +353,17 @@ def _better_without(program: Program, kind: int, groups: Sequence[object]) -> ND
     next_s = END_TICKS * program.period_us * 1e-6
     for _, group in groupby(range(len(seconds) - 1, -1, -1), key=groups.__getitem__):
         parts = list(group)
-        whole_s, worst_s = float(duration_s[parts].sum()) + next_s, 0.0
+        end_s, worst_s = next_s, 0.0
         for i in parts:
             waiting_s = seconds[i] + next_s
             numbers_s = max(own_s[i], waits[i] * seconds[i] + next_s if waits[i] > 0.0 else 0.0)
             out[i] = waiting_s < WORTH_SHARE * numbers_s
             next_s = waiting_s if out[i] else numbers_s
             worst_s = max(worst_s, next_s)
-        if worst_s > WORTH_SHARE * whole_s and (codes[parts] != codes[parts[0]]).any():
+        if len(parts) == 1 or (codes[parts] == codes[parts[0]]).all():
+            continue
+        whole_s = float(duration_s[parts].sum()) + end_s
+        if worst_s > WORTH_SHARE * whole_s:
             for i in parts:
                 out[i] = True
             next_s = whole_s
