@@ -194,6 +194,25 @@ def test_a_stop_while_the_drives_are_switched_on_ends_the_job(
     assert clock.now_s() < begun_s + 1.0
 
 
+def test_outputs_go_off_at_the_end_without_the_host(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    """It is killed when the controller has the whole job."""
+    file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nG1 X4\nM30\n")
+    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
+    with running(clock, "stream", *words, name="stream") as command:
+        while bench.controller.targets(1)[0] != 2_000_000:
+            clock.sleep(0.05)
+        clock.sleep(0.5)
+        assert bench.controller.read(OUTPUTS, 1) == VALVE
+        command.kill()
+    while bench.controller.state() != READY:
+        clock.sleep(0.05)
+    clock.sleep(0.1)
+    assert bench.controller.targets(1) == [4_000_000]
+    assert bench.controller.read(OUTPUTS, 1) == 0
+
+
 def test_the_end_of_a_file_is_executed_where_it_ends(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
 ) -> None:
