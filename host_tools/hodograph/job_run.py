@@ -300,11 +300,13 @@ def _check_bus(at: RunSession, wait_s: float) -> None:
     if at.rig is not None:
         at.rig.check()
     state = at.controller.state()
-    if state not in (READY, FAULT_STATE):
+    if state == FAULT_STATE:
+        raise RunError(f"{at.controller.who()} is in fault: {at.controller.fault_advice()}")
+    if state != READY:
         raise RunError(
             f"{at.controller.who()} is in state {STATES.get(state, state)} at a rest of the job: another command has "
-            "moved the axes or switched the drives off, so the job ends here: see hodograph status"
+            "moved the axes or switched the drives off, or the controller has restarted, so the job ends here: see "
+            "hodograph status"
         )
-    at.controller.wait_for((READY,), 0.0)
     at.controller.require_no_stop()
     at.controller.clock.sleep(wait_s)

@@ -14,7 +14,7 @@ from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.run import RunSession, bring_up
-from hodograph.bus.sdo.controller import OFF, READY
+from hodograph.bus.sdo.controller import OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import DISABLE, ENABLING, OUTPUTS, QUICK_STOP, STOP
 from hodograph.cli.bus_commands import stopping
 from hodograph.cli.main import main
@@ -211,6 +211,23 @@ def test_outputs_go_off_at_the_end_without_the_host(
     clock.sleep(0.1)
     assert bench.controller.targets(1) == [4_000_000]
     assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+def test_drives_off_just_after_the_motion_end_a_stream_at_once(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nM30\n")
+    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
+    with running(clock, "stream", *words, name="stream") as command:
+        while bench.controller.state() != RUNNING:
+            clock.sleep(0.001)
+        while bench.controller.state() != READY:
+            clock.sleep(0.001)
+        bench.controller.command(DISABLE)
+        begun_s = clock.now_s()
+        assert command.wait() == 6, command.err
+        assert "the drives" in command.err
+    assert clock.now_s() < begun_s + 1.0
 
 
 def test_the_end_of_a_file_is_executed_where_it_ends(

@@ -516,7 +516,7 @@ class Sender:
         if status.state == UNDERRUN and self._unplanned is not None:
             raise self._unplanned
         if status.state == ENDED and all_sent:
-            controller.wait_for((READY,), 10.0)
+            controller.wait_for_end(10.0)
             return True
         if status.state == STOPPED:  # after a quick stop the drives are off
             controller.wait_for((READY, OFF, BOOT), 10.0)
@@ -524,5 +524,5 @@ class Sender:
                 f"{self._section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
-        controller.wait_for((*BUSY, READY), 0.0)
+        controller.wait_for((*BUSY, READY, OFF, BOOT), 0.0)  # drives off: the next status tells why
         return False
