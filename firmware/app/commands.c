@@ -109,7 +109,8 @@ static enum machine_refusal start(struct controller *controller, int64_t from_q4
         refusal = machine_start(&controller->machine, &prepared, start_counts);
     }
     if (refusal == MACHINE_ACCEPTED) {
-        controller->machine.outputs_stay = controller->values.outputs_at_standstill.stay_at_end != 0u;
+        controller->machine.outputs_stay =
+            controller->values.outputs_at_standstill.stay_at_end != 0u;
     }
     port_unlock();
     if (refusal == MACHINE_ACCEPTED && stream_is_open(&controller->stream)) {

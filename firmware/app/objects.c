@@ -158,6 +158,18 @@ static bool object_urgent_command(uint8_t value)
     return command_is_urgent(value);
 }
 
+/* While a program runs, the value is for this one and not for the next. */
+static void object_written_outputs_stay(struct controller *controller)
+{
+    uint8_t *stay = &controller->values.outputs_at_standstill.stay_at_end;
+    port_lock();
+    if (machine_on_path(&controller->machine)) {
+        controller->machine.outputs_stay = *stay != 0u;
+        *stay = 0;
+    }
+    port_unlock();
+}
+
 static void object_written_override(struct controller *controller)
 {
     port_lock();
@@ -404,6 +416,7 @@ static const struct object objects[] = {
     {0x2056, 0x2056, 1, 3, OWN, NULL, object_write_start, NULL, NULL},
     {0x2057, 0x2057, 1, 1, SHARED, object_read_stop_commands, NULL, NULL, NULL},
     {0x2058, 0x2058, 1, 5, SHARED, object_read_set_outputs, object_write_set_outputs, NULL, NULL},
+    {0x2058, 0x2058, 6, 6, OWN, NULL, NULL, object_written_outputs_stay, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
     {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},

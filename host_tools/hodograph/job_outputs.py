@@ -45,6 +45,11 @@ WAITS = (Dwell, ProgramStop, ToolChange)
 """Commands at which a machine waits at rest."""
 
 
+def acts_at_rest(commands: Iterable[Command]) -> bool:
+    """Whether the host waits at some of the commands, or switches outputs."""
+    return any(isinstance(command, (*WAITS, SwitchedAtRest)) for command in commands)
+
+
 @dataclass(frozen=True)
 class ProgrammedFeed:
     """The programmed feed from an arc length on, mm/s (inf: a rapid move), and its source line."""

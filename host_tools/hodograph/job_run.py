@@ -33,6 +33,7 @@ from .config import Machine
 from .errors import PlanError, RefusedError, RunError
 from .events import OutputValues
 from .job import Job, JobSection
+from .job_outputs import acts_at_rest
 from .job_simulation import JobMotion
 from .native import NativeProgram
 from .program.image import LARGEST_BANK, RECORD_BYTES, memory_bytes
@@ -176,7 +177,8 @@ def _run_sections(
         # No move, unless an operator moved the axes during the stop.
         _to_start(at, section, made, program, unhomed)
         own = None if progress is None else _shifted(progress, passed)
-        more = goes_off_at_end(job.machine) and (number < len(job.sections) or bool(job.after))
+        follows = number < len(job.sections) or acts_at_rest(job.after)
+        more = goes_off_at_end(job.machine) and follows
         recorded = record_program(
             at, job.machine, program.image, own, unhomed=unhomed, outputs_stay=more
         )
@@ -271,6 +273,7 @@ def _switch(controller: Controller, values: OutputValues) -> None:
     """Switches the outputs at a rest. Raises RunError: a stop came, perhaps just before. Then they are on again, until
     the job that ends stops too (`stop_after`).
     """
+    controller.require_no_stop()
     try:
         set_outputs(controller, values)
     except RefusedError:
@@ -297,11 +300,13 @@ def _check_bus(at: RunSession, wait_s: float) -> None:
     if at.rig is not None:
         at.rig.check()
     state = at.controller.state()
-    if state not in (READY, FAULT_STATE):
+    if state == FAULT_STATE:
+        raise RunError(f"{at.controller.who()} is in fault: {at.controller.fault_advice()}")
+    if state != READY:
         raise RunError(
             f"{at.controller.who()} is in state {STATES.get(state, state)} at a rest of the job: another command has "
-            "moved the axes or switched the drives off, so the job ends here: see hodograph status"
+            "moved the axes or switched the drives off, or the controller has restarted, so the job ends here: see "
+            "hodograph status"
         )
-    at.controller.wait_for((READY,), 0.0)
     at.controller.require_no_stop()
     at.controller.clock.sleep(wait_s)

@@ -14,7 +14,7 @@ from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.run import RunSession, bring_up
-from hodograph.bus.sdo.controller import OFF, READY
+from hodograph.bus.sdo.controller import OFF, READY, RUNNING
 from hodograph.bus.sdo.objects import DISABLE, ENABLING, OUTPUTS, QUICK_STOP, STOP
 from hodograph.cli.bus_commands import stopping
 from hodograph.cli.main import main
@@ -191,6 +191,42 @@ def test_a_stop_while_the_drives_are_switched_on_ends_the_job(
         begun_s = clock.now_s()
         assert command.wait() == 6, command.err
         assert "a stop was commanded" in command.err
+    assert clock.now_s() < begun_s + 1.0
+
+
+def test_outputs_go_off_at_the_end_without_the_host(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    """It is killed when the controller has the whole job."""
+    file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nG1 X4\nM30\n")
+    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
+    with running(clock, "stream", *words, name="stream") as command:
+        while bench.controller.targets(1)[0] != 2_000_000:
+            clock.sleep(0.05)
+        clock.sleep(0.5)
+        assert bench.controller.read(OUTPUTS, 1) == VALVE
+        command.kill()
+    while bench.controller.state() != READY:
+        clock.sleep(0.05)
+    clock.sleep(0.1)
+    assert bench.controller.targets(1) == [4_000_000]
+    assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+def test_drives_off_just_after_the_motion_end_a_stream_at_once(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
+) -> None:
+    file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nM30\n")
+    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
+    with running(clock, "stream", *words, name="stream") as command:
+        while bench.controller.state() != RUNNING:
+            clock.sleep(0.001)
+        while bench.controller.state() != READY:
+            clock.sleep(0.001)
+        bench.controller.command(DISABLE)
+        begun_s = clock.now_s()
+        assert command.wait() == 6, command.err
+        assert "the drives" in command.err
     assert clock.now_s() < begun_s + 1.0
 
 

@@ -558,6 +558,24 @@ static void test_outputs_stay_at_the_end_once(void)
     set_lamp_and_speed(); /* OFF_AT_END concerns the end alone */
 }
 
+/* A host that learns in motion that nothing follows. The value is not for the next motion. */
+static void test_outputs_stay_is_written_in_motion(void)
+{
+    for (uint8_t stay = 0; stay <= 1; ++stay) {
+        setUp();
+        configure(4, OFF_AT_END, 1);
+        make_ready();
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, 1u - stay, 1));
+        start();
+        app_bench_periods(&bench, 100);
+        TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, stay, 1));
+        TEST_ASSERT_EQUAL_INT(0, app_bench_read(&bench, 0x2058, 6));
+        (void)app_bench_until(&bench, MACHINE_READY, 1000);
+        app_bench_periods(&bench, 2);
+        TEST_ASSERT_EQUAL_HEX16(stay != 0u ? LAMP : 0u, digital());
+    }
+}
+
 /* Also if a feed hold begins where the motion is over: the job of the host goes on. */
 static void test_outputs_stay_at_an_end_in_a_hold(void)
 {
@@ -607,6 +625,7 @@ int main(void)
     RUN_TEST(test_outputs_at_standstill_end_with_a_stop);
     RUN_TEST(test_outputs_at_standstill_need_it);
     RUN_TEST(test_outputs_stay_at_the_end_once);
+    RUN_TEST(test_outputs_stay_is_written_in_motion);
     RUN_TEST(test_outputs_stay_at_an_end_in_a_hold);
     RUN_TEST(test_outputs_that_stay_at_the_end_go_off_at_a_stop);
     RUN_TEST(test_start_from_a_place_has_all_events_before_it);

@@ -34,6 +34,7 @@ from ..bus.sdo.stream_channel import (
 from ..config import Machine
 from ..errors import HodographError, PlanError, RefusedError, RunError
 from ..fixed_point import nearest_q40
+from ..job_outputs import acts_at_rest
 from ..job_run import (
     Operator,
     end_outputs,
@@ -154,6 +155,10 @@ class Sender:
     _done_s: float = 0.0
     """Motion of finished jobs of the controller."""
     _ahead: deque[PlannedSection] = field(default_factory=deque)
+    _outputs_stay: bool = False
+    """Whether the outputs stay on at the end of the controller's job, on a machine whose outputs go off there: another
+    one may follow, or commands at rest.
+    """
     _noted: int = -1
     """The section in the journal."""
     _unplanned: HodographError | None = None
@@ -315,10 +320,24 @@ class Sender:
                 raise self._unplanned
             if not started and sent and (all_sent or self._may_start(first_s)):
                 self._slow_down()
-                # Another job of the controller may follow: the end of all is that of this command.
-                stay = goes_off_at_end(self.machine)
-                controller.start(unhomed=self.unhomed, job=self._job_number, outputs_stay=stay)
+                self._outputs_stay = goes_off_at_end(self.machine)
+                controller.start(
+                    unhomed=self.unhomed, job=self._job_number, outputs_stay=self._outputs_stay
+                )
                 started = True
+            elif started and all_sent and self._outputs_stay and self._is_last():
+                self._outputs_stay = False
+                controller.let_outputs_end()
+
+    def _is_last(self) -> bool:
+        """Whether nothing follows what was sent. Then the controller ends the job, also if this process is killed."""
+        try:
+            self._planned()
+        except IndexError:
+            return not acts_at_rest(self.plan.after)
+        except HodographError:
+            pass
+        return False
 
     def _may_start(self, first_s: float) -> bool:
         """Whether the motion may start: enough is sent, or the first chunk has waited long enough, or waiting is
@@ -497,7 +516,7 @@ class Sender:
         if status.state == UNDERRUN and self._unplanned is not None:
             raise self._unplanned
         if status.state == ENDED and all_sent:
-            controller.wait_for((READY,), 10.0)
+            controller.wait_for_end(10.0)
             return True
         if status.state == STOPPED:  # after a quick stop the drives are off
             controller.wait_for((READY, OFF, BOOT), 10.0)
@@ -505,5 +524,5 @@ class Sender:
                 f"{self._section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
-        controller.wait_for((*BUSY, READY), 0.0)
+        controller.wait_for((*BUSY, READY, OFF, BOOT), 0.0)  # drives off: the next status tells why
         return False

@@ -453,6 +453,10 @@ class Controller(Node):
     def _stopped_text(self) -> str:
         return f"{self.who()}: a stop was commanded while the axes stood: the job ends here"
 
+    def let_outputs_end(self) -> None:
+        """Takes `outputs_stay` of `start` back while the motion lasts."""
+        self.write(SET_OUTPUTS, _STAY_AT_END, 0)
+
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand. At standstill it switches the outputs off."""
         self.command(STOP)
