@@ -28,8 +28,8 @@ ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = ROOT / "tests/data/counts.json"
 DOCUMENT = ROOT / "docs/validation/counts.md"
 _SHOWN = "an386 float"
-_PORT = r"The port adds (\d+) to each tick"
-_WAIT = r"\*supervision\* (\d+), since"
+_PORT = r"The port adds (\d+) = \d+ \+ \d+ to each tick"
+_WAIT = r"(\d+) are \*supervision\*: the controller waits"
 
 
 def blocks(figures: dict[str, Any]) -> dict[str, str]:
