@@ -185,7 +185,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "job_view": {"job", "toolpath"},
     "job_run": {
         *("errors", "events", "config", "native", "program", "bus", "toolpath"),
-        *("job", "job_simulation"),
+        *("job", "job_outputs", "job_simulation"),
     },
     "stream": {
         *("errors", "config", "spline", "feed", "program", "native", "pipeline", "bus", "bus.sdo"),
