@@ -558,6 +558,31 @@ static void test_outputs_stay_at_the_end_once(void)
     set_lamp_and_speed(); /* OFF_AT_END concerns the end alone */
 }
 
+/* The tick that follows the stop may be the one that ends the motion. */
+static void test_a_stop_while_the_axes_arrive_switches_off(void)
+{
+    static const uint32_t behaviour[] = {0, OFF_AT_END, OFF_AT_END | KEPT_AT_STOP};
+    for (uint32_t i = 0; i < 3u; ++i) {
+        bool arrives = true;
+        for (uint32_t ticks = 0; arrives; ++ticks) {
+            setUp();
+            configure(4, behaviour[i], 1);
+            make_ready();
+            TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 6, 1, 1));
+            start();
+            while (!motion_over(&bench.controller.machine.motion)) {
+                app_bench_period(&bench);
+            }
+            app_bench_periods(&bench, ticks);
+            arrives = bench.controller.machine.state == MACHINE_RUNNING;
+            command(COMMAND_STOP);
+            app_bench_periods(&bench, AXIS_STANDSTILL_SYNCS);
+            TEST_ASSERT_EQUAL_INT(MACHINE_READY, bench.controller.machine.state);
+            TEST_ASSERT_EQUAL_HEX16(0, digital());
+        }
+    }
+}
+
 /* A host that learns in motion that nothing follows. The value is not for the next motion. */
 static void test_outputs_stay_is_written_in_motion(void)
 {
@@ -625,6 +650,7 @@ int main(void)
     RUN_TEST(test_outputs_at_standstill_end_with_a_stop);
     RUN_TEST(test_outputs_at_standstill_need_it);
     RUN_TEST(test_outputs_stay_at_the_end_once);
+    RUN_TEST(test_a_stop_while_the_axes_arrive_switches_off);
     RUN_TEST(test_outputs_stay_is_written_in_motion);
     RUN_TEST(test_outputs_stay_at_an_end_in_a_hold);
     RUN_TEST(test_outputs_that_stay_at_the_end_go_off_at_a_stop);

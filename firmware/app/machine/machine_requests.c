@@ -93,12 +93,22 @@ static bool outputs_stay_at_stop(const struct machine *machine)
            (behaviour & CONFIG_OUTPUTS_OFF_AT_END) == 0u;
 }
 
+/* At once, since the next tick may end the motion: then it never sees the state stopping. */
+static void stop_outputs(struct machine *machine)
+{
+    machine->outputs_stay = false;
+    if ((machine->config.outputs.behaviour & CONFIG_OUTPUTS_KEEP_AT_STOP) == 0u) {
+        path_outputs_clear(&machine->motion.outputs);
+    }
+}
+
 enum machine_refusal machine_request_stop(struct machine *machine)
 {
     machine->stop_commands++;
     if (machine->state == MACHINE_RUNNING || machine->state == MACHINE_HOLDING ||
         machine->state == MACHINE_HELD) {
         motion_stop(&machine->motion);
+        stop_outputs(machine);
         machine->state = MACHINE_STOPPING;
     } else if (machine->state == MACHINE_ENABLING) {
         return machine_disable(machine);
