@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Outputs of a toolpath (M62 to M65, M67, M68, and spindle and coolant where the machine file maps them) as events of
-its sections' programs. Used by job, stream/output_check, stream/plan and stream/reading. No I/O.
+its sections' programs. Used by job, job_run and stream/. No I/O.
 
 A command within a section acts at its place on the curve. A command at rest acts with the first setpoint of the next
 section. If a dwell, a tool change or a program stop follows it at the same rest, it acts with the last setpoint of the

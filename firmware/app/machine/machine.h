@@ -68,7 +68,7 @@ enum machine_refusal {
     MACHINE_NOT_IN_TIME = 16,   /* drives are real, and the port does not guarantee ticks in time */
     MACHINE_JOB_STARTED = 19,   /* a job starts once, at its beginning */
     MACHINE_OTHER_PROGRAM = 20, /* not the program or job that the start names */
-    MACHINE_STOPPED = 21,        /* a stop was commanded since the host prepared this start */
+    MACHINE_STOPPED = 21,       /* a stop was commanded since the host prepared this start */
     MACHINE_OUTSIDE_TRAVEL = 22, /* an axis is outside its travel: its drive would move it there */
 };
 

@@ -26,7 +26,7 @@ struct outputs {
     struct path_outputs_values present; /* those that the module has from the next SYNC on */
     struct path_outputs_values sent;
     enum machine_state state_before; /* of the machine, in the last tick */
-    uint32_t refresh_ticks; /* until the frame is sent again; 0: it is due */
+    uint32_t refresh_ticks;          /* until the frame is sent again; 0: it is due */
 };
 
 /* All outputs off; the frame is due. */

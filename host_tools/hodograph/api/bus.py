@@ -170,8 +170,8 @@ class Controller:
         operator   is called with the place and the code where the job waits for the operator (M0, M1, tool change), and
                    returns when the job may continue. None: such a job is refused before anything moves
 
-        All sections are planned before the first one moves. A fault, a stop (also at rest) or a hold ends the job. Raises InputError,
-        PlanError, and the errors of `run`.
+        All sections are planned before the first one moves. A fault, a stop (also at rest) or a hold ends the job.
+        Raises InputError, PlanError, and the errors of `run`.
         """
         made = prepared(job._job, job.machine._file.kernel)
         stops = list(operator_stops(job._job))
