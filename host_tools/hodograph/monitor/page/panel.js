@@ -6,7 +6,7 @@ import { text } from "./scale.js";
 const $ = (id) => document.getElementById(id);
 const MOST_EVENTS = 60;
 
-/** Commands that make sense in a state; quick stop always does. In ready a stop ends the job of a host, as in a dwell. */
+/** Commands that make sense in a state; quick stop always does. In ready a stop ends the job of a host. */
 const POSSIBLE = {
   off: ["enable", "home"], enabling: ["stop", "disable"], ready: ["start", "stop", "disable"], running: ["hold", "stop"],
   holding: ["resume", "stop"], held: ["resume", "stop"], fault: ["reset"], stopping: [], boot: [], homing: ["stop"],
