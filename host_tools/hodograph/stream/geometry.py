@@ -60,6 +60,20 @@ _FARTHEST_Q40 = 1 << 62
 
 
 @dataclass(frozen=True, eq=False)
+class Chords:
+    """The chords of the programmed path that a block was fitted to, in their order.
+
+    line      (m,) source line of each
+    start_mm  (m,) arc length of the block that belongs to its start
+    off_mm    (m,) distance between the curve there and the programmed point
+    """
+
+    line: Int
+    start_mm: Real
+    off_mm: Real
+
+
+@dataclass(frozen=True, eq=False)
 class Block:
     """Consecutive segments of a section's path, as they were fitted.
 
@@ -67,12 +81,14 @@ class Block:
     feed_mm_s  (n,) programmed feed of each segment; inf: as fast as the machine can
     line       (n,) source line of each
     events     outputs that switch on it; arc lengths from its start
+    chords     of the programmed path; None: they were not asked for, or the path is of another kind
     """
 
     curve: Curve
     feed_mm_s: Real
     line: Int
     events: Events = field(default_factory=no_events)
+    chords: Chords | None = None
 
 
 def short_segments(block: Block) -> Block:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..config import Machine
+from ..config import SPACE_AXES, Machine
 from ..errors import InputError
 from ..events import Events, events_of, no_events
 from ..feed.request import GREATEST_FEED_MM_S
@@ -37,7 +37,7 @@ from ..toolpath.fit.reference import ReferenceBuilder
 from ..toolpath.fit.sections import EXACT_MM, SAG_SHARE, Divider, Section
 from ..toolpath.fit.stations import SHORTEST_MM, turns
 from ..toolpath.moves import Command, Move
-from .geometry import Block, with_joints
+from .geometry import Block, Chords, with_joints
 
 WINDOW_CHORDS = 1500
 """Chords that are fitted at once; the first window of a job is shorter, so that it starts soon."""
@@ -144,6 +144,7 @@ class StreamReader:
 
     notes  one line for each thing that the user should know; grows while the file is read
     after  commands at rest at the end, known then
+    with_chords  whether blocks have the chords of the programmed path
     """
 
     file: Path
@@ -152,6 +153,7 @@ class StreamReader:
     reading: ReadOptions
     notes: list[str] = field(default_factory=list)
     after: tuple[Command, ...] = ()
+    with_chords: bool = False
 
     def sections(self) -> Iterator[StreamSection]:
         """The sections in order. Raises InputError and PlanError, naming the line."""
@@ -164,7 +166,7 @@ class StreamReader:
         if part is None:
             raise InputError(f"{self.file}: moves nothing: a job needs a move of 2 um at least")
         while part is not None:
-            rest = _Rest(part, parts)
+            rest = _Rest(part, parts, with_chords=self.with_chords)
             first = part.section
             yield StreamSection(
                 self.file,
@@ -285,9 +287,9 @@ def _with_final(parts: Iterator[JobSection]) -> Iterator[tuple[JobSection, bool]
 class _Rest:
     """The parts of a section after its first one; `next_part` is the first of the next section once all are read."""
 
-    def __init__(self, part: _Part, parts: Iterator[_Part]) -> None:
+    def __init__(self, part: _Part, parts: Iterator[_Part], *, with_chords: bool) -> None:
         self.next_part: _Part | None = None
-        self._part, self._parts = part, parts
+        self._part, self._parts, self._with_chords = part, parts, with_chords
 
     def next_start(self) -> NDArray[np.float64] | None:
         """Where the next section starts, if it moves the same axes."""
@@ -301,12 +303,25 @@ class _Rest:
     def blocks(self) -> Iterator[Block]:
         part: _Part | None = self._part
         while part is not None:
-            yield replace(block_of(part.section), events=part.events)
+            chords = chords_of(part.section) if self._with_chords else None
+            yield replace(block_of(part.section), events=part.events, chords=chords)
             tied = part.section.tied[1]
             part = next(self._parts, None)
             if part is not None and not tied:
                 self.next_part = part
                 return
+
+
+def chords_of(section: JobSection) -> Chords:
+    """The chords of a section, or of a part of one. Where rotary axes move alone, their distances are not known."""
+    fitted, reference = section.fitted, section.fitted.reference
+    start_mm = np.maximum(fitted.arc_length_at(reference.place_mm[:-1]), 0.0)
+    off_mm = np.full(reference.count, np.inf)
+    if section.stands_at is None:
+        drawn = section.pipeline.curve.axes_point(start_mm)[:, :SPACE_AXES]
+        programmed = reference.point[:-1, : drawn.shape[1]]
+        off_mm = np.asarray(np.linalg.norm(drawn - programmed, axis=1))
+    return Chords(reference.line, start_mm, off_mm)
 
 
 def block_of(section: JobSection) -> Block:

@@ -105,29 +105,47 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
 
 
 def place_of_line(job: JobFiles, line: int) -> Nearest:
-    """The start of the path that a source line of the first file describes. If none begins there, since a fitted curve
-    passes several lines or the line has no motion, the place before it in its section, else the next one.
+    """Where the motion of a source line of the first file begins on the path; of a line that is executed several times,
+    where it begins first. If the line has no motion, where the next motion begins. Within a fitted curve it may be the
+    start of the segment around this place.
 
-    Raises InputError: no path is at this line or after it; InputError and PlanError as reading the job does.
+    Raises InputError: no motion is at this line or after it; InputError and PlanError as reading the job does.
     """
-    for number, blocks, standing_mm in _sections(job):
-        begin_mm, before = 0.0, None
+    after: Nearest | None = None
+    for number, blocks, standing_mm in _sections(job, with_chords=True):
+        begin_mm = 0.0
         for block in blocks:
-            later = np.flatnonzero(block.line >= line)
-            if later.size:
-                segment = int(later[0])
-                begins_here = block.line[segment] == line
-                if not begins_here and segment > 0:
-                    segment -= 1
-                elif not begins_here and before is not None:
-                    block, begin_mm = before
-                    segment = len(block.line) - 1
-                arc_mm = float(block.curve.segment_starts_mm[segment])
+            lines = block.line if block.chords is None else block.chords.line
+            here = np.flatnonzero(lines == line)
+            later = np.flatnonzero(lines > line)
+            if here.size or (later.size and after is None):
+                index = int((here if here.size else later)[0])
+                arc_mm = _begin_of(block, index, job.tolerance_mm)
                 place = _place(number, begin_mm + arc_mm)
-                return _programmed(job, block, arc_mm, place, standing_mm)
-            before = block, begin_mm
+                found = _programmed(job, block, arc_mm, place, standing_mm)
+                found = replace(found, line=int(lines[index]))
+                if here.size:
+                    return found
+                after = found
             begin_mm += block.curve.length_mm
-    raise InputError(f"{job.files[0]}: there is no motion at line {line} or after it")
+    if after is None:
+        raise InputError(f"{job.files[0]}: there is no motion at line {line} or after it")
+    return after
+
+
+def _begin_of(block: Block, index: int, tolerance_mm: float) -> float:
+    """Arc length of a block at which a chord begins, or a segment if the block has no chords. The start of the segment
+    before the chord, where the curve is not near the programmed point: cutting a part twice is better than leaving it
+    out.
+    """
+    starts_mm = block.curve.segment_starts_mm
+    if block.chords is None:
+        return float(starts_mm[index])
+    arc_mm = float(block.chords.start_mm[index])
+    if block.chords.off_mm[index] <= max(2.0 * tolerance_mm, _START_MM):
+        return arc_mm
+    segment = int(np.searchsorted(starts_mm, arc_mm + _START_MM, side="right")) - 1
+    return float(starts_mm[max(segment, 0)])
 
 
 def place_of_arc(job: JobFiles, arc_mm: float) -> Nearest:
@@ -168,14 +186,18 @@ def _moved(found: Nearest, offset_mm: Real) -> Nearest:
     return replace(found, point_mm=tuple((np.array(found.point_mm) + offset_mm).tolist()))
 
 
-def _sections(job: JobFiles) -> Iterator[tuple[int, Iterator[Block], tuple[float, ...]]]:
+def _sections(
+    job: JobFiles, *, with_chords: bool = False
+) -> Iterator[tuple[int, Iterator[Block], tuple[float, ...]]]:
     """The sections of all files: number, blocks (which may be left unread), and positions of the axes before those of
     the path.
     """
     number = 0
     for file in job.files:
         if is_toolpath(file):
-            reader = StreamReader(file, job.machine, job.tolerance_mm, job.reading)
+            reader = StreamReader(
+                file, job.machine, job.tolerance_mm, job.reading, with_chords=with_chords
+            )
             for section in reader.sections():
                 blocks = section.blocks
                 yield number, blocks, section.standing_mm

@@ -223,6 +223,8 @@ class Sender:
             if item is not None:
                 return item
             self._check_bus()
+            if self.plan.reads_input:  # which may come after hours; a file is planned at once
+                self.at.controller.require_no_stop()
 
     def _planned(self) -> tuple[PlannedSection, Chunk, float] | None:
         """The next chunk; None: it is not planned yet. Virtual time stands still while the planner works, so that the

@@ -157,7 +157,32 @@ def test_a_line_within_a_fitted_curve_is_not_passed(tmp_path: Path, machine: Mac
         found = place_of_line(job, line)
         begins_mm = 20.0 * angle[line - 2]  # line 2 begins at the start
         assert begins_mm - 8.0 < found.place.arc_q40 / Q40 < begins_mm + 0.01
-        assert found.line <= line
+        assert found.line == line
+
+
+def place_in(tmp_path: Path, machine: Machine, text: str, line: int) -> tuple[int, float]:
+    file = tmp_path / "part.ngc"
+    file.write_text(text)
+    place = place_of_line(JobFiles((file,), machine, 0.01, ReadOptions()), line).place
+    return place.section, place.arc_q40 / Q40
+
+
+def test_lines_that_one_segment_passes(tmp_path: Path, machine: Machine) -> None:
+    """Also at the end of a section: nothing of it is left out."""
+    text = "F600\nG1 X2\nG1 X4\n(no motion)\nG1 X6\nG4 P1\nG1 X8\nG1 X9\nM2\n"
+    for line, place in {2: (0, 0), 3: (0, 2), 4: (0, 4), 5: (0, 4), 6: (1, 0), 8: (1, 2)}.items():
+        assert place_in(tmp_path, machine, text, line) == pytest.approx(place, abs=1e-6)
+
+
+def test_a_rounded_corner_begins_near_its_point(tmp_path: Path, machine: Machine) -> None:
+    section, arc_mm = place_in(tmp_path, machine, "F6000\nG1 X10\nG1 Y10\nG1 X0\nM2\n", 3)
+    assert (section, arc_mm) == (0, pytest.approx(10.0, abs=0.02))
+
+
+def test_a_line_of_a_subroutine_is_found_where_it_runs(tmp_path: Path, machine: Machine) -> None:
+    """Lines after it run before."""
+    text = "F600\nO1 sub\nG91\nG1 Y3\nG1 X3\nG90\nO1 endsub\nG1 X20\nO1 call\nG1 X0 Y0\nM2\n"
+    assert place_in(tmp_path, machine, text, 5) == (0, pytest.approx(23.0, abs=0.02))
 
 
 def test_no_motion_at_a_line_or_after_it(job: JobFiles) -> None:

@@ -370,14 +370,9 @@ class Controller(Node):
             self.write(START_POSITION, None, nearest_q40(from_mm))
         deadline = self.clock.now_s() + wait_s
         while True:
-            if unhomed:
-                self.write(UNHOMED_START, 1, 1)  # for one attempt, as the next two
-            if self._stops is not None:
-                self.write(STOP_COMMANDS, 2, self._stops)
-            if outputs_stay:
-                self.write(SET_OUTPUTS, _STAY_AT_END, 1)
             try:
                 with self.turn():
+                    self._permit(unhomed=unhomed, outputs_stay=outputs_stay)
                     self._start(START if from_mm is None else START_FROM, image, job)
                 return
             except CommandRefusedError as error:
@@ -389,6 +384,15 @@ class Controller(Node):
                 if error.reason != REFUSED_MOVING or moving or self.clock.now_s() > deadline:
                     raise
             self.clock.sleep(POLL_S)
+
+    def _permit(self, *, unhomed: bool, outputs_stay: bool) -> None:
+        """What holds for one attempt to start, that of any client."""
+        if unhomed:
+            self.write(UNHOMED_START, 1, 1)
+        if self._stops is not None:
+            self.write(STOP_COMMANDS, 2, self._stops)
+        if outputs_stay:
+            self.write(SET_OUTPUTS, _STAY_AT_END, 1)
 
     def _start(self, command: int, image: bytes | None, job: int | None) -> None:
         """One attempt. The start names its program or job, since a client on another computer may replace it at any
