@@ -24,8 +24,6 @@ from .options import (
 
 _JOBS = 2
 """Processes that prepare a streamed job."""
-_FULL_OVERRIDE = 100
-"""Feed override with which a job begins, unless another one is given; per cent."""
 
 
 def _upload(command: Command) -> None:
@@ -115,9 +113,9 @@ def _stream(command: Command) -> None:
     stream.add_argument(
         "--override",
         type=options.percentage,
-        default=_FULL_OVERRIDE,
         metavar="PERCENT",
-        help="feed override with which it begins, also the move to the start (default 100)",
+        help="feed override with which it begins, also the move to the start (default 100; with --continue the present "
+        "one)",
     )
     options.unhomed(stream)
     stream.add_argument("--machine", type=Path, metavar="FILE", help="machine file")
@@ -146,9 +144,7 @@ def _pace(parser: ArgumentParser) -> None:
 def _run(command: Command) -> None:
     run = command("run", "run paths on the bus, record and analyse")
     # A job that does not fit the controller's memory is streamed, with the defaults of `stream`.
-    run.set_defaults(
-        from_line=None, from_mm=None, journal=None, jobs=_JOBS, override=_FULL_OVERRIDE
-    )
+    run.set_defaults(from_line=None, from_mm=None, journal=None, jobs=_JOBS, override=None)
     options.file(run, many=True, what=f"path file (TOML), or {options.TOOLPATH}")
     options.unhomed(run)
     options.machine(run)

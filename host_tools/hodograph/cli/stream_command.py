@@ -26,9 +26,9 @@ from ..bus.capture.setpoint_check import step_limits
 from ..bus.capture.setpoint_watch import jumps
 from ..bus.goto import SHORTEST_MOVE_MM
 from ..bus.own_bus import opened_bus
-from ..bus.run import RunSession, bring_up
+from ..bus.run import FULL_OVERRIDE, RunSession, bring_up
 from ..bus.sdo.controller import connect
-from ..bus.sdo.objects import HOMED, HOMING_METHOD, MOVING, STREAM
+from ..bus.sdo.objects import HOMED, HOMING_METHOD, MOVING, OVERRIDE, STREAM
 from ..bus.sdo.stream_channel import close_stream, stream_status
 from ..bustime import machine_bus_time, require_fit
 from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
@@ -270,7 +270,8 @@ def _run(
         recording = stack.enter_context(recorded(options.record, job.machine, address))
         at = stack.enter_context(session(job.machine, address, options))
         stack.enter_context(at.controller.ending_at_stops())
-        bring_up(at, job.machine, kernel, options.override)
+        override = _first_override(at, options, continued=continued)
+        bring_up(at, job.machine, kernel, override)
         if isinstance(start, Nearest):
             _require_at(at, job.machine, start, unhomed=options.unhomed)
         if begin is None:
@@ -296,12 +297,26 @@ def _run(
             unhomed=options.unhomed,
             slow=_free_rate(job.machine, address),
             recording=recording,
-            override=options.override,
+            override=override,
         )
         done = sender.run()
         for line in plan.notes:
             note(line)
     _print(done, options)
+
+
+def _first_override(at: RunSession, options: Namespace, *, continued: bool) -> int:
+    """The feed override with which a job begins. One that continues keeps the present one: an operator may have lowered
+    it for a reason.
+    """
+    if options.override is not None:
+        return int(options.override)
+    if not continued:
+        return FULL_OVERRIDE
+    percent = at.controller.read(OVERRIDE, 1)
+    if percent != FULL_OVERRIDE:
+        note(f"goes on with the present feed override, {percent} %: --override sets another one")
+    return percent
 
 
 def _continued(entry: Entry, job_number: int, begin: Place) -> Entry:
@@ -414,15 +429,15 @@ def _require_at(at: RunSession, machine: Machine, place: Nearest, *, unhomed: bo
 
 
 def _goto(machine: Machine, place: Nearest) -> str:
-    """What the operator does to move the axes to a place."""
+    """What the operator does to move the axes to a place; z is the last one to move."""
     point = [_coordinate(one) for one in place.point_mm]
-    more = f" --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
+    down = f", then the same command with --z {point[2]}" if len(point) > SPACE_AXES - 1 else ""
     turned = [
         f"{axis.name} {at}"
         for axis, at in zip(machine.path_axes[SPACE_AXES:], point[SPACE_AXES:], strict=True)
     ]
     along = f", with {', '.join(turned)} (hodograph goto of a path file)" if turned else ""
-    return f"lift the tool, hodograph goto {machine.file} --to {point[0]} {point[1]}{more}{along}"
+    return f"lift the tool, hodograph goto {machine.file} --to {point[0]} {point[1]}{down}{along}"
 
 
 def _coordinate(value: float) -> str:

@@ -773,7 +773,8 @@ def test_the_way_back_to_the_path_is_exact() -> None:
     passed = Nearest(Place(0, 0), 4, (1234.567891, -0.0000004, -0.5), 3.0)
     found = Nearest(Place(0, 5), 6, (1236.0, 0.0, -0.5), 1.5, passed)
     text = stream_command._off_the_path(_MACHINE, found)
-    assert "--to 1234.567891 0 --z -0.5, then hodograph stream --continue: back to line 4" in text
+    end = "then the same command with --z -0.5, then hodograph stream --continue: back to line 4"
+    assert f"--to 1234.567891 0, {end}" in text
     assert "1.5 mm from the path of the job, at line 6" in text
 
 
@@ -788,3 +789,19 @@ def test_a_job_goes_on_with_its_own_files_and_options(
     journal = str(tmp_path / "stream.json")
     assert main(["stream", "--continue", "--journal", journal, *words]) == 2
     assert "of the last job: give none" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("given", "continued", "percent", "said"),
+    [(None, False, 100, 0), (None, True, 30, 1), (10, True, 10, 0), (0, False, 0, 0)],
+)
+def test_the_override_with_which_a_job_begins(
+    monkeypatch: pytest.MonkeyPatch, given: int | None, continued: bool, percent: int, said: int
+) -> None:
+    """One that continues keeps the present override, 30 %."""
+    notes: list[str] = []
+    monkeypatch.setattr(stream_command, "note", notes.append)
+    at: Any = SimpleNamespace(controller=SimpleNamespace(read=lambda *_: 30))
+    options = Namespace(override=given)
+    assert stream_command._first_override(at, options, continued=continued) == percent
+    assert len(notes) == said
