@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* hodograph-controller: the same main for a process and for a microcontroller. Started by the shell on Linux, by the
- * start-up code of the port on a board. Owns the struct controller; its loop is the main loop. All I/O
- * is that of the port. */
+ * start-up code of the port on a board. Owns the struct controller; its loop is the main loop. All I/O is that of the
+ * port. */
 #include "app/controller.h"
 #include "port/port.h"
 

@@ -415,7 +415,7 @@ static const struct object objects[] = {
     {0x2055, 0x2055, 2, 2, SHARED, object_read_unhomed, NULL, NULL, NULL},
     {0x2056, 0x2056, 1, 3, OWN, NULL, object_write_start, NULL, NULL},
     {0x2057, 0x2057, 1, 1, SHARED, object_read_stop_commands, NULL, NULL, NULL},
-    {0x2058, 0x2058, 1, 5, SHARED, object_read_set_outputs, object_write_set_outputs, NULL, NULL},
+    {0x2058, 0x2058, 1, 5, SHARED, object_read_rest_outputs, object_write_rest_outputs, NULL, NULL},
     {0x2058, 0x2058, 6, 6, OWN, NULL, NULL, object_written_outputs_stay, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},

@@ -192,13 +192,13 @@ uint64_t object_read_outputs(struct controller *controller, const struct od_entr
     return outputs_value(&controller->tick.outputs.sent, entry->sub);
 }
 
-uint64_t object_read_set_outputs(struct controller *controller, const struct od_entry *entry)
+uint64_t object_read_rest_outputs(struct controller *controller, const struct od_entry *entry)
 {
     return outputs_value(&controller->machine.motion.outputs.values, entry->sub);
 }
 
-uint32_t object_write_set_outputs(struct controller *controller, const struct od_entry *entry,
-                                  uint64_t number)
+uint32_t object_write_rest_outputs(struct controller *controller, const struct od_entry *entry,
+                                   uint64_t number)
 {
     port_lock();
     struct path_outputs_values values = controller->machine.motion.outputs.values;

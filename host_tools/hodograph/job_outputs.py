@@ -41,6 +41,8 @@ from .toolpath.moves import (
     ToolChange,
 )
 
+Commands = tuple[Command, ...]
+
 WAITS = (Dwell, ProgramStop, ToolChange)
 """Commands at which a machine waits at rest."""
 
@@ -97,14 +99,18 @@ def is_output(command: Command, outputs: Outputs | None) -> bool:
     return isinstance(command, DigitalOutput | AnalogOutput)
 
 
-def with_spindle_waits(commands: Iterable[Command], outputs: Outputs | None) -> Iterator[Command]:
+def with_spindle_waits(commands: Iterable[Command], outputs: Outputs | None) -> Iterable[Command]:
     """The commands, with the wait of the machine file (`spindle_wait_s`) where the spindle starts or turns over."""
     wait_s = 0.0 if outputs is None else outputs.codes.spindle_wait_s
+    return _with_waits(commands, wait_s) if wait_s else commands
+
+
+def _with_waits(commands: Iterable[Command], wait_s: float) -> Iterator[Command]:
     turns = Rotation.STOPPED
     for command in commands:
         yield command
         if isinstance(command, Spindle):
-            if wait_s and command.rotation not in (Rotation.STOPPED, turns):
+            if command.rotation not in (Rotation.STOPPED, turns):
                 yield Dwell(command.line, wait_s)
             turns = command.rotation
 
@@ -119,13 +125,13 @@ class JobEvents:
     """
 
     events: list[Events]
-    before: tuple[Command, ...]
-    after: tuple[Command, ...]
+    before: Commands
+    after: Commands
 
 
 def job_events(
     sections: Sequence[SectionCommands],
-    after: tuple[Command, ...],
+    after: Commands,
     outputs: Outputs,
     file: Path,
     notes: list[str],
@@ -165,9 +171,6 @@ class SectionEvents:
     events: list[Event]
 
 
-Commands = tuple[Command, ...]
-
-
 def _at_first_wait(commands: Commands, *, is_last: bool = False) -> tuple[Commands, Commands]:
     """Commands before the first wait, which act at the end of the section before them, and those from it on. Without a
     wait all act at the start of the next section, or at the end if there is none.
@@ -200,7 +203,7 @@ class EventMaker:
     def section(
         self,
         section: SectionCommands,
-        after: tuple[Command, ...],
+        after: Commands,
         *,
         is_first: bool = False,
         is_last: bool = False,

@@ -20,14 +20,7 @@ from .bus.capture.setpoint_check import SetpointJumpError
 from .bus.diagnostics.texts import STATES
 from .bus.goto import goto
 from .bus.outputs import set_outputs
-from .bus.run import (
-    BusRun,
-    Progress,
-    RunSession,
-    analysed,
-    bring_up,
-    record_program,
-)
+from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
 from .bus.sdo.controller import FAULT_STATE, READY, Controller
 from .config import Machine
 from .errors import PlanError, RefusedError, RunError
@@ -178,9 +171,9 @@ def _run_sections(
         _to_start(at, section, made, program, unhomed)
         own = None if progress is None else _shifted(progress, passed)
         follows = number < len(job.sections) or acts_at_rest(job.after)
-        more = goes_off_at_end(job.machine) and follows
+        stay = goes_off_at_end(job.machine) and follows
         recorded = record_program(
-            at, job.machine, program.image, own, unhomed=unhomed, outputs_stay=more
+            at, job.machine, program.image, own, unhomed=unhomed, outputs_stay=stay
         )
         _require_end(at, section, made, program, place)
         passed += program.ticks
@@ -301,7 +294,7 @@ def _check_bus(at: RunSession, wait_s: float) -> None:
         at.rig.check()
     state = at.controller.state()
     if state == FAULT_STATE:
-        raise RunError(f"{at.controller.who()} is in fault: {at.controller.fault_advice()}")
+        raise at.controller.fault_error()
     if state != READY:
         raise RunError(
             f"{at.controller.who()} is in state {STATES.get(state, state)} at a rest of the job: another command has "

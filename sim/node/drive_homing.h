@@ -9,8 +9,8 @@
  *     35, 37   home is here
  *
  * Switches are read once in each period, so the error of home is the distance of a period at the slow speed. In each
- * period the servo calls drive_homing_move, reads the switches, then calls drive_homing_evaluate. The one thread
- * of hodograph-drive.
+ * period the servo calls drive_homing_move, reads the switches, then calls drive_homing_evaluate. The one thread of
+ * hodograph-drive.
  */
 #ifndef NODE_DRIVE_HOMING_H
 #define NODE_DRIVE_HOMING_H

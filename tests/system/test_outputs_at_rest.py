@@ -70,6 +70,25 @@ def job(folder: Path, text: str = JOB) -> str:
     return str(file)
 
 
+def words(folder: Path, machine: Path, file: str, name: str = "stream") -> tuple[str, ...]:
+    """The arguments of `run`, or of `stream` with a journal of its own."""
+    more = ("--journal", str(folder / "stream.json")) if name == "stream" else ()
+    return (file, "--machine", str(machine), *more)
+
+
+def await_state(bench: Bench, state: int) -> None:
+    while bench.controller.state() != state:
+        bench.clock.sleep(0.001)
+
+
+def ends_at_once(clock: VirtualClock, command: Command, text: str) -> None:
+    """Within a second, with this in its message."""
+    begun_s = clock.now_s()
+    assert command.wait() == 6, command.err
+    assert text in command.err
+    assert clock.now_s() < begun_s + 1.0
+
+
 def outputs_meanwhile(bench: Bench, clock: VirtualClock, command: Command) -> list[tuple[int, int]]:
     """Digital outputs and position of the first axis in um, each time one of the outputs has changed."""
     found: list[tuple[int, int]] = []
@@ -85,9 +104,8 @@ def outputs_meanwhile(bench: Bench, clock: VirtualClock, command: Command) -> li
 def test_the_spindle_turns_before_the_axes_move(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path, name: str
 ) -> None:
-    more = ("--journal", str(tmp_path / "stream.json")) if name == "stream" else ()
-    words = (job(tmp_path), "--machine", str(machine), *more)
-    with running(clock, name, *words, name=name) as command:
+    given = words(tmp_path, machine, job(tmp_path), name)
+    with running(clock, name, *given, name=name) as command:
         seen = outputs_meanwhile(bench, clock, command)
         assert command.wait() == 0, command.err
     assert [one for one, _ in seen[:5]] == [0, SPINDLE, SPINDLE | VALVE, SPINDLE, SPINDLE | VALVE]
@@ -105,9 +123,9 @@ def test_the_spindle_turns_before_the_axes_move(
 def test_a_stop_in_the_dwell_before_the_first_move_ends_the_job(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path, name: str, command: int
 ) -> None:
-    more = ("--journal", str(tmp_path / "stream.json")) if name == "stream" else ()
     file = job(tmp_path, JOB.replace("G4 P1", "G4 P20"))
-    with running(clock, name, file, "--machine", str(machine), *more, name=name) as process:
+    given = words(tmp_path, machine, file, name)
+    with running(clock, name, *given, name=name) as process:
         while not bench.controller.read(OUTPUTS, 1):
             clock.sleep(0.05)
         clock.sleep(1.0)
@@ -143,8 +161,7 @@ def test_an_error_before_the_first_move_switches_the_outputs_off(
 ) -> None:
     """Here standard input ends at a program stop. No axis has moved."""
     file = job(tmp_path, "F6000\nM3 S40\nM0\nG1 X6\nM30\n")
-    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
-    with running(clock, "stream", *words, name="stream") as command:
+    with running(clock, "stream", *words(tmp_path, machine, file), name="stream") as command:
         assert SPINDLE in [one for one, _ in outputs_meanwhile(bench, clock, command)]
         assert command.wait() == 2, command.err
     clock.sleep(0.1)
@@ -185,13 +202,9 @@ def test_a_stop_while_the_drives_are_switched_on_ends_the_job(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
 ) -> None:
     with running(clock, "run", job(tmp_path), "--machine", str(machine), name="run") as command:
-        while bench.controller.state() != ENABLING:
-            clock.sleep(0.001)
+        await_state(bench, ENABLING)
         bench.controller.command(STOP)
-        begun_s = clock.now_s()
-        assert command.wait() == 6, command.err
-        assert "a stop was commanded" in command.err
-    assert clock.now_s() < begun_s + 1.0
+        ends_at_once(clock, command, "a stop was commanded")
 
 
 def test_outputs_go_off_at_the_end_without_the_host(
@@ -199,15 +212,13 @@ def test_outputs_go_off_at_the_end_without_the_host(
 ) -> None:
     """It is killed when the controller has the whole job."""
     file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nG1 X4\nM30\n")
-    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
-    with running(clock, "stream", *words, name="stream") as command:
+    with running(clock, "stream", *words(tmp_path, machine, file), name="stream") as command:
         while bench.controller.targets(1)[0] != 2_000_000:
             clock.sleep(0.05)
         clock.sleep(0.5)
         assert bench.controller.read(OUTPUTS, 1) == VALVE
         command.kill()
-    while bench.controller.state() != READY:
-        clock.sleep(0.05)
+    await_state(bench, READY)
     clock.sleep(0.1)
     assert bench.controller.targets(1) == [4_000_000]
     assert bench.controller.read(OUTPUTS, 1) == 0
@@ -217,17 +228,11 @@ def test_drives_off_just_after_the_motion_end_a_stream_at_once(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path
 ) -> None:
     file = job(tmp_path, "F6000\nM64 P0\nG1 X2\nG4 P1\nM30\n")
-    words = (file, "--machine", str(machine), "--journal", str(tmp_path / "stream.json"))
-    with running(clock, "stream", *words, name="stream") as command:
-        while bench.controller.state() != RUNNING:
-            clock.sleep(0.001)
-        while bench.controller.state() != READY:
-            clock.sleep(0.001)
+    with running(clock, "stream", *words(tmp_path, machine, file), name="stream") as command:
+        await_state(bench, RUNNING)
+        await_state(bench, READY)
         bench.controller.command(DISABLE)
-        begun_s = clock.now_s()
-        assert command.wait() == 6, command.err
-        assert "the drives" in command.err
-    assert clock.now_s() < begun_s + 1.0
+        ends_at_once(clock, command, "the drives")
 
 
 def test_the_end_of_a_file_is_executed_where_it_ends(
@@ -237,9 +242,8 @@ def test_the_end_of_a_file_is_executed_where_it_ends(
     first, second = tmp_path / "first.ngc", tmp_path / "second.ngc"
     first.write_text("F6000\nG1 X6\nG4 P0.3\n(MSG,glue)\nM64 P0\nG4 P0.3\nM65 P0\nM30\n")
     second.write_text("F6000\nG4 P0.3\nG1 X2\nM30\n")
-    words = (str(first), str(second), "--machine", str(machine))
-    journal = str(tmp_path / "stream.json")
-    with running(clock, "stream", *words, "--journal", journal, name="stream") as command:
+    given = words(tmp_path, machine, str(second))
+    with running(clock, "stream", str(first), *given, name="stream") as command:
         seen = outputs_meanwhile(bench, clock, command)
         assert command.wait() == 0, command.err
         assert f"{first}:4: glue" in command.err
@@ -260,8 +264,8 @@ def test_switching_by_hand(
     off = {"valve": False, "needle": False, "laser": False, "power": 0.0}
     assert json.loads(capsys.readouterr().out) == off
     assert main(["output", str(machine), "valve=on", "power=50"]) == 0
-    words = capsys.readouterr().out.split()
-    assert words == ["valve", "on", "needle", "off", "laser", "off", "power", "50", "%"]
+    printed = capsys.readouterr().out.split()
+    assert printed == ["valve", "on", "needle", "off", "laser", "off", "power", "50", "%"]
     clock.sleep(0.1)
     assert (bench.controller.read(OUTPUTS, 1), bench.controller.read(OUTPUTS, 3)) == (VALVE, 16384)
     assert main(["output", str(machine), "power=0", "needle=on"]) == 0

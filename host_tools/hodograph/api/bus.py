@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
 
-from ..bus.goto import goto, require_inside_travel
+from ..bus.goto import goto, switch_on
 from ..bus.hub import LocalHub
 from ..bus.own_bus import bus_address
 from ..bus.run import BusRun, RunSession, run_program, run_session
@@ -73,8 +73,7 @@ class Controller:
 
     def enable(self) -> None:
         """Switches the drives on; returns at standstill. Raises RefusedError: an axis stands outside of its travel."""
-        require_inside_travel(self._node, self._machine._file)
-        self._node.enable()
+        switch_on(self._node, self._machine._file)
 
     def disable(self) -> None:
         """Switches the drives off, at standstill."""

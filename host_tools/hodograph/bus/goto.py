@@ -129,9 +129,17 @@ def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, 
     return [(start_mm, detour), (detour, end_mm)]
 
 
-def require_inside_travel(controller: Controller, machine: Machine) -> None:
-    """Call it before drives are switched on: a drive outside of its software limits moves to them at once, without a
-    ramp. An axis may stand there after a limit switch. Raises RefusedError, naming the axis.
+def switch_on(controller: Controller, machine: Machine) -> None:
+    """Switches the drives on; returns at standstill, ready. Raises RefusedError, naming the axis: it stands outside of
+    its travel. The controller refuses this too, but does not name the axis.
+    """
+    _require_inside_travel(controller, machine)
+    controller.enable()
+
+
+def _require_inside_travel(controller: Controller, machine: Machine) -> None:
+    """A drive outside of its software limits moves to them at once, without a ramp. An axis may stand there after a
+    limit switch.
     """
     if controller.state_after_boot() != OFF:
         return

@@ -9,7 +9,7 @@ from ..errors import RefusedError
 from ..events import ANALOGUES, OutputValues
 from .diagnostics.texts import STATES
 from .sdo.controller import Controller, lacks_object
-from .sdo.objects import READY, SET_OUTPUTS
+from .sdo.objects import READY, STANDSTILL_OUTPUTS
 
 _FIRST_ANALOGUE = 3
 """Subindex of the first analogue output; digital outputs are subs 1 and 2."""
@@ -24,9 +24,9 @@ def set_outputs(controller: Controller, values: OutputValues) -> None:
     controller.acted = True
     try:
         for i, value in enumerate(values.analogue):
-            controller.write(SET_OUTPUTS, _FIRST_ANALOGUE + i, value)
+            controller.write(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i, value)
         for sub in (1, 2):
-            controller.write(SET_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
+            controller.write(STANDSTILL_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
     except RefusedError as error:
         raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
 
@@ -44,6 +44,6 @@ def _reason(controller: Controller, error: RefusedError) -> str:
 
 def outputs_of(controller: Controller) -> OutputValues:
     """The outputs as a program, or `set_outputs`, has switched them last."""
-    digital = controller.read(SET_OUTPUTS, 1) | controller.read(SET_OUTPUTS, 2) << 8
-    analogue = (controller.read(SET_OUTPUTS, _FIRST_ANALOGUE + i) for i in range(ANALOGUES))
+    digital = controller.read(STANDSTILL_OUTPUTS, 1) | controller.read(STANDSTILL_OUTPUTS, 2) << 8
+    analogue = (controller.read(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i) for i in range(ANALOGUES))
     return OutputValues(digital, tuple(analogue))

@@ -21,7 +21,7 @@ from .capture.decode import unhomed_starts
 from .capture.frames import Frames
 from .capture.recorder import Recorder
 from .capture.recordings import write_recording
-from .goto import goto, require_inside_travel
+from .goto import goto, switch_on
 from .processes import SimulatedMachine
 from .sdo.controller import DISABLE, STATISTICS, Controller, connect
 from .sdo.follow import Follower
@@ -153,8 +153,7 @@ def bring_up(at: RunSession, machine: Machine, kernel: str, override: int = FULL
     """Configures the controller, sets the feed override (per cent) and switches the drives on."""
     at.controller.configure(machine, kernel)
     at.controller.override(override)
-    require_inside_travel(at.controller, machine)
-    at.controller.enable()
+    switch_on(at.controller, machine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +181,7 @@ def record_program(
     outputs_stay: bool = False,
 ) -> Recorded:
     """Uploads a program at whose start the axes stand, starts it, and waits until they stand again. `outputs_stay`:
-    also on a machine whose outputs go off at the end of a program.
+    the outputs stay on at its end, although the configuration switches them off there.
 
     Raises RefusedError, BusError, and RunError for a fault.
     """

@@ -287,13 +287,13 @@ def _check(command: Command) -> None:
     options.json(check)
 
 
-def _machine_file(parser: ArgumentParser, then: str = "") -> None:
-    """Adds an optional FILE; `then`: help text about its use."""
+def _machine_file(parser: ArgumentParser, then: str = "", *, required: bool = False) -> None:
+    """Adds a FILE, optional unless `required`; `then`: help text about its use."""
     parser.add_argument(
         "file",
         metavar="FILE",
         type=Path,
-        nargs="?",
+        nargs=None if required else "?",
         help=f"machine file, or a path file that names one{then}",
     )
 
@@ -355,9 +355,7 @@ def _override(command: Command) -> None:
 
 def _output(command: Command) -> None:
     output = command("output", "switch outputs by hand at standstill, or print them")
-    output.add_argument(
-        "file", metavar="FILE", type=Path, help="machine file, or a path file that names one"
-    )
+    _machine_file(output, required=True)
     output.add_argument(
         "assignments",
         metavar="NAME=VALUE",

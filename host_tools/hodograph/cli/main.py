@@ -71,18 +71,8 @@ _AWAITED = frozenset(
             "report",
         ),
         *("paper", "tune", "identify", "upload", "goto", "run", "stream", "campaign", "faults"),
-        *(
-            "demo",
-            "latency",
-            "scan",
-            "check",
-            "configure",
-            "home",
-            "output",
-            "start",
-            "hold",
-            "stop",
-        ),
+        *("demo", "latency", "scan", "check", "configure"),
+        *("home", "output", "start", "hold", "stop"),
     )
 )
 """Commands whose running time a terminal shows; the others end at once, or at Ctrl-C."""

@@ -12,7 +12,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from ..bus.goto import goto as goto_point
-from ..bus.goto import require_inside_travel
+from ..bus.goto import switch_on
 from ..bus.outputs import outputs_of, set_outputs
 from ..bus.own_bus import bus_address, opened_bus
 from ..bus.run import BusRun, rig_until_interrupted
@@ -96,9 +96,8 @@ def goto(options: Namespace) -> None:
     with reached(address, machine.node, machine.bitrate, options.wait) as controller:
         controller.require_standing()
         controller.configure(machine, options.kernel or machine.kernel)
-        require_inside_travel(controller, machine)
         with stopping(controller):
-            controller.enable()
+            switch_on(controller, machine)
             follower = Follower(controller, note)
             distance_mm = goto_point(controller, machine, end, follower, unhomed=options.unhomed)
         if image is not None:
@@ -122,8 +121,7 @@ def output(options: Namespace) -> None:
             require_fit(machine)
             controller.require_standing()
             controller.configure(machine, options.kernel or machine.kernel)
-            require_inside_travel(controller, machine)
-            controller.enable()
+            switch_on(controller, machine)
             state = SwitchedOutputs(outputs_of(controller))
             state.act(events_of(wanted))
             set_outputs(controller, state.at_rest)

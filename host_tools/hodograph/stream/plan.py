@@ -24,7 +24,7 @@ from ..config import Machine, load_paths
 from ..errors import InputError, PlanError, RunError, SectionPlanError
 from ..events import Events, OutputValues, SwitchedOutputs, events_after
 from ..fixed_point import MM_PER_Q40
-from ..job_outputs import WAITS
+from ..job_outputs import acts_at_rest
 from ..names import STANDARD_INPUT, is_toolpath
 from ..toolpath.files import ReadOptions
 from ..toolpath.moves import Command, Dwell, ProgramStop, SwitchedAtRest, ToolChange
@@ -90,7 +90,7 @@ class PlanRests:
 
 
 @dataclass(frozen=True)
-class Ending:
+class FileEnd:
     """Commands at rest at the end of a file that is followed by another one."""
 
     file: Path
@@ -103,7 +103,7 @@ class PlannedSection:
 
     number       in the job, over all files
     before       commands at rest before it
-    ending       those at the end of the file before, where the axes stand before they move to this section
+    file_end     of the file before: the axes stand there before they move to this section
     start_q40    arc length of the controller's job at its start
     rest         what the controller does at rest before it; None: a job of the controller begins with it
     standing_mm  positions of the axes before those of its programs, without the work offset
@@ -116,7 +116,7 @@ class PlannedSection:
     start_q40: int = 0
     rest: Rest | None = None
     standing_mm: tuple[float, ...] = ()
-    ending: Ending | None = None
+    file_end: FileEnd | None = None
 
 
 class _EndedError(Exception):
@@ -257,8 +257,8 @@ class JobPlan:
     def _wait_s(self, section: PlannedSection) -> float:
         """Standstill before a section in s, without the time of program stops."""
         if section.rest is None:
-            ending_s = 0.0 if section.ending is None else dwell_s(section.ending.commands)
-            return ending_s + dwell_s(section.before)
+            file_end_s = 0.0 if section.file_end is None else dwell_s(section.file_end.commands)
+            return file_end_s + dwell_s(section.before)
         period_us = self._job.machine.period_us
         return 1e-6 * period_us * section.rest.ticks(period_us)
 
@@ -347,24 +347,24 @@ class JobPlan:
     def _planning(self) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         """The chunks of all files, with their sections and their new motion in s."""
         number = 0
-        ending: Ending | None = None
+        file_end: FileEnd | None = None
         for file in self._job.files:
             self.after = ()
             if is_toolpath(file):
-                number = yield from self._toolpath(file, number, ending)
+                number = yield from self._toolpath(file, number, file_end)
                 if self._ending:
                     return
             else:
-                yield from self._paths(file, number, ending)
+                yield from self._paths(file, number, file_end)
                 number += len(load_paths(file))
-            ending = Ending(file, self.after)
+            file_end = FileEnd(file, self.after)
 
     def _toolpath(
-        self, file: Path, number: int, ending: Ending | None
+        self, file: Path, number: int, file_end: FileEnd | None
     ) -> Generator[tuple[PlannedSection, Chunk, float], None, int]:
         """The chunks of a toolpath, the first section of which is `number`. Returns the number after the last.
 
-        ending  of the file before
+        file_end  of the file before it
         """
         place: JobPlace | None = None
         first = number
@@ -383,7 +383,7 @@ class JobPlan:
                     section.first_line,
                     before,
                     standing_mm=section.standing_mm,
-                    ending=None if begin_q40 else ending,
+                    file_end=None if begin_q40 else file_end,
                 )
                 if place is None:
                     first = number
@@ -404,7 +404,7 @@ class JobPlan:
                 place = yield from self._chunks_of(made, chunks)
             elif not self._skip(section, switched):
                 return number
-            ending = None
+            file_end = None
             number += 1
         self.after = reader.after
         return number
@@ -439,7 +439,7 @@ class JobPlan:
         return ParallelReader(reader) if self._processes > 1 else reader
 
     def _paths(
-        self, file: Path, number: int, ending: Ending | None
+        self, file: Path, number: int, file_end: FileEnd | None
     ) -> Iterator[tuple[PlannedSection, Chunk, float]]:
         """The paths of a path file as sections, the first with this number."""
         begin = self._begin
@@ -452,7 +452,7 @@ class JobPlan:
             own = None
             if header.rest is None:
                 before, start_q40 = () if header.job_start_q40 else before, 0
-                own, ending = None if header.job_start_q40 else ending, None
+                own, file_end = None if header.job_start_q40 else file_end, None
             section = PlannedSection(
                 number + header.line - 1,
                 file,
@@ -513,7 +513,7 @@ def _switched_first(
     codes = outputs.codes
     wait_s = min(codes.restart_wait_s(values), codes.restart_wait_s(moving.at_rest))
     waits = (Dwell(section.first_line, wait_s),) if wait_s else ()
-    if not waits and not any(isinstance(one, WAITS) for one in before):
+    if not waits and not acts_at_rest(before):
         return before
     return (SwitchedAtRest(section.first_line, values), *waits, *before)
 

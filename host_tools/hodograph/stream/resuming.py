@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..fixed_point import MM_PER_Q40, nearest_q40
 from ..names import is_toolpath
 from ..pipeline import pipeline_of
-from .geometry import Block, Curve
+from .geometry import Block, Chords, Curve
 from .journal import Entry
 from .plan import JobFiles, Place
 from .reading import StreamReader
@@ -105,9 +105,9 @@ def nearest_place(job: JobFiles, entry: Entry, at_mm: tuple[float, ...]) -> Near
 
 
 def place_of_line(job: JobFiles, line: int) -> Nearest:
-    """Where the motion of a source line of the first file begins on the path; of a line that is executed several times,
-    where it begins first. If the line has no motion, where the next motion begins. Within a fitted curve it may be the
-    start of the segment around this place.
+    """Where the motion of a source line of the first file, a toolpath, begins on the path; of a line that is executed
+    several times, where it begins first. If the line has no motion, where the next motion begins. Within a fitted curve
+    it may be the start of the segment around this place.
 
     Raises InputError: no motion is at this line or after it; InputError and PlanError as reading the job does.
     """
@@ -115,12 +115,13 @@ def place_of_line(job: JobFiles, line: int) -> Nearest:
     for number, blocks, standing_mm in _sections(job, with_chords=True):
         begin_mm = 0.0
         for block in blocks:
-            lines = block.line if block.chords is None else block.chords.line
+            assert block.chords is not None
+            lines = block.chords.line
             here = np.flatnonzero(lines == line)
             later = np.flatnonzero(lines > line)
             if here.size or (later.size and after is None):
                 index = int((here if here.size else later)[0])
-                arc_mm = _begin_of(block, index, job.tolerance_mm)
+                arc_mm = _begin_of(block.chords, index, block.curve, job.tolerance_mm)
                 place = _place(number, begin_mm + arc_mm)
                 found = _programmed(job, block, arc_mm, place, standing_mm)
                 found = replace(found, line=int(lines[index]))
@@ -133,17 +134,14 @@ def place_of_line(job: JobFiles, line: int) -> Nearest:
     return after
 
 
-def _begin_of(block: Block, index: int, tolerance_mm: float) -> float:
-    """Arc length of a block at which a chord begins, or a segment if the block has no chords. The start of the segment
-    before the chord, where the curve is not near the programmed point: cutting a part twice is better than leaving it
-    out.
+def _begin_of(chords: Chords, index: int, curve: Curve, tolerance_mm: float) -> float:
+    """Arc length of a block's curve at which a chord begins. Where the curve is not near the programmed point there,
+    the start of its segment: cutting a part twice is better than leaving it out.
     """
-    starts_mm = block.curve.segment_starts_mm
-    if block.chords is None:
-        return float(starts_mm[index])
-    arc_mm = float(block.chords.start_mm[index])
-    if block.chords.off_mm[index] <= max(2.0 * tolerance_mm, _START_MM):
+    arc_mm = float(chords.start_mm[index])
+    if chords.off_mm[index] <= max(2.0 * tolerance_mm, _START_MM):
         return arc_mm
+    starts_mm = curve.segment_starts_mm
     segment = int(np.searchsorted(starts_mm, arc_mm + _START_MM, side="right")) - 1
     return float(starts_mm[max(segment, 0)])
 

@@ -174,12 +174,12 @@ class Sender:
         return max(FULL_OVERRIDE, self.override)
 
     def run(self) -> StreamedJob:
-        """Sends the whole job and returns at its end. Raises RefusedError, BusError, RunError, and errors of planning
-        once the motion has come to rest. Any exception first stops the axes on their path, unless nothing was started.
+        """Sends the whole job and returns at its end; within `ending_at_stops` of the controller. Raises RefusedError,
+        BusError, RunError, and errors of planning once the motion has come to rest. Any exception first stops the axes
+        on their path, unless nothing was started.
         """
         try:
-            with self.at.controller.ending_at_stops():
-                done = self._run()
+            done = self._run()
         except BaseException as error:
             self.at.controller.stop_after(error)
             with suppress(HodographError):
@@ -245,8 +245,10 @@ class Sender:
 
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
         """Sends sections that the controller runs as one job, beginning with this one."""
-        if section.ending is not None:
-            execute_at_rest(self.at, section.ending.file, section.ending.commands, self.operator)
+        if section.file_end is not None:
+            execute_at_rest(
+                self.at, section.file_end.file, section.file_end.commands, self.operator
+            )
         self._to_start(section, chunk)
         execute_at_rest(self.at, section.file, section.before, self.operator)
         self._to_start(section, chunk)

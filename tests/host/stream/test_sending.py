@@ -390,9 +390,6 @@ class Stopped:
     def stop_and_wait(self) -> None:
         self.stops += 1
 
-    def ending_at_stops(self) -> nullcontext[None]:
-        return nullcontext()
-
 
 def stops_after(monkeypatch: pytest.MonkeyPatch, error: BaseException, *, moved: bool) -> int:
     """How often a job that ends with the error stops the axes."""
@@ -682,7 +679,6 @@ def test_a_lowered_override_is_taken_back_at_the_end(
     at = Overridden(before)
     at.controller.state = lambda: state
     at.controller.stop_after = lambda _: None
-    at.controller.ending_at_stops = nullcontext
     plan: Any = SimpleNamespace(greatest_rate=lambda: 20_000.0)
     known: Any = at
     nothing: Any = None

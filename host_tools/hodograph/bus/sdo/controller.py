@@ -72,7 +72,7 @@ from .objects import (
     RESUME,
     RUNNING,
     SAVE,
-    SET_OUTPUTS,
+    STANDSTILL_OUTPUTS,
     START,
     START_FROM,
     START_POSITION,
@@ -269,7 +269,7 @@ class Controller(Node):
             if state in states:
                 return state
             if state == FAULT_STATE:
-                raise RunError(f"{self.who()} is in fault: {self.fault_advice()}")
+                raise self.fault_error()
             if self.clock.now_s() > deadline:
                 names = " or ".join(STATES[s] for s in states)
                 raise BusError(
@@ -324,6 +324,10 @@ class Controller(Node):
         remedy = fault_words(self.read(FAULT, 1)).remedy
         return f"{self.fault_text()}: {remedy}; then hodograph reset"
 
+    def fault_error(self) -> RunError:
+        """The error for the present fault."""
+        return RunError(f"{self.who()} is in fault: {self.fault_advice()}")
+
     def require_standing(self) -> None:
         """Raises RefusedError: axes move by another command, which is not interrupted."""
         state = self.state()
@@ -360,7 +364,7 @@ class Controller(Node):
         unhomed  also if axes with a homing method are not homed
         image    the program that was uploaded to be started; None: any
         job      number of the streamed job to be started; None: any
-        outputs_stay  also on a machine whose outputs go off at the end of a program
+        outputs_stay  the outputs stay on at the end, although the configuration switches them off there
 
         Raises InputError: the path does not have the place. Raises RefusedError: another program or job is there.
         Raises RunError: a stop command came since `ending_at_stops` began.
@@ -392,7 +396,7 @@ class Controller(Node):
         if self._stops is not None:
             self.write(STOP_COMMANDS, 2, self._stops)
         if outputs_stay:
-            self.write(SET_OUTPUTS, _STAY_AT_END, 1)
+            self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 1)
 
     def _start(self, command: int, image: bytes | None, job: int | None) -> None:
         """One attempt. The start names its program or job, since a client on another computer may replace it at any
@@ -429,20 +433,17 @@ class Controller(Node):
     @contextmanager
     def ending_at_stops(self) -> Iterator[None]:
         """For the length of a job: a stop command of any client also ends it where the axes stand, for example in a
-        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on; one
-        within another one is without effect.
+        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on.
         """
-        before = self._stops
-        if before is None:
-            try:
-                self._stops = self.read(STOP_COMMANDS, 1)
-            except RefusedError as error:
-                if not lacks_object(error):
-                    raise
+        try:
+            self._stops = self.read(STOP_COMMANDS, 1)
+        except RefusedError as error:
+            if not lacks_object(error):
+                raise
         try:
             yield
         finally:
-            self._stops = before
+            self._stops = None
 
     def _expect_no_stop(self) -> None:
         """After a command of this connection that the controller counts as a stop: it does not end the job."""
@@ -459,7 +460,7 @@ class Controller(Node):
 
     def let_outputs_end(self) -> None:
         """Takes `outputs_stay` of `start` back while the motion lasts."""
-        self.write(SET_OUTPUTS, _STAY_AT_END, 0)
+        self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 0)
 
     def stop_and_wait(self, wait_s: float = 10.0) -> None:
         """Controlled stop on the path; returns when the axes stand. At standstill it switches the outputs off."""
@@ -549,7 +550,7 @@ _TWICE = (ENABLE, DISABLE, RESET)
 _NAMED_PROGRAM, _NAMED_JOB = {START: 1, START_FROM: 2}, 3
 """Subindices of NAMED_START."""
 _STAY_AT_END = 6
-"""Subindex of SET_OUTPUTS."""
+"""Subindex of STANDSTILL_OUTPUTS."""
 _PREFIX = 16
 """Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")
