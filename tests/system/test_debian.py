@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`make deb` and `make container`: in a clean root of Debian, without other files of this project. Run by pytest;
-starts `make`, and writes to temporary folders.
+starts `make`, which writes build/, and writes to temporary folders.
 """
 
 from __future__ import annotations

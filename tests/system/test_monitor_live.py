@@ -2,7 +2,7 @@
 """`hodograph monitor` on a bus in virtual time, in a browser.
 
 The time of the bus advances only while a test allows it, so the page may take any time. Run by pytest; starts a browser
-and a machine on a local bus, and writes to temporary folders.
+and a machine on a local bus, and writes to build/monitor and temporary folders.
 """
 
 from __future__ import annotations
