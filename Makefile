@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Every entry point of Hodograph; `make help` lists them.
+# Every entry point of Hodograph; `make help` lists them. Run by hand, by .ci/run and by tests.
 #
 # Sources are found by wildcard, so a new file needs no line here. All output is under build/ (BUILD=...
 # to change), except .venv and the cffi module, which Python has to find beside its package.

@@ -3,8 +3,8 @@
 
     python benchmarks/kernels.py [--json OUT] [--points N] [--compiler CC]
 
-Run by `make bench`. Compiles firmware/core as a shared object of its own, in a temporary folder. Prints the figures and
-writes them as one JSON object:
+Run by `make bench`; tests/host/core/test_accuracy.py uses it. Compiles firmware/core as a shared object of its own, in
+a temporary folder. Prints the figures and writes them as one JSON object:
 
 - accuracy: largest distance from the program as uploaded in 50-digit arithmetic, on random segments at the
   limit of the speed ratio (31 mm to 1e-6 mm) and on the golden programs;

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: MIT
 """emulate.py TARGET --bus INTERFACE ...: the controller on an emulated board, in place of hodograph-controller.
 
-Used by tools/til, tools/count_til and tools/stream_soak. Started as a process, by these or by hand.
+Used by tools/til, tools/count_til and tools/stream_soak. Started as a process, by these, by tests or by hand.
 
-Starts QEMU with the image of `make firmware`, and hodograph-bridge, which joins it to the bus; ends both. Takes the
-options of hodograph-controller and has its exit status. docs/guides/target.md has more.
+Starts QEMU with the image of `make firmware`, and hodograph-bridge, which joins it to the bus; ends both. Writes to a
+temporary folder, and prints errors to stderr. Takes the options of hodograph-controller and has its exit status.
+docs/guides/target.md has more.
 """
 
 from __future__ import annotations

@@ -5,7 +5,8 @@
     .venv/bin/python tools/longest_path.py an386 float
     .venv/bin/python tools/longest_path.py --update     # the tables of docs/validation/wcet.md
 
-Run by tests/system/test_longest_path.py and by hand. Reads images by the binary utilities.
+Run by tests/system/test_longest_path.py and by hand. Reads images by the binary utilities. --update writes
+docs/validation/wcet.md.
 
 Needs `make firmware`. Prints each function with all that it calls, in instructions; docs/validation/wcet.md compares
 the sum with what was counted. Exit status 1 when no bound can be shown.

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* setpoints IMAGE [COUNTS_PER_MM]: prints the setpoints of a program in counts, a line for each period. */
+/* setpoints IMAGE [COUNTS_PER_MM]: prints the setpoints of a program in counts, a line for each period. Built and run
+ * by hand (docs/guides/embed.md) and by tests. Reads IMAGE, prints to stdout and stderr; no bus and no drives. */
 #include <hodograph.h>
 
 #include <stdio.h>

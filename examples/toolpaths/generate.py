@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Writes the toolpaths of this folder: `python generate.py`. Lengths in mm, feeds in mm/min.
+"""Makes the toolpaths of this folder. Run by hand (`python generate.py`), and used by tests. Writes the files below.
+Lengths in mm, feeds in mm/min.
 
 pocket.ngc     a plate with two pockets, a slot and four holes: arcs, helices, a drilling cycle, two tools
 engraving.ngc  a sign: cubic Bézier curves (G5), a NURBS (G5.2) and lines, between rapid moves
@@ -15,12 +16,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 SAFE_Z = 5.0
+_NOTE = (
+    "made by generate.py, read by commands of hodograph, of which run and stream move axes along it"
+)
 
 
 def pocket() -> Iterator[str]:
     """Two round pockets by helix and spiral, a slot with round ends, four holes."""
     yield from (
-        "(plate with pockets)",
+        f"(plate with pockets, {_NOTE})",
         "G21 G17 G90 G94 G64 P0.01",
         "T1 M6 (end mill 6 mm)",
         "G43 H1",
@@ -48,7 +52,7 @@ def pocket() -> Iterator[str]:
 
 def engraving() -> Iterator[str]:
     """A frame with round corners, a wave of Bézier curves, and a leaf as a NURBS."""
-    yield from ("(sign)", "G21 G17 G90 G94 G64 P0.01", "S18000 M3")
+    yield from (f"(sign, {_NOTE})", "G21 G17 G90 G94 G64 P0.01", "S18000 M3")
     yield "G0 X5 Y0 Z2\nG1 Z-0.3 F300\nF1500"
     yield "G1 X85\nG3 X90 Y5 J5\nG1 Y35\nG3 X85 Y40 I-5\nG1 X5\nG3 X0 Y35 J-5\nG1 Y5\nG3 X5 Y0 I5"
     yield "G0 Z2\nG0 X10 Y10\nG1 Z-0.3 F300\nF1500"
@@ -62,7 +66,11 @@ def engraving() -> Iterator[str]:
 
 def dispensing() -> Iterator[str]:
     """Round the rim of a lid; the valve opens and closes with moves, so that the bead begins and ends on the move."""
-    yield from ("(bead of adhesive)", "G21 G17 G90 G94 G64 P0.05", "M68 E0 Q2.5 (pressure, bar)")
+    yield from (
+        f"(bead of adhesive, {_NOTE})",
+        "G21 G17 G90 G94 G64 P0.05",
+        "M68 E0 Q2.5 (pressure, bar)",
+    )
     for x in (0.0, 120.0):
         yield f"(lid at X{x:g})\nG0 X{x + 20:g} Y10 Z3\nG1 Z0.4 F600\nG4 P0.05"
         yield f"M62 P0 (valve opens with the next move)\nG1 X{x + 90:g} F3000"
@@ -80,7 +88,7 @@ def surface() -> Iterator[str]:
         return 3.0 * math.sin(x / 9.0) * math.cos(y / 13.0) - 3.0
 
     yield from (
-        "(surface, ball end mill 6 mm)",
+        f"(surface, ball end mill 6 mm, {_NOTE})",
         "G21 G17 G90 G94 G64 P0.01",
         "S18000 M3",
         f"G0 X0 Y0 Z{SAFE_Z:g}",
@@ -97,7 +105,7 @@ def surface() -> Iterator[str]:
 def five_axes() -> Iterator[str]:
     """One turn up a dome in chords of about 0.5 mm; A and C turn with X, Y and Z."""
     yield from (
-        "(groove round a dome, X Y Z A C)",
+        f"(groove round a dome, X Y Z A C, {_NOTE})",
         "G21 G17 G90 G94 G64 P0.01",
         "S18000 M3",
         f"G0 X30 Y0 Z{SAFE_Z:g}",

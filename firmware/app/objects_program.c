@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/objects_program.h (see there): handlers of object 0x2000, for the table and the hooks in objects.c.
- * Called by objects.c only. They read and change controller->slot. `context` is the controller. Main loop. */
+ * Called by objects.c only. They read and change controller->slot, which writes the store; a new program closes
+ * controller->stream. `context` is the controller. Main loop. */
 #include "app/objects_program.h"
 
 #include <string.h>

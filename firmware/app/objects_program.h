@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* objects_program: handlers of object 0x2000, for the table and the hooks in objects.c: the image (sub 1, a DOMAIN),
  * state of the upload, data of the program in the slot. Called by objects.c only. They read and change
- * controller->slot. `context` is the controller. Main loop. */
+ * controller->slot, which writes the store; a new program closes controller->stream. `context` is the controller. Main
+ * loop. */
 #ifndef APP_OBJECTS_PROGRAM_H
 #define APP_OBJECTS_PROGRAM_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/objects_stream.h (see there): handlers of object 0x2060, for the table and the hooks in objects.c.
- * Called by objects.c only. Main loop. Reads and changes controller->stream. */
+ * Called by objects.c only. Main loop. Reads and changes controller->stream, and reads the machine. */
 #include "app/objects_stream.h"
 
 #include "canopen/sdo_abort.h"

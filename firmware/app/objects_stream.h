@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* objects_stream: handlers of object 0x2060, for the table and the hooks in objects.c: a chunk (sub 1, a DOMAIN), the
- * state of the job, its end. Called by objects.c only. They read and change controller->stream. Main loop. */
+ * state of the job, its end. Called by objects.c only. They read and change controller->stream, and read the machine.
+ * Main loop. */
 #ifndef APP_OBJECTS_STREAM_H
 #define APP_OBJECTS_STREAM_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/program_slot.h (see there): the active program and the upload of its successor (object 0x2000). Called
- * by app/commands, app/objects_program and app/controller.c. Main loop. Erases and writes the program banks of the
- * store, and changes its struct. */
+ * by app/commands, app/objects, app/objects_program and app/controller.c. Main loop. Erases and writes the program
+ * banks of the store, and changes its struct. */
 #include "app/program_slot.h"
 
 #include <string.h>

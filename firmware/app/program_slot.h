@@ -9,8 +9,8 @@
  * The commit record also holds the CRC-32 of the configuration that the program was checked against. Under another
  * configuration, and once after each power-on, the program is checked again before it may run.
  *
- * Called by app/commands, app/objects_program and app/controller.c. Main loop. The program must not run when an upload
- * ends (see machine_moving). Erases and writes the program banks of the store, and changes its struct.
+ * Called by app/commands, app/objects, app/objects_program and app/controller.c. Main loop. The program must not run
+ * when an upload ends (see machine_moving). Erases and writes the program banks of the store, and changes its struct.
  */
 #ifndef APP_PROGRAM_SLOT_H
 #define APP_PROGRAM_SLOT_H

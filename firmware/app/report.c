@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/report.h (see there): emergency messages, the NMT state after errors, lines on the console. Used by
- * app/controller.c. Main loop; takes the port's lock to read the machine. */
+ * app/controller.c. Main loop; takes the port's lock to read the machine. Sends emergency messages, changes the NMT
+ * state and what it has reported, and prints by port_log. */
 #include "app/report.h"
 
 #include "canopen/cia402.h"

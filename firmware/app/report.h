@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* report: reports changes of the controller: emergency messages, the NMT state after its own errors, lines on the
- * console. Used by app/controller.c. Main loop; takes the port's lock to read the machine. */
+ * console. Used by app/controller.c. Main loop; takes the port's lock to read the machine. Sends emergency messages,
+ * changes the NMT state and what it has reported, and prints by port_log. */
 #ifndef APP_REPORT_H
 #define APP_REPORT_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/stream.h (see there): a job that comes in chunks (object 0x2060). Called by app/objects_stream,
- * app/commands and app/controller.c. Main loop; takes the port's lock where it reads or changes the machine. */
+ * app/objects_program, app/commands and app/controller.c. Main loop; takes the port's lock where it reads or changes
+ * the machine. Changes its struct and the port's memory for chunks, and prints by port_log. */
 #include "app/stream.h"
 
 #include <string.h>

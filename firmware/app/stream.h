@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * stream: a job in chunks (object 0x2060), which may be longer than any memory (core/chunk.h,
- * docs/reference/protocol.md 1.7). Called by app/objects_stream, app/commands and app/controller.c. Main loop; takes
- * the port's lock where it reads or changes the machine.
+ * docs/reference/protocol.md 1.7). Called by app/objects_stream, app/objects_program, app/commands and
+ * app/controller.c. Main loop; takes the port's lock where it reads or changes the machine. Changes its struct and the
+ * port's memory for chunks, and prints by port_log.
  *
  * Chunks are downloaded in order to a ring in RAM, and checked as strictly as a program. Coefficient records exist only
  * near the motion (app/chunk_records.h). In every tick the motion follows one chunk, a whole program that ends at rest.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* can_frame: one classic CAN data frame, as the protocol objects and the ports exchange it. Used by all parts of the
- * firmware and by the simulated drives. Plain data.
+/* can_frame: one classic CAN data frame, as the protocol objects and the ports exchange it. Used by the whole
+ * firmware except its core, and by the simulated nodes and bus programs. Plain data.
  *
  * Only base frames (11-bit identifier, no remote frames) exist here: a port drops everything else
  * at its boundary. Bytes of `data` from `len` on have no meaning on receipt and are zero in frames

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/cia402_master.h (see there): the controlword that brings a drive nearer to a goal. Called by
- * app/machine/axis in each tick, with the latest state; the result is the controlword to send. Pure functions, any
- * context. */
+ * app/drives/homing, and by app/machine/axis in each tick, with the latest state; the result is the controlword to
+ * send. Pure functions, any context. */
 #include "canopen/cia402_master.h"
 
 /* Towards the goal one state after the other; at or above the goal the command that keeps it. Entries that are not

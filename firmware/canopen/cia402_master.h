@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* cia402_master: the controller's side of the CiA 402 state machine: which controlword brings a drive nearer to a goal.
  *
- * Called by app/machine/axis in each tick, with the latest state; the result is the controlword to send. The caller
- * keeps the previous controlword, for the rising edge of the fault reset. Pure functions, any context. */
+ * Called by app/drives/homing, and by app/machine/axis in each tick, with the latest state; the result is the
+ * controlword to send. The caller keeps the previous controlword, for the rising edge of the fault reset. Pure
+ * functions, any context. */
 #ifndef CANOPEN_CIA402_MASTER_H
 #define CANOPEN_CIA402_MASTER_H
 

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements canopen/od.h: finds and moves values of an object dictionary. Used by canopen/od_transfer,
- * canopen/pdo_map, firmware/app and sim/node. Main loop, if not stated otherwise. Changes the struct with the values;
- * no I/O. */
+/* Implements canopen/od.h: finds and moves values of an object dictionary. Used by firmware/canopen, firmware/app and
+ * sim/node. Main loop, if not stated otherwise. Changes the struct with the values; no I/O. */
 #include "canopen/od.h"
 
 #include <string.h>

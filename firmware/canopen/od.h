@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* od: an object dictionary, as a constant table of entries and one struct with the values. Used by canopen/od_transfer,
- * canopen/pdo_map, firmware/app and sim/node. Changes the struct with the values; no I/O.
+/* od: an object dictionary, as a constant table of entries and one struct with the values. Used by firmware/canopen,
+ * firmware/app and sim/node. Changes the struct with the values; no I/O.
  *
  * tools/eds generates both from an EDS file: `struct od_<name>` with a named, typed field for each value, in the
  * processor's byte order, `od_<name>_defaults` and `od_<name>_table`. The application uses the fields directly. This

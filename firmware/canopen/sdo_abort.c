@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/sdo_abort.h (see there): the abort codes of SDO transfers that this project sends or explains.
- * Used by the SDO server, by the SDO client, and by all hooks and handlers of the dictionaries, which return such a
- * code; 0 means success. Constants, and one pure function for any context. */
+ * Used by firmware/app, firmware/canopen and sim/node: hooks and handlers of the dictionaries return such a code. 0
+ * means success. Constants, and one pure function for any context. */
 #include "canopen/sdo_abort.h"
 
 #include <stddef.h>

@@ -2,8 +2,8 @@
 /* sdo_abort: the abort codes of SDO transfers (CiA 301, table 22) that this project sends or explains, with their
  * texts.
  *
- * Used by the SDO server, by the SDO client, and by all hooks and handlers of the dictionaries, which return such a
- * code; 0 means success. Constants, and one pure function for any context.
+ * Used by firmware/app, firmware/canopen and sim/node: hooks and handlers of the dictionaries return such a code. 0
+ * means success. Constants, and one pure function for any context.
  */
 #ifndef CANOPEN_SDO_ABORT_H
 #define CANOPEN_SDO_ABORT_H

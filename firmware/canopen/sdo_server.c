@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/sdo_server.h (see there): gives an object dictionary to one SDO client. Used by
- * app/controller_state and sim/node. No I/O: frames in, frames out. */
+ * app/controller_state, app/controller and sim/node. No I/O: frames in, frames out. */
 #include "canopen/sdo_server.h"
 
 #include <assert.h>

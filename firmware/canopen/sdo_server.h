@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* sdo_server: lets one SDO client at a time read and write an object dictionary (CiA 301, 7.2.4). Used by
- * app/controller_state and sim/node. No I/O: frames in, frames out.
+ * app/controller_state, app/controller and sim/node. No I/O: frames in, frames out.
  * 
  * Download (client writes): expedited, segmented, block with CRC and retransmission. Upload (client reads): expedited,
  * segmented, block. How the bytes come to the object and from it: canopen/od_transfer.h.

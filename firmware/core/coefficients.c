@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/coefficients.h (see there): makes the coefficient records of a program. Used by firmware/app,
- * firmware/core and host tools: app/program_table, core/coefficient_cache and host tools make the records,
- * interpolator and program clock read them. Any context, if not stated otherwise. */
+ * firmware/core and host tools: app/program_table, core/coefficient_cache and host tools make the records, interpolator
+ * and program clock read them. Any context, if not stated otherwise. Writes only to the memory or the sink that it is
+ * given; no I/O. */
 #include "core/coefficients.h"
 
 #include <string.h>

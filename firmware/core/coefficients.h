@@ -7,6 +7,7 @@
  *
  * The controller itself makes the records from a program that has passed program_check; they are never uploaded. They
  * hold native structs, so they are valid only for the binary that made them. Any context, if not stated otherwise.
+ * Writes only to the memory or the sink that it is given; no I/O.
  *
  * A tick goes from record to record by the links in them. So it needs a window of records around its place: all records
  * of a program in a bank (coefficients_make), or a few of a chunk (core/coefficient_cache.h). If a window ends before

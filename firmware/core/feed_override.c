@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/feed_override.h (see there): the feed override and path stops: which place of the path each tick has.
- * Called by app/machine/motion, sim/offline and host tools. Tick, or main loop while no tick runs, as each function
- * states. Changes only its struct and the interpolator that it is given; no I/O. */
+ * Called by firmware/app, sim/offline and host tools. Tick, or main loop while no tick runs, as each function states.
+ * Changes only its struct and the interpolator that it is given; no I/O. */
 #include "core/feed_override.h"
 
 #include <stddef.h>

@@ -2,8 +2,8 @@
 /*
  * feed_override: which point of the path the next tick gets, by the feed plan of the program and the commands: feed
  * hold, resume, override 0 to 200 %, stop and fault stop, and a start from rest anywhere in the program. The tool never
- * leaves the curve. Called by app/machine/motion, sim/offline and host tools. Changes only its struct and the
- * interpolator that it is given; no I/O.
+ * leaves the curve. Called by firmware/app, sim/offline and host tools. Changes only its struct and the interpolator
+ * that it is given; no I/O.
  *
  * Override and resume change the override (core/override_plan) along jerk-limited ramps inside the override bounds of
  * every feed piece that they touch. Hold, stop and fault stop leave the nominal motion: they are path stops

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements core/feedforward.h (see there): velocity and torque offsets (0x60B1, 0x60B2) that go with the setpoints
- * of one axis. Used by app/machine/offsets and sim/offline/offline. Changes the struct of the axis only; any context.
+/* Implements core/feedforward.h (see there): velocity and torque offsets (0x60B1, 0x60B2) that go with the setpoints of
+ * one axis. Used by app/machine/offsets, app/tick and sim/offline/offline. Changes the struct of the axis only; any
+ * context.
  */
 #include "core/feedforward.h"
 

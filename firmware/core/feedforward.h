@@ -10,8 +10,8 @@
  * Setpoint k is latched at SYNC k+1 and reached, by linear interpolation, at SYNC k+2, so velocity(k) is exactly that
  * of the period in which the drive has the offset. acceleration(k) is that of SYNC k+1, the beginning of that period:
  * half a period old in its middle. Offsets are rounded to nearest and saturate; they are zero at standstill (equal
- * points). Integers only, the same on every target. Used by app/machine/offsets and sim/offline/offline. Changes the
- * struct of the axis only; any context.
+ * points). Integers only, the same on every target. Used by app/machine/offsets, app/tick and sim/offline/offline.
+ * Changes the struct of the axis only; any context.
  */
 #ifndef HODOGRAPH_CORE_FEEDFORWARD_H
 #define HODOGRAPH_CORE_FEEDFORWARD_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * kernel: the interface of a kernel, which precomputes the coefficients of segments and feed pieces, and evaluates
- * them. Used by firmware/core, firmware/app, firmware/targets and sim/offline/stream: core/coefficients precomputes
- * (main loop), core/interpolator evaluates (tick), the others select or list kernels.
+ * them. Used by firmware, sim/offline/stream and host tools: core/coefficients precomputes (main loop),
+ * core/interpolator evaluates (tick), the others select or list kernels.
  *
  * `kernels_linked` lists the kernels of an image: core/kernels_all.c on a host, one of firmware/targets/kernels_*.c on
  * a microcontroller. Pure, any context.

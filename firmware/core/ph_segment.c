@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/ph_segment.h (see there): a PH segment expanded for evaluation. Used by firmware/core: the kernels,
- * and the checks of segments and axis limits. Pure; about 10^3 instructions on a 32-bit target. Main loop or tick. */
+ * their coefficient records, and the checks of segments and axis limits. Pure; about 10^3 instructions on a 32-bit
+ * target. Main loop or tick. */
 #include "core/ph_segment.h"
 
 #include "core/qmath.h"

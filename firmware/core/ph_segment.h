@@ -7,8 +7,8 @@
  * centred, so that the rounding of a Horner step never grows. docs/theory/numerics.md section 9,
  * "Expansion".
  *
- * Used by firmware/core: the kernels, and the checks of segments and axis limits. Pure; about 10^3 instructions on a
- * 32-bit target. Main loop or tick.
+ * Used by firmware/core: the kernels, their coefficient records, and the checks of segments and axis limits. Pure;
+ * about 10^3 instructions on a 32-bit target. Main loop or tick.
  */
 #ifndef HODOGRAPH_CORE_PH_SEGMENT_H
 #define HODOGRAPH_CORE_PH_SEGMENT_H

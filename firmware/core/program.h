@@ -8,7 +8,7 @@
  * `program_open` checks what is needed to read without leaving the image (sizes, counts, CRC); `program_check`
  * (core/program_check.h) checks everything else, and has to pass before a program is interpolated.
  *
- * No heap, no globals. Any context.
+ * No heap, no globals. Any context. Reads the image, changes only its arguments; no I/O.
  */
 #ifndef HODOGRAPH_CORE_PROGRAM_H
 #define HODOGRAPH_CORE_PROGRAM_H

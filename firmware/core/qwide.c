@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/qwide.h (see there): exact sums of products of 50-bit numbers, for decisions that must not depend on
- * rounding. Used by the checks of segments. Pure, any context. */
+ * rounding. Used by core/segment_check and core/joint_check. Pure, any context. */
 #include "core/qwide.h"
 
 #define LOW_BITS  50

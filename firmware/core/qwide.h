@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * qwide: exact sums of products of 50-bit numbers, for decisions that must not depend on rounding: the speed ratio and
- * the direction at joints. A value is high 2^50 + low. Used by the checks of segments. Pure, any context.
+ * the direction at joints. A value is high 2^50 + low. Used by core/segment_check and core/joint_check. Pure, any context.
  */
 #ifndef HODOGRAPH_CORE_QWIDE_H
 #define HODOGRAPH_CORE_QWIDE_H

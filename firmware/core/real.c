@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/real.h (see there): floating-point numbers in integers, the same on every target. Used by
- * joint_check, limit_check, path_motion and brake_check. Pure, any context. */
+ * firmware/core: the checks of joints, and the proofs of axis limits and stops. Pure, any context. */
 #include "core/real.h"
 
 #include "core/qmath.h"

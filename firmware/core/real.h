@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * real: floating-point numbers in integers, for proofs that need range rather than digits and have to give the same
- * verdict on every target, with or without an FPU. Used by joint_check, limit_check, path_motion and brake_check.
+ * verdict on every target, with or without an FPU. Used by firmware/core: the checks of joints, and the proofs of axis
+ * limits and stops.
  *
  * A value is m 2^e with 2^30 <= |m| < 2^31, or zero. A sum is within 2^-29 of the greater of its terms, a product or a
  * quotient within 2^-29 of itself. Exponents are meant to stay within +-2^20, far beyond any quantity of motion;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements core/stop_check.h (see there): how long a stop can take, and whether the stop table covers it. A part of
- * program_check; the host tools compute the table with it. Main loop. Changes only its arguments; no I/O. */
+ * program_check; core/brake_check uses it too, and the host tools compute the table with it. Main loop. Changes only its arguments; no I/O. */
 #include "core/stop_check.h"
 
 #include "core/feed_bounds.h"

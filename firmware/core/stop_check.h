@@ -2,8 +2,8 @@
 /*
  * stop_check: checks the stop table of a program (docs/reference/protocol.md 1.4): does each stop time bound in it
  * cover the longest stop? The bounds are computed anew from the feed pieces, the override bounds and the stop
- * parameters (docs/theory/feed.md section 7, "Stops"). A part of program_check; the host tools compute the table
- * with it.
+ * parameters (docs/theory/feed.md section 7, "Stops"). A part of program_check; core/brake_check uses it too, and the
+ * host tools compute the table with it.
  *
  * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.
  * Integer arithmetic; every value is rounded so that a bound is never too short. About 10 000 instructions for each

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The pipeline of a section of a job: its curve is fitted already, and equal sections share its plan and program. Used
-by api/path and job. No I/O.
+by api/path and job. No I/O; reads the clock.
 
 job.py makes one for each section, the API one for a fitted path. In addition to what `Pipeline` does, it lowers the
 feed where a plan would leave no headroom for a changing override.

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* hodograph-bridge: the gateway between an emulated board, or one without SocketCAN, and a CAN interface. Started by
- * the operator. One thread: it sleeps until frames or a signal come. */
+ * the operator, tools/emulate.py and tests. Moves frames between the bus and the FIFOs or the serial line of the board.
+ * One thread: it sleeps until frames or a signal come. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* hodograph-hub: CAN buses for the processes of one computer, without kernel CAN. Started by the operator and by
- * host_tools (bus/hub). One thread: it sleeps until frames, a connection or a signal come. */
+ * host_tools (bus/hub). Opens the buses by hub/hub, and prints errors. One thread: it sleeps until frames, a connection
+ * or a signal come. */
 #define _GNU_SOURCE
 #include <getopt.h>
 #include <inttypes.h>

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-injector: joins two SocketCAN buses and injects faults. Started by the operator and by host_tools. One
- * thread: it sleeps until frames or a signal come, or a delayed frame is due. */
+/* hodograph-injector: joins two SocketCAN buses and injects faults. Started by the operator and by host_tools. Receives
+ * and sends frames on both buses, reads the file of fault rules, prints what it injects. One thread: it sleeps until
+ * frames or a signal come, or a delayed frame is due. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

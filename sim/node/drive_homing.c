@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_homing.h (see there): the homing mode of a simulated drive. Called by node/servo. All in one
- * context. Changes its struct and the axis that it is given; no I/O. */
+/* Implements node/drive_homing.h (see there): the homing mode of a simulated drive. Called by node/servo and
+ * node/drive_od. All in one context. Changes its struct and the axis that it is given; no I/O. */
 #include "node/drive_homing.h"
 
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_homing: the homing mode of a simulated drive (CiA 402-2): methods, search for the switch, change of
- * coordinates. Called by node/servo. Changes its struct and the axis that it is given; no I/O.
+ * coordinates. Called by node/servo and node/drive_od. Changes its struct and the axis that it is given; no I/O.
  *
  *     17, 18   to the negative, positive limit switch, home where it goes off again
  *     19, 20   home switch on in the positive direction: home where it goes off going negative, on

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/drive_node.h (see there): one simulated servo drive on the bus. Used by node/drives. All functions in
- * one context. Changes the node, and sends frames through its port; no other I/O. */
+/* Implements node/drive_node.h (see there): one simulated servo drive on the bus. Used by node/drives and
+ * node/node_faults. All functions in one context. Changes the node, and sends frames through its port; no other I/O. */
 #include "node/drive_node.h"
 
 #include <string.h>

@@ -11,7 +11,8 @@
  * enabled in CSP that is an error: EMCY 0x8700, the reaction of 0x6007, and the run is marked as not reproducible
  * (0x2101 sub 5), until the drive is enabled again. Homing may continue.
  *
- * Used by node/drives. Frames in, frames out through the port; no I/O, no heap. All functions in one context.
+ * Used by node/drives and node/node_faults. Frames in, frames out through the port; no I/O, no heap. All functions in
+ * one context.
  */
 #ifndef NODE_DRIVE_NODE_H
 #define NODE_DRIVE_NODE_H

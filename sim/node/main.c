@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* hodograph-drive: simulated servo drives on a SocketCAN bus. Started by the operator and by host_tools. One thread:
- * it sleeps until frames or a signal come. */
+/* hodograph-drive: simulated servo drives on a SocketCAN bus. Started by the operator and by host_tools. Receives and
+ * sends frames on the bus, by node/drives; reads the file of fault rules, prints errors. One thread: it sleeps until
+ * frames or a signal come. */
 #define _GNU_SOURCE
 #include <errno.h>
 #include <sched.h>

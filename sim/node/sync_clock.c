@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements node/sync_clock.h (see there): the time base of a simulated drive. Called by node/drive_node. All in one
- * context. Changes only its struct; no I/O. */
+/* Implements node/sync_clock.h (see there): the time base of a simulated drive. Called by node/drive_node and
+ * node/drive_od. All in one context. Changes only its struct; no I/O. */
 #include "node/sync_clock.h"
 
 void sync_clock_reset_counter(struct sync_clock *clock, uint8_t overflow)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* sync_clock: the time base of a simulated drive: SYNC, or the wall clock while SYNC is missing. It returns how many
- * periods pass; the caller computes them. Called by node/drive_node. All in one context. Changes only its struct; no
- * I/O.
+ * periods pass; the caller computes them. Called by node/drive_node and node/drive_od. All in one context. Changes only
+ * its struct; no I/O.
  */
 #ifndef NODE_SYNC_CLOCK_H
 #define NODE_SYNC_CLOCK_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/contour_curve.h (see there): places on the curve, for contour.c. Called by offline/contour. All
- * functions except contour_begin are pure. One thread for each struct contour. */
+/* Implements offline/contour_curve.h (see there): places on the curve, for contour.c. Called by offline/contour,
+ * offline/offline and host tools. All functions except contour_begin are pure. One thread for each struct contour. */
 #include "offline/contour_curve.h"
 
 #include <math.h>

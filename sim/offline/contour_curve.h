@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* contour_curve: the exact curve of a program: expands it once, and finds places on it near a point. Called by
- * offline/contour. All functions except contour_begin are pure. One thread for each struct contour. */
+ * offline/contour, offline/offline and host tools. All functions except contour_begin are pure. One thread for each
+ * struct contour. */
 #ifndef HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 #define HODOGRAPH_OFFLINE_CONTOUR_CURVE_H
 

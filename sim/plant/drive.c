@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements plant/drive.h (see there): one simulated servo axis in cyclic synchronous position mode. Called by
- * sim/node/axis_motion, sim/offline and host tools. One thread for each struct drive. Changes only its struct; no I/O.
- * */
+ * plant/influence, sim/node, sim/offline and host tools. One thread for each struct drive. Changes only its struct; no
+ * I/O. */
 #include "plant/drive.h"
 
 static void drive_set_up_loop(struct drive *d, const struct drive_config *c)

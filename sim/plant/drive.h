@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* drive: one simulated servo axis in cyclic synchronous position mode: setpoint interpolation, PDFF loop, motor, screw,
- * encoder. No CAN and no clock: the caller advances it by whole bus periods. Called by sim/node/axis_motion,
+ * encoder. No CAN and no clock: the caller advances it by whole bus periods. Called by plant/influence, sim/node,
  * sim/offline and host tools. Model: docs/theory/drives.md section 13. Changes only its struct; no I/O.
  *
  * Use: drive_init, then drive_place (or drive_hold), then for every SYNC j: report

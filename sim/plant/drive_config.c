@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements plant/drive_config.h (see there): the figures that describe a simulated axis. Used by plant/drive,
- * sim/node/equipment and sim/offline/axis_run. Pure functions, any thread. */
+ * sim/node, sim/offline and host tools. Pure functions, any thread. */
 #include "plant/drive_config.h"
 
 #include <stdbool.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_config: the configuration of a simulated axis: plant, gains, encoder, rates; and its check. Used by
- * plant/drive, sim/node/equipment and sim/offline/axis_run. Pure functions, any thread. */
+ * plant/drive, sim/node, sim/offline and host tools. Pure functions, any thread. */
 #ifndef HODOGRAPH_PLANT_DRIVE_CONFIG_H
 #define HODOGRAPH_PLANT_DRIVE_CONFIG_H
 

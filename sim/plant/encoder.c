@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements plant/encoder.h (see there): the encoder on the motor shaft. Used by plant/drive and plant/influence.
- * Pure functions, any thread. */
+/* Implements plant/encoder.h (see there): the encoder on the motor shaft. Used by plant/drive, plant/influence and
+ * sim/node. Pure functions, any thread. */
 #include "plant/encoder.h"
 
 #include <assert.h>

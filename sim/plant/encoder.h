@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* encoder: the encoder on the motor shaft: rounds the position to the nearest of its increments (ties to even). Used by
- * plant/drive and plant/influence. Pure functions, any thread.
+ * plant/drive, plant/influence and sim/node. Pure functions, any thread.
  *
  * An increment is 2 pi screw / counts_per_rev mm of table position. The electrical zero is half an increment before the
  * table's zero, so that rounding is to nearest and a table at 0 reads 0.

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements plant/influence.h (see there): what acts on an axis in addition to its setpoints: load, friction, faults.
- * Used by sim/node/axis_motion and sim/offline. docs/theory/drives.md section 13. Changes its arguments only; any
- * thread. */
+ * Used by sim/node and sim/offline. docs/theory/drives.md section 13. Changes its arguments only; any thread. */
 #include "plant/influence.h"
 
 void influence_none(struct influence *influence, const struct drive_config *config)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* influence: all that acts on an axis in addition to its setpoints: offsets of a feedforward, load, friction, brake, a
- * weak supply, a faulty encoder. Used by sim/node/axis_motion and sim/offline. docs/theory/drives.md section 13.
+ * weak supply, a faulty encoder. Used by sim/node and sim/offline. docs/theory/drives.md section 13.
  *
  * drive.h computes an axis without any of these. After influence_none, influence_period gives the same bits as
  * drive_period. The functions change the given structs only; any thread.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements plant/overload.h (see there): thermal model of a motor and its power stage (I2t). Used by
- * sim/node/supervision. The functions change their struct only; any thread. */
+/* Implements plant/overload.h (see there): thermal model of a motor and its power stage (I2t). Used by node/supervision
+ * and node/servo. The functions change their struct only; any thread. */
 #include "plant/overload.h"
 
 void overload_init(struct overload *overload, double peak, double time_s)

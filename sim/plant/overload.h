@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* overload: thermal model of a motor and its power stage (I2t): heat that rises with the square of the load and falls
- * by the losses at rated load. Used by sim/node/supervision.
+ * by the losses at rated load. Used by node/supervision and node/servo.
  *
  *     heat' = (load / rated)^2 - 1, not below 0                [s]
  *

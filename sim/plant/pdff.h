@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* pdff: one sample of the servo loop PDFF (pseudo-derivative feedback with feedforward), as in section 5 of the paper
- * (docs/validation/paper.md). Called by plant/drive, the axis model, at the rate of the loop. Pure.
+ * (docs/validation/paper.md). Called by plant/drive, the axis model, and plant/influence, at the rate of the loop.
+ * Pure.
  *
  *     speed_ref = k_pp (x_com - x_act) + k_pf d(x_com)/dt
  *     torque    = k_pv (k_vf speed_ref + k_iv * integral of (speed_ref - speed) - speed)

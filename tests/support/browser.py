@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Headless Chromium, driven by the Chrome DevTools Protocol over a WebSocket. Used by tests/system. Starts a
-process and sends to it.
+process and sends to it; writes its profile, log and pictures to folders that it is given.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """How late this computer itself is, for tests of real-time pace: measured in the same run, on the same core.
 
-Used by tests of boards that are emulated at real-time pace. Reads /proc; starts a thread.
+Used by tests of boards that are emulated at real-time pace. Reads /proc; starts a thread of high
+priority, and sets its processor core.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """LinuxCNC's interpreter `rs274` as an oracle, and its commands and those of `read_gcode` in one form. Used by tests of
-toolpaths and by benchmarks/peers. Starts processes; writes temporary files. The first use downloads LinuxCNC's Debian
-packages to build/linuxcnc (tools/fetch_linuxcnc.sh).
+toolpaths. Starts processes; writes temporary files. The first use downloads LinuxCNC's Debian packages to
+build/linuxcnc (tools/fetch_linuxcnc.sh).
 
 `rs274` prints canonical commands with four decimals, in the units of the program and relative to all offsets.
 `canonical` follows the offsets and gives machine positions in mm, so that a position is off by a few 1e-4 units.

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Programs that are computed once for all tests of a process. Used by conftest.py of several folders. While tests run
-it replaces `plan_stops` of hodograph.program.compiler and steps of `Pipeline`, and keeps up to 200 results in memory;
-`MonkeyPatch` restores the replaced functions. No I/O of its own.
+"""Programs that are computed once for all tests of a process. Used by conftest.py of several folders and by
+program/test_stop_planning. While tests run it replaces `plan_stops` of hodograph.program.compiler and steps of
+`Pipeline`, and keeps up to 200 results in memory; `MonkeyPatch` restores the replaced functions. No I/O of its own.
 
 Most tests of a program's motion compile one of a few example files, which costs more processor time than the rest of
 the test. Commands that a test starts as processes are not affected.

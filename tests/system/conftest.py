@@ -3,7 +3,8 @@
 
 A test runs in virtual time on a local bus of its own (fixtures `hub`, `make_bench`); one that needs the CAN of the
 kernel is marked `bus`, and has vcan0. `make_bench` starts the controller and the drives as processes, and ends them;
-`one_core`, which `hub` uses, sets the processor core of pytest and its children. Loaded by pytest.
+`one_core`, which `hub` uses, sets the processor core of pytest and its children. Loaded by pytest; writes to
+temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Home, quick stop, reset; messages of commands while they wait. Run by pytest; starts a controller and drives on a
-local bus, and writes to temporary folders.
+"""Home, quick stop, reset; messages of commands while they wait. Run by pytest; starts a controller, drives and
+`hodograph` on a local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

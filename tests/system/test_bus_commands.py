@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Commands on the bus: refusals leave everything as it was, Ctrl-C leaves the axes standing. Run by pytest; starts a
-controller and drives on a local bus.
+controller, drives and `hodograph` on a local bus.
 """
 
 from __future__ import annotations

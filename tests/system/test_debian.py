@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """`make deb` and `make container`: in a clean root of Debian, without other files of this project. Run by pytest;
-starts `make`, and writes to temporary folders.
+starts `make`, which writes build/, lintian, mmdebstrap, buildah and `hodograph`, and writes to temporary folders. Makes
+container images, and removes them.
 """
 
 from __future__ import annotations

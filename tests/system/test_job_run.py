@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Toolpaths on a local bus in virtual time: sections one after the other, what happens between them, and how a job ends
-before its end. Run by pytest; starts a controller and drives on a local bus, and writes to temporary folders.
+before its end. Run by pytest; starts a controller, drives and `hodograph` on a local bus, and writes to temporary
+folders.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """`hodograph monitor` on a bus in virtual time, in a browser.
 
-The time of the bus advances only while a test allows it, so the page may take any time. Run by pytest; starts a browser
-and a machine on a local bus, and writes to temporary folders.
+The time of the bus advances only while a test allows it, so the page may take any time. Run by pytest; starts a
+browser, `hodograph` and a machine on a local bus, and writes to build/monitor and temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Hold, resume, override and start from a position, by the command on the bus. Run by pytest; starts a controller and
-drives on a local bus.
+drives on a local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

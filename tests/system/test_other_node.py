@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A faulty or hostile node on the bus: after any of its frames the machine reports its true state, and needs no restart
-to recover. Run by pytest; starts a controller and drives on a local bus.
+to recover. Run by pytest; starts a controller, drives and `hodograph` on a local bus.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """docs/guides/port-to-your-board.md, followed to the letter in a copy of the tree: its files, its commands, the same
-bits. Run by pytest; starts `make` and an emulated board, and writes to temporary folders.
+bits. Run by pytest; starts `make` and an emulated board, and writes to build/ and temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A run that was recorded and is read again gives the figures of the live run, in every format. Run by pytest; starts a
-controller and drives on a local bus, and writes to temporary folders.
+controller, drives and `hodograph` on a local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`make site`: every page is there, nothing is fetched from outside, and it works in a browser from the disk. Run by
-pytest; starts `make` and a browser, and writes to temporary folders.
+pytest; starts `make`, which writes build/site, and a browser; writes to temporary folders.
 """
 
 from __future__ import annotations

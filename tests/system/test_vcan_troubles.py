@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A SocketCAN interface that takes no frames, as an adapter that is bus-off has it: the recovery. Run by pytest on
-vcan0; starts a controller and drives, and changes vcan0 by `tc` and `ip`.
+vcan0; starts a controller, drives and `hodograph`, and changes vcan0 by `tc` and `ip`.
 """
 
 from __future__ import annotations

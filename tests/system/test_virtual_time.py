@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Virtual time: the result of a simulation depends on its inputs only, not on the load of the computer. Run by pytest;
-starts hubs, devices and busy processes, and writes to temporary folders.
+starts hubs, devices, `hodograph` and busy processes, and writes to temporary folders.
 """
 
 from __future__ import annotations

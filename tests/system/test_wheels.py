@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`make wheels`: the wheels of both platforms; programs and Python module of the one for aarch64 under QEMU. Run by
-pytest; starts `make`, QEMU and `hodograph`, and writes to temporary folders.
+pytest; starts `make`, which may write build/, QEMU and `hodograph`; writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 /*
  * The core's own clock, to time a few instructions: SysTick, which counts cycles of the processor's clock, or on RISC-V
  * the counter of instructions retired (which QEMU answers in nanoseconds of its virtual time). Wraps at 24 bits. The
- * host has none: always 0. Used by the images isr and setpoints. Pure.
+ * host has none: always 0. Used by the images isr and setpoints. clock_begin writes the
+ * registers of SysTick; clock_now only reads.
  */
 #ifndef TARGET_CLOCK_H
 #define TARGET_CLOCK_H

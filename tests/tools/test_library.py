@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """libhodograph as others use it: the example built from the installed files, the promised interface, modules. Run by
-pytest; starts `hodograph` and built programs, and writes to temporary folders.
+pytest; starts dist/install.py, compilers, CMake, `hodograph` and the programs built, and writes to temporary folders.
 """
 
 from __future__ import annotations

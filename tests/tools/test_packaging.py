@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """What packages are made of: locked requirements of the host tools, list of components, manifests of the modules. Run
-by pytest; starts `make` and Python, and writes to temporary folders.
+by pytest; starts `make`, which writes build/, and Python; writes to temporary folders.
 """
 
 from __future__ import annotations

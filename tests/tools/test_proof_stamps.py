@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A run of a prover is taken from its stamp while nothing has changed that it depends on, and only if it was good. Run
-by pytest; writes to temporary folders.
+by pytest; starts compilers, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The committed sizes of the images are those of the commit; and the table says what changed. Run by pytest; reads the
-images of `make firmware`.
+images of `make firmware`, and starts compilers.
 """
 
 from __future__ import annotations

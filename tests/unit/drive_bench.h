@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* drive_bench: one simulated drive on the bench: node 3, standing at 1 mm, NMT operational. What it sends is kept;
- * failures are Unity's. Used by the tests of sim/node and sim/plant, and by harnesses of tests/fuzz. One thread; no
- * I/O. */
+ * failures are Unity's. Used by the tests of sim/node, sim/plant and sim/offline, and by harnesses of tests/fuzz. One
+ * thread; no I/O. */
 #ifndef DRIVE_BENCH_H
 #define DRIVE_BENCH_H
 

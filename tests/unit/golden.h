@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Golden program images of tests/data for the C tests, which run in the root of the repository. Used by tests of
- * firmware/core and sim/offline, and by harnesses of tests/fuzz. Reads files. */
+ * firmware/core, streaming, app/controller and port/stm32g4, and by harnesses of tests/fuzz. Reads files. */
 #ifndef HODOGRAPH_TESTS_GOLDEN_H
 #define HODOGRAPH_TESTS_GOLDEN_H
 

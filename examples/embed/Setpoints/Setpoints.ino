@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Prints the setpoints of a program, a line for each period, over and over. For boards with 32-bit processors. program.h
- * holds the image; `hodograph compile` makes others, `xxd -i` writes them as C. */
+ * holds the image; `hodograph compile` makes others, `xxd -i` writes them as C. Compiled by the Arduino IDE, and
+ * by tests/tools/test_library.py. Writes to the serial port only; no drives. */
 #include <hodograph.h>
 
 #include "program.h"

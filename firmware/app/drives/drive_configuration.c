@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/drives/drive_configuration.h (see there): the configuration of one drive as a list of operations on
- * its dictionary, in order. Used by app/drives/drive_boot and app/drives/drive_monitor. Main loop. Changes only its
- * struct and the properties. */
+ * its dictionary, in order. Used by app/controller, app/drives/drive_boot and app/drives/drive_monitor. Main loop.
+ * Changes only its struct and the properties. */
 #include "app/drives/drive_configuration.h"
 
 #include <stddef.h>

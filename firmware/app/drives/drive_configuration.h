@@ -7,8 +7,8 @@
  *     drive_configuration_begin(&configuration, &config, axis, &properties);
  *     while (drive_configuration_op(&configuration, &op)) { do it; drive_configuration_advance(&configuration); }
  *
- * Later operations depend on the properties that the drive reports in earlier ones. Used by app/drives/drive_boot and
- * app/drives/drive_monitor. Changes its struct and the properties only. Main loop.
+ * Later operations depend on the properties that the drive reports in earlier ones. Used by app/controller,
+ * app/drives/drive_boot and app/drives/drive_monitor. Changes its struct and the properties only. Main loop.
  */
 #ifndef APP_DRIVES_DRIVE_CONFIGURATION_H
 #define APP_DRIVES_DRIVE_CONFIGURATION_H

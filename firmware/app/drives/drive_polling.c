@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/drives/drive_polling.h: reads values of the drives that are in no PDO. Called by app/controller.c.
- * Main loop; takes the port's lock where it writes to the axes. */
+ * Main loop; takes the port's lock where it writes to the axes. No I/O: the caller sends. */
 #include "app/drives/drive_polling.h"
 
 #include <string.h>

@@ -4,7 +4,7 @@
  * inputs (0x60FD) of drives without a TPDO3 for them. It reads one object of one axis by SDO after the other, each once
  * in DRIVE_POLLING_US.
  *
- * Called by app/controller.c. Main loop; takes the port's lock where it writes to the axes.
+ * Called by app/controller.c. Main loop; takes the port's lock where it writes to the axes. No I/O: the caller sends.
  */
 #ifndef APP_DRIVES_DRIVE_POLLING_H
 #define APP_DRIVES_DRIVE_POLLING_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/drives/homing.h (see there): command 10, which homes one axis after the other. Called by
- * app/controller.c. Main loop; takes the port's lock where it changes the machine. Times are counted in ticks, so they
- * have the same meaning on a host that is too slow. */
+ * app/controller.c and app/commands. Main loop; takes the port's lock where it changes the machine. Times are counted
+ * in ticks, so they have the same meaning on a host that is too slow. */
 #include "app/drives/homing.h"
 
 #include <string.h>

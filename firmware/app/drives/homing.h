@@ -9,8 +9,8 @@
  * state HOMING. A stop, a quick stop or a fault leaves that state and ends homing. The drives are then configured again
  * before they can be enabled, which restores mode 8.
  *
- * Called by app/controller.c. Main loop; takes the port's lock where it changes the machine. Times are counted in
- * ticks, so they have the same meaning on a host that is too slow.
+ * Called by app/controller.c and app/commands. Main loop; takes the port's lock where it changes the machine. Times are
+ * counted in ticks, so they have the same meaning on a host that is too slow.
  */
 #ifndef APP_DRIVES_HOMING_H
 #define APP_DRIVES_HOMING_H

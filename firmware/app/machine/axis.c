@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements app/machine/axis.h (see there): one drive as the tick uses it. Used by app/machine and app/tick. Receive
- * interrupt, timer, and main loop in a critical section. Changes only its struct; no I/O. */
+/* Implements app/machine/axis.h (see there): one drive as the tick uses it. Used by firmware/app. Receive interrupt,
+ * timer, and main loop in a critical section. Changes only its struct; no I/O. */
 #include "app/machine/axis.h"
 
 #include <string.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * axis: the state of one drive in the controller: its last reported values, its goal and target, and the setpoint that
- * is sent. Used by app/machine and app/tick.
+ * is sent. Used by firmware/app.
  *
  * Guarded by the port's lock: written by the receive and timer interrupts, read by the main loop in a critical section.
  * Positions in counts. No I/O.

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/machine/statusword_monitor.h (see there): bits of a drive's statusword in addition to those of the
  * state, while it is in Operation enabled. Used by axis.c and machine_supervise.c. Receive and timer, under the port's
- * lock. */
+ * lock. Changes only its struct; no I/O. */
 #include "app/machine/statusword_monitor.h"
 
 #include "app/machine/fault.h"

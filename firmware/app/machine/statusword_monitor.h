@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * statusword_monitor: finds wrong bits in the statusword of a drive in Operation enabled, other than the bits of its
- * state. Used by axis.c and machine_supervise.c. Receive and timer, under the port's lock.
+ * state. Used by axis.c and machine_supervise.c. Receive and timer, under the port's lock. Changes only its struct; no
+ * I/O.
  *
  * Bits that have been set since the drive was enabled must stay: voltage (4), remote (9) and, in CSP, "follows the
  * command value" (12). Following error (13, in CSP) must stay clear. A bit is reported when it is wrong in more than

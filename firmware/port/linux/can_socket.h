@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /*
  * can_socket: classic CAN frames through a raw SocketCAN socket, or through a local bus without kernel CAN. Used by
- * port/linux and sim/. One thread at a time for each socket, except that can_socket_send may be called by a second one.
+ * port/linux and sim/. Opens a socket, sends and receives on it. One thread at a time for each socket, except that
+ * can_socket_send may be called by a second one.
  *
  * The socket never blocks in real time. In virtual time sending waits until the hub takes the frame. Received remote,
  * extended and error frames are dropped. A socket does not receive its own frames; other sockets of the same machine

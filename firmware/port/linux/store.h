@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* store: the program store and the parameter store of port.h as memory of the process, or as a mapped file that
- * outlives the process; and the memory of ring and coefficient cache of streamed jobs. Used by port_linux.c: main
- * thread, at the start of the process. Later the main loop writes by ram_store_put (port/common/ram_store.h), which
- * waits for the disk at each commit record of the parameter store. */
+ * outlives the process; and the memory of ring and coefficient cache of streamed jobs. Opens, maps and writes the file.
+ * Used by port_linux.c: main thread, at the start of the process. Later the main loop writes by ram_store_put
+ * (port/common/ram_store.h), which waits for the disk at each commit record of the parameter store. */
 #ifndef PORT_LINUX_STORE_H
 #define PORT_LINUX_STORE_H
 

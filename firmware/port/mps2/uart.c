@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements port/mps2/uart.h (see there): UART 0 of the board (Arm's CMSDK UART), both directions by interrupt. Used
- * by link_slcan. Any context; uart_begin in the main loop. `receive` is called in the receive interrupt. */
+ * by link_slcan. Reads and writes the registers of UART 0. Any context; uart_begin in the main loop. `receive` is
+ * called in the receive interrupt. */
 #include "port/mps2/uart.h"
 
 #include "port/cortex_m/core.h"

@@ -3,8 +3,8 @@
  * uart: UART 0 of the board (Arm's CMSDK UART), both directions by interrupt.
  *
  * The interrupt of the transmitter takes characters from a ring, so the sender does not wait. The other end controls
- * the flow: the emulator gives a character when the last one has been read. Used by link_slcan. Any context; uart_begin
- * in the main loop. It calls `receive` in the receive interrupt.
+ * the flow: the emulator gives a character when the last one has been read. Used by link_slcan. Reads and writes the
+ * registers of UART 0. Any context; uart_begin in the main loop. It calls `receive` in the receive interrupt.
  */
 #ifndef PORT_MPS2_UART_H
 #define PORT_MPS2_UART_H

@@ -3,7 +3,8 @@
  * startup: what a RISC-V hart does between reset and main(): stack, global pointer, traps, memory. For QEMU's virt
  * machine and the images of tests/target, which have no interrupts: machine mode, one hart, exit by semihosting.
  *
- * Called by the hardware only, at reset and in traps. A trap of any kind ends the emulator with status 3.
+ * Called by the hardware only, at reset and in traps. Writes the variables in RAM before main(). A trap of any kind
+ * ends the emulator with status 3.
  */
 #ifndef PORT_RV32_STARTUP_H
 #define PORT_RV32_STARTUP_H

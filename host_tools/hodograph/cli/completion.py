@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""hodograph completion: the script with which a shell completes commands, options and files. Started by cli/main.
-Prints to stdout.
+"""hodograph completion: the script with which a shell completes commands, options and files. Started by cli/main;
+tools/make_share installs the same script. Prints to stdout.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Sources of frames: a live bus, or a recording at the rate of the machine or a multiple of it. Used by pump, session
-and cli/monitor_command. Receives frames from the bus, or reads the file that it is given.
+and cli/monitor_command. Receives frames from the bus in a thread of its own, or reads the file that it is given.
 """
 
 from __future__ import annotations

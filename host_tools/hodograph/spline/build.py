@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """From points or a control polygon to a PHSpline; docs/theory/numerics.md sections 1 to 3. Used by many modules of
-host_tools: the pipelines of paths and sections, moves to a start, branches. No I/O.
+host_tools: the pipelines of paths and sections, moves to a start, streamed paths. No I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Answers of a controller that are lost, or that come to a transfer which it has ended meanwhile. Run by pytest; the
-node is a class, and nothing is opened or started.
+node is one of python canopen on a virtual bus of this process; starts threads, and writes lock files.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Straight moves: from count to count exactly, inside the machine's limits, however short or long. Run by pytest;
-opens a virtual bus of python-can in this process.
+"""Straight moves: from count to count exactly, inside the machine's limits, however short or long. Run by pytest; opens
+a virtual bus of python-can in this process, with its lock file; starts a thread.
 """
 
 from __future__ import annotations

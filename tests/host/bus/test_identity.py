@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""A node that differs from the EDS is refused before any command is sent to it. Run by pytest; the node is a class, and
-temporary files are written.
+"""A node that differs from the EDS is refused before any command is sent to it. Run by pytest; the node is one of
+python canopen on a virtual bus of this process. Starts threads, and writes lock files and temporary folders.
 """
 
 from __future__ import annotations

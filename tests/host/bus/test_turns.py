@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The SDO channel lock: clients wait for it in turn, for a bounded time. Run by pytest; writes the files of locks."""
+"""The SDO channel lock: clients wait for it in turn, for a bounded time. Run by pytest; opens virtual buses of this
+process, starts a thread, and writes the files of locks.
+"""
 
 import os
 import queue

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """A machine whose tick cannot fit is refused before any frame is sent, with values that would fit. Run by pytest;
-writes to temporary folders.
+starts `hodograph-hub`, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Path files on which rotary axes move alone: the program moves these axes only, and mistakes get one line. Run by
-pytest; writes to temporary folders.
+pytest; starts a controller and drives on a local bus, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 """The kernels against 50-digit arithmetic, within the bounds of docs/theory/numerics.md sections 9 to 12.
 
 A small run of benchmarks/kernels.py: random segments at the limit of the speed ratio and golden programs. Run by
-pytest; writes to temporary folders.
+pytest; starts a C compiler, loads what it makes, and writes to temporary folders.
 """
 
 from __future__ import annotations

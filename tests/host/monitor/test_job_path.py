@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The contour error of a streamed job, from its chunks. Run by pytest; writes to temporary folders."""
+"""The contour error of a streamed job, from its chunks. Run by pytest; starts threads and processes, and writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Commands of browsers interrupt the reading of the program, and stops wait for nobody; a program is read again after a
-failure. Run by pytest; bus and controller are classes, and nothing is opened or started.
+failure. Run by pytest; bus and controller are classes, except for virtual buses of this process; starts threads, and
+writes lock files.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Path files with several paths: what they may say, and the job that they become. Run by pytest; writes to temporary
-folders.
+"""Path files with several paths: what they may say, and the job that they become. Run by pytest; starts threads, and
+writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Planned chunks on the disk: bounded, given back as they are read, and what happens when the disk is full. Run by
-pytest; writes to temporary folders.
+pytest; starts threads and processes, and writes to temporary folders.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Streamed toolpaths with rotary axes that move with x, y and z: in windows, as chunks, continued in the middle. Run by
-pytest; writes to temporary folders.
+pytest; starts threads, and writes to temporary folders.
 """
 
 from __future__ import annotations

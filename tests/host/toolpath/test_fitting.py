@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Curves of toolpaths: continuity, the certificate compared with sampled distances, times, and effects of noise. Run by
-pytest; starts and writes nothing.
+pytest; reads programs of LinuxCNC, which the first use downloads to build/linuxcnc.
 """
 
 from __future__ import annotations

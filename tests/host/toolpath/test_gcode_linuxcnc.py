@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The reader of G-code compared with LinuxCNC's own interpreter, on its programs and on generated ones. Run by pytest;
-starts rs274, and writes to temporary folders.
+starts rs274, which the first use downloads to build/linuxcnc, and writes to temporary folders.
 """
 
 from __future__ import annotations

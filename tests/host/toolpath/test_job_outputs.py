@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Outputs of G-code become events of the sections' programs. Run by pytest; reads examples/machines; writes to
-temporary folders.
+"""Outputs of G-code become events of the sections' programs. Run by pytest; reads examples/machines; starts threads and
+processes, and writes to temporary folders.
 """
 
 import re

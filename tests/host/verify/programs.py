@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Random programs for the tests of the verifier, each a pure function of a seed. Used by the tests of the verifier and
-of toolpaths. No I/O.
+"""Random programs for the tests of the verifier, each a pure function of a seed. Used by the tests of this folder. No
+I/O.
 """
 
 from __future__ import annotations

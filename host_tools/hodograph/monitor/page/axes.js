@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Axes after x, y, z: each over arc length, as the program has it, where the setpoints went, where the axis went.
+// Used by page.js. Makes its elements in the document, and draws on their canvases.
 
 import { digitsOf, prepare, roundUp, text } from "./scale.js";
 import { Ring } from "./store.js";

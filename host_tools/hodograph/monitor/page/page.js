@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The page put together: messages go to store and panel, what changed is drawn at the next frame of the screen.
+// Loaded by index.html. Opens the link to the monitor, sends commands of buttons and keys, changes the document.
 
 import { AxisCurves } from "./axes.js";
 import { Chart, timeAt } from "./chart.js";

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Words and buttons: the controller's state, faults with remedy, drives, program, messages.
+// Used by page.js. Changes elements of the document, and the title; no I/O.
 
 import { text } from "./scale.js";
 

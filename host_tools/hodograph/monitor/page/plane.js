@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The path: the program's curve, where the setpoints went, where the axes went. A path in space is projected.
+// Used by page.js. Draws on the canvas that it is given, and takes its pointer and keys.
 
 import { digitsOf, prepare, roundUp } from "./scale.js";
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Round numbers for axes, and numbers for people.
+// Used by page.js, axes.js, chart.js, panel.js and plane.js. No state, except that `prepare` sets the size of a canvas.
 
 /** The least of 1, 2, 5 times a power of ten that is not below `value`. */
 export function roundUp(value) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What the plots draw: the last groups of each series and the last points of the path, in rings of fixed size.
+// Used by page.js and axes.js. Changes its own arrays only; no I/O.
 
 const GROUPS = 8192;
 const POINTS = 12288;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Light, dark, or as the system has it; and the colours for the canvases.
+// Used by page.js. Keeps the choice in localStorage, and sets the theme of the document.
 
 const STORED = "hodograph-theme";
 const NEXT = { auto: "light", light: "dark", dark: "auto" };

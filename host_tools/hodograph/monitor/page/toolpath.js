@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A toolpath on the plane: programmed path, curve with its feed as colour, rapid moves dashed, the source line of a place.
+// Used by page.js; plane.js draws it. Draws on the canvas that it is given; no other effects.
 
 const COLOURS = 24; // grades of feed
 const RAPID = -1;

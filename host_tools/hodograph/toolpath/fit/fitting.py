@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """From a programmed path to a curve of continuous curvature within a certified tolerance. Used by many modules of
-host_tools: jobs, streaming and the pipeline of sections. No I/O.
+host_tools: jobs, the Python API and the pipeline of sections. No I/O.
 
 Theory: docs/theory/toolpath-fitting.md.
 """
