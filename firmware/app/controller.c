@@ -99,7 +99,7 @@ static void init_values(struct controller *controller, uint8_t port_node)
     }
 }
 
-/* Called during the check of a chunk, while the motion continues: the main loop is alive, and the chunk before this one
+/* Called during the check of a chunk, while the motion continues: the main loop runs, and the chunk before this one
  * may be due. */
 static void beat_in_stream(void *self)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements app/controller_state.h (see there): what the parts of the controller need of the whole. Used by
  * firmware/app, except its folders. Main loop, outside the lock, which some functions take; controller_send waits while
- * the port has no room. Changes the controller, sends frames, and tells the port of progress (watchdog). */
+ * the port has no room. Changes the controller, sends frames, and reports progress to the port (watchdog). */
 #include "app/controller_state.h"
 
 #include "port/port.h"

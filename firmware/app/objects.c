@@ -8,6 +8,7 @@
 
 #include "app/commands.h"
 #include "app/objects_axis.h"
+#include "app/objects_outputs.h"
 #include "app/objects_program.h"
 #include "app/objects_stream.h"
 #include "canopen/cob.h"
@@ -156,18 +157,6 @@ static uint32_t object_write_start(struct controller *controller, const struct o
 static bool object_urgent_command(uint8_t value)
 {
     return command_is_urgent(value);
-}
-
-/* While a program runs, the value is for this one and not for the next. */
-static void object_written_outputs_stay(struct controller *controller)
-{
-    uint8_t *stay = &controller->values.outputs_at_standstill.stay_at_end;
-    port_lock();
-    if (machine_on_path(&controller->machine)) {
-        controller->machine.outputs_stay = *stay != 0u;
-        *stay = 0;
-    }
-    port_unlock();
 }
 
 static void object_written_override(struct controller *controller)

@@ -5,9 +5,9 @@
  * the controller, the machine under the lock, the period of the tick and the stored parameters.
  *
  * Handlers are attached to entries in one table (objects.c): an object with behaviour needs its lines in the EDS file,
- * its handlers and a row in that table. Those of one axis are in objects_axis.c, those of the program in
- * objects_program.c, those of jobs in objects_stream.c. Objects of the configuration are found by config_contains
- * (app/machine/config.h).
+ * its handlers and a row in that table. Those of one axis are in objects_axis.c, those of the outputs in
+ * objects_outputs.c, those of the program in objects_program.c, those of jobs in objects_stream.c. Objects of the
+ * configuration are found by config_contains (app/machine/config.h).
  */
 #ifndef APP_OBJECTS_H
 #define APP_OBJECTS_H

@@ -30,13 +30,13 @@ void emcy_producer_init(struct emcy_producer *producer, uint8_t node, uint8_t *e
  * all. */
 static void make_room(struct emcy_producer *producer, uint16_t code)
 {
-    uint8_t victim = 0;
+    uint8_t replaced = 0;
     for (uint8_t i = (uint8_t)QUEUE_SIZE; i-- > 0u;) {
-        victim = producer->queue[i].code == code ? i : victim;
+        replaced = producer->queue[i].code == code ? i : replaced;
     }
     producer->queued--;
-    memmove(&producer->queue[victim], &producer->queue[victim + 1u],
-            (size_t)(producer->queued - victim) * sizeof producer->queue[0]);
+    memmove(&producer->queue[replaced], &producer->queue[replaced + 1u],
+            (size_t)(producer->queued - replaced) * sizeof producer->queue[0]);
 }
 
 static void queue(struct emcy_producer *producer, uint16_t code, const uint8_t *detail)

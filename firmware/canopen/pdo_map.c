@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Implements canopen/pdo_map.h (see there): one remappable PDO of a device: parameters, mapping, packing, times. Used
- * by app/objects_axis and sim/node. All functions of one PDO in one context. Changes its struct and the mapped values
- * of the dictionary; no I/O. */
+ * by app/objects_axis, app/objects_outputs and sim/node. All functions of one PDO in one context. Changes its struct and
+ * the mapped values of the dictionary; no I/O. */
 #include "canopen/pdo_map.h"
 
 #include <assert.h>

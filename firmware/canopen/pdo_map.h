@@ -2,13 +2,13 @@
 /* pdo_map: one remappable PDO of a device (CiA 301, 7.2.2, objects 0x1400 ... 0x1BFF): parameters, mapping, packing,
  * times.
  * 
- * Used by app/objects_axis and sim/node. The parameters are in the object dictionary, with the sub-indices of its EDS.
- * This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and applies them
- * (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of 0x1400 ... are
- * received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object must be readable
- * to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the application
- * updates fields before packing, and checks received values when it uses them. Changes its struct and the mapped values
- * of the dictionary; no I/O.
+ * Used by app/objects_axis, app/objects_outputs and sim/node. The parameters are in the object dictionary, with the
+ * sub-indices of its EDS. This module checks writes to them (pdo_map_write, called by the dictionary's write hook) and
+ * applies them (pdo_map_written). It keeps the mapped entries in a list, so that packing needs no search. PDOs of
+ * 0x1400 ... are received, those of 0x1800 ... sent. The EDS says which objects may be mapped (PDOMapping); an object
+ * must be readable to be sent, writable to be received. Packing and unpacking do not call the dictionary's hooks: the
+ * application updates fields before packing, and checks received values when it uses them. Changes its struct and the
+ * mapped values of the dictionary; no I/O.
  * 
  * Rules for writes, with their abort codes:
  *   COB-ID (sub 1)      another identifier while the PDO is valid (bit 31 clear), an identifier of

@@ -7,12 +7,12 @@
 #include "core/qmath.h"
 #include "core/stop_check.h"
 
-#define STEPS 16 /* of a brake, about */
-/* of a brake, until the remaining states must be within the limits as a whole */
+#define STEPS 16 /* of a path stop, about */
+/* of a path stop, until the remaining states must be within the limits as a whole */
 #define MOST_STEPS        160
 #define MOST_HALVINGS     3     /* of a step */
 #define MOST_PARTS        14    /* of a piece at a time */
-#define MOST_EVALUATIONS  3000  /* of stretches of brakes, for a piece and kind, */
+#define MOST_EVALUATIONS  3000  /* of stretches of path stops, for a piece and kind, */
 #define EVALUATIONS_PER_S 30000 /* and more for a long piece */
 #define LOW_RATES         4     /* halvings of the rate of the lowest level, each by itself */
 #define PIECE_SLACK_Q40   ((int64_t)1 << 26) /* by which a piece may go back: 2^-14 mm */
@@ -42,7 +42,7 @@ struct part {
     struct span slope;
 };
 
-/* The brakes from all states of a part, at one time. */
+/* The path stops from all states of a part, at one time. */
 struct flow {
     const struct numbers *own;
     struct states at;
@@ -165,7 +165,7 @@ static void path_of(struct brake_check *check, const struct states *at, struct p
     path_bounds_of(&check->bounds, check->hint, at->low_q40_mm, at->high_q40_mm, path);
 }
 
-/* --- The brakes from all states of a part --- */
+/* --- The path stops from all states of a part --- */
 
 /* The least deceleration at which the release phase can begin, for a speed v: b^2 c + 4 T b >= v with
  * c = 1 / (2 j1) + 1.016 / (2 j2). */
@@ -196,7 +196,7 @@ static struct real least_release(const struct flow *flow)
     return real_div(real_mul(flow->own->up, steady), most);
 }
 
-/* The speed that the jerk of the onset makes in a tick, times 2: a brake whose last tick before the release phase has
+/* The speed that the jerk of onset makes in a tick, times 2: a path stop whose last tick before the release phase has
  * no jerk may lose less speed by this much. */
 static struct real tick_change(const struct flow *flow)
 {
@@ -218,7 +218,7 @@ static void flow_begin(struct flow *flow, const struct brake_check *check,
         real_negative(real_root(real_scale(real_mul(own->up, from->v.high), 1)));
     flow->own = own;
     flow->at = *from;
-    flow->at.a.low = real_max(from->a.low, deepest); /* below, no brake begins */
+    flow->at.a.low = real_max(from->a.low, deepest); /* below, no path stop begins */
     flow->at.a.high = real_max(from->a.high, flow->at.a.low);
     flow->begin = flow->at.a;
     flow->least = real_min(real_negative(own->deep), flow->begin.low);
@@ -230,7 +230,7 @@ static void flow_begin(struct flow *flow, const struct brake_check *check,
     flow->slow = least_release(flow);
 }
 
-/* Accelerations of the onset at a time: those of the brake that begins with the greatest one and falls late, */
+/* Accelerations of the onset at a time: those of the path stop that begins with the greatest one and falls late, */
 static struct real onset_high(const struct flow *flow, struct real time_s)
 {
     const struct real since = real_max(real_sub(time_s, flow->late_s.high), zero);
@@ -269,7 +269,7 @@ static struct real mean(struct real a, struct real b)
     return real_scale(real_add(a, b), -1);
 }
 
-/* The greatest speed a time later: no brake loses less than the slowest onset or the slowest release. */
+/* The greatest speed a time later: no path stop loses less than the slowest onset or the slowest release. */
 static struct real speed_high(const struct flow *flow, struct real step_s)
 {
     const struct real v = flow->at.v.high;
@@ -413,7 +413,7 @@ static struct real greatest_speed(const struct flow *flow)
     return real_add(flow->at.v.high, real_add(late, falls));
 }
 
-/* The remaining motion of all brakes at once. */
+/* The remaining motion of all path stops at once. */
 static int remainder_keeps(struct brake_check *check, const struct flow *flow, int64_t distance_q40)
 {
     struct states left = flow->at;
@@ -432,7 +432,7 @@ static int remainder_keeps(struct brake_check *check, const struct flow *flow, i
     return keeps_on(check, &path, &left, jerk);
 }
 
-/* Every brake from these states, until standstill. */
+/* Every path stop from these states, until standstill. */
 static int brakes_keep(struct brake_check *check, const struct program_stop *stop,
                        const struct numbers *own, const struct states *from)
 {

@@ -19,7 +19,7 @@ enum phase { PHASE_PLAN, PHASE_BRAKE, PHASE_REST };
 #define FIFTH_MORE_MS_Q32 5153961u /* 6/5 of a microsecond in ms, rounded up */
 #define END_TICKS         2u       /* until a command counts, and until the end is a setpoint */
 #define SEARCH_STEPS      2        /* in a tick at standstill */
-#define NO_NUMBERS        2u       /* no enum program_stop_kind: no brake is possible */
+#define NO_NUMBERS        2u       /* no enum program_stop_kind: no path stop is possible */
 #define MOST_FEED_Q32     ((int64_t)1 << 45) /* 2^13 mm/s */
 /* 2^57, the greatest, less a unit: it is made an int32_t */
 #define MOST_SLOPE_Q56 (((int64_t)1 << 57) - 1)
@@ -120,7 +120,7 @@ static void read_numbers(struct feed_override *f)
         path_brake_numbers_of(&f->numbers, &stop, f->clock.period_us) ? f->kind : NO_NUMBERS;
 }
 
-/* The deadline of a brake under way stays. */
+/* The stop deadline of a path stop under way stays. */
 static void request_stop(struct feed_override *f, enum program_stop_kind kind)
 {
     const int64_t left_q30 = f->phase == PHASE_BRAKE ? f->left_q30 : 0;
@@ -243,7 +243,7 @@ static void come_to_standstill(struct feed_override *f, uint32_t found)
     }
 }
 
-/* The point at the brake's arc length. */
+/* The point at the arc length of the path stop. */
 static int interpolate_brake(struct feed_override *f, struct interpolator *it)
 {
     const struct path_state *at = &f->brake.at;
@@ -279,7 +279,7 @@ static int fits_before_end(const struct feed_override *f, const struct path_stat
     return path_brake_fits(from, &f->numbers, left_q40_mm);
 }
 
-/* Whether every brake of the stop table would end before the end of the path, and before the program does. The
+/* Whether every path stop of the stop table would end before the end of the path, and before the program does. The
  * remainder is rounded down, to micrometres and microseconds. */
 static int is_far_from_end(const struct feed_override *f, const struct path_state *from)
 {
@@ -294,10 +294,10 @@ static int is_far_from_end(const struct feed_override *f, const struct path_stat
            qmath_mul_unsigned(left_q32_s, US_PER_S) >= (int64_t)time_us;
 }
 
-/* --- From the nominal motion to the brake --- */
+/* --- From the nominal motion to the path stop --- */
 
-/* Leaves the nominal motion, if a brake may begin here. A hold or a stop does not begin while a rising override adds
- * more than a quarter of the deceleration to the acceleration: the rise is cut instead. */
+/* Leaves the nominal motion, if a path stop may begin here. A hold or a stop does not begin while a rising override
+ * adds more than a quarter of the deceleration to the acceleration: the override ramp ends early instead. */
 static int leave_plan(struct feed_override *f, const struct path_state *state, int64_t turned_q56)
 {
     if (f->kind == PROGRAM_STOP_HOLD && turned_q56 > f->numbers.deceleration_q56 / 4) {
@@ -312,9 +312,9 @@ static int leave_plan(struct feed_override *f, const struct path_state *state, i
     return 1;
 }
 
-/* The nominal motion continues for another tick. At a low override it may take long to the place of the next brake, so
- * the override goes to 0. At a high one the fall of the override would add to the deceleration of the nominal motion.
- * */
+/* The nominal motion continues for another tick. At a low override it may take long to the place of the next path stop,
+ * so the override goes to 0. At a high one the fall of the override would add to the deceleration of the nominal
+ * motion. */
 static void wait_slowly(struct feed_override *f)
 {
     if (f->plan.now.override_q57 < OVERRIDE_ONE / 2) {
@@ -365,7 +365,8 @@ static int wait_tick(struct feed_override *f, struct interpolator *it)
     return plan_tick(f, it);
 }
 
-/* A fault stop gives its own numbers to the brake of a hold or a stop, if the brake then still ends on the path. */
+/* A fault stop gives its own stop parameters to the path stop of a hold or a stop, if it then still ends on the path.
+ * */
 static void replace_brake(struct feed_override *f)
 {
     const struct path_state at = f->brake.at;
@@ -544,7 +545,8 @@ int feed_override_take_over(struct feed_override *f, struct interpolator *it,
 
 /* --- Its records --- */
 
-/* 1: the program clock is at the place of the motion: not in a brake, nor until the place of standstill is found. */
+/* 1: the program clock is at the place of the motion: not in a path stop, nor until the place of standstill is found.
+ * */
 static int clock_is_here(const struct feed_override *f)
 {
     return f->phase == PHASE_PLAN || (f->phase == PHASE_REST && f->found != 0);
@@ -560,7 +562,7 @@ void feed_override_place(const struct feed_override *f, const struct interpolato
     place->by_arc = here ? 0u : 1u;
 }
 
-/* While the place of standstill is searched only the bisected piece is needed; in a brake, none. */
+/* While the place of standstill is searched only the bisected piece is needed; in a path stop, none. */
 int feed_override_use(struct feed_override *f, struct interpolator *it,
                       const struct coefficients_window *window)
 {

@@ -56,10 +56,10 @@ struct feed_override {
     uint32_t at_end;                  /* and the state that follows at the end of the program */
     uint32_t phase;                   /* where setpoints come from */
     uint32_t kind;                    /* enum program_stop_kind of the requested stop */
-    uint32_t replace;                 /* 1: a fault stop, whose numbers `brake` does not have yet */
-    uint32_t found;                   /* 1: `place` has been found */
-    uint32_t goes_on;                 /* 1: the job continues after the end of the program */
-    int64_t left_q30;                 /* ticks at override 1 until the deadline */
+    uint32_t replace; /* 1: a fault stop, whose parameters `brake` does not have yet */
+    uint32_t found;   /* 1: `place` has been found */
+    uint32_t goes_on; /* 1: the job continues after the end of the program */
+    int64_t left_q30; /* ticks at override 1 until the deadline */
 };
 
 /* For a checked program with coefficient records, at rest at a program time (0: its start; else program_time_at_q42 of

@@ -10,7 +10,7 @@
 
 #define PARTS_LOG2    5  /* a cell has 2^this parts */
 #define MOST_HALVINGS 20 /* of a cell */
-#define CUT_STEPS     30 /* halvings of a piece's time to find a distance */
+#define PLACE_STEPS   30 /* halvings of a piece's time to find a distance */
 
 /* Never inlined, so that its frame is not on the stack while the caller calls program_limits_attend(). */
 #if defined(__GNUC__)
@@ -327,7 +327,7 @@ static int check_stretch(struct check *check, const struct feed_polynomial *poly
 static struct real time_of(const struct feed_polynomial *poly, struct real mm, struct real low)
 {
     struct real high = real_make(1, 0);
-    for (int step = 0; step < CUT_STEPS; step++) {
+    for (int step = 0; step < PLACE_STEPS; step++) {
         const struct real middle = real_scale(real_add(low, high), -1);
         if (real_less(path_motion_horner(poly->c, FEED_DEGREE, middle), mm) != 0) {
             low = middle;
@@ -364,10 +364,10 @@ static int check_piece(struct check *check, uint32_t piece, uint32_t *segment)
         if (real_less(mm, poly.end_mm) == 0) {
             break;
         }
-        const struct real cut = time_of(&poly, mm, low);
-        if (real_less(brief, real_sub(cut, low)) != 0) {
-            code = check_stretch(check, &poly, &path, low, cut);
-            low = cut;
+        const struct real end = time_of(&poly, mm, low);
+        if (real_less(brief, real_sub(end, low)) != 0) {
+            code = check_stretch(check, &poly, &path, low, end);
+            low = end;
         }
         (*segment)++;
         path_motion_read(&path, p, *segment);

@@ -4,12 +4,12 @@
  * at every feed override that its override bounds allow. docs/guides/limits.md describes what is proved and what is
  * not. A part of program_check. Changes only its result; no I/O.
  *
- * It uses nothing of the image but its coefficients. Time is cut into cells: one feed piece on one segment. In a cell
- * every quantity q of the motion has a bound M of |q''|, by Taylor series with majorants; between two samples h apart q
- * is at most M h^2/8 above the greater one. So samples bound the motion at all times. The check goes from one sample to
- * the next and makes h as great as the limits allow there. Where h would have to be less than a 32nd of the cell, the
- * cell is halved. At the joints of cells a step of velocity or acceleration counts as the jerk that a drive sees: step
- * over period.
+ * It uses nothing of the image but its coefficients. Time is divided into cells: one feed piece on one segment. In a
+ * cell every quantity q of the motion has a bound M of |q''|, by Taylor series with majorants; between two samples h
+ * apart q is at most M h^2/8 above the greater one. So samples bound the motion at all times. The check goes from one
+ * sample to the next and makes h as great as the limits allow there. Where h would have to be less than a 32nd of the
+ * cell, the cell is halved. At the joints of cells a step of velocity or acceleration counts as the jerk that a drive
+ * sees: step over period.
  *
  * Integers only (core/real.h): the same verdict on every target. Main loop; no heap, some 3 KiB of stack.
  */

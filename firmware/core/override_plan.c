@@ -427,8 +427,8 @@ static int comes_steady(struct override_plan *plan)
 
 /* --- On a ramp --- */
 
-/* Another override is commanded: the ramp continues until a cut would end there, or beyond. Above guaranteed_q57 a
- * falling ramp is not cut, because no return ramp would be known. */
+/* Another override is commanded: the ramp continues until an early ramp end would lead there, or beyond. Above
+ * guaranteed_q57 a falling ramp does not end early, because no return ramp would be known. */
 static void change_target(struct override_plan *plan, int64_t wanted_q57)
 {
     struct override_ramp *ramp = &plan->ramp;

@@ -65,7 +65,7 @@ struct override_plan {
     uint32_t step;   /* of the search, enum override_search */
     uint32_t window; /* evaluated next, */
     struct override_window ahead; /* and the one evaluated last */
-    struct program_override kept; /* its bounds, if their record is no longer there */
+    struct program_override kept; /* its bounds, if their record is not there any more */
     uint32_t searched;            /* last search above guaranteed_q57 began in this piece */
     int64_t wanted_q57;           /* what the decision is made for: commanded, or 0 */
     int64_t target_q57;           /* the override that is searched, */
@@ -103,7 +103,7 @@ void override_plan_forget_records(struct override_plan *plan);
 /* A path stop has ended: the override continues from 0. */
 void override_plan_restart(struct override_plan *plan);
 
-/* --- Commands: take effect in the next tick, or when the ramp under way may be cut. --- */
+/* --- Commands: take effect in the next tick, or when the ramp under way may end early. --- */
 
 /* The commanded override, in per cent; more than OVERRIDE_MOST_PERCENT counts as that. */
 void override_plan_set(struct override_plan *plan, uint32_t percent);

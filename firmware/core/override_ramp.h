@@ -109,7 +109,7 @@ uint64_t override_span_q32(const struct ramp_ticks *ticks, int64_t mean_q57, uin
 /* All zero but `end_q57`: the override is constant. */
 struct override_ramp {
     int64_t step_q56; /* signed */
-    int64_t end_q57;  /* where the override would end if the ramp were cut now */
+    int64_t end_q57;  /* the override after an early ramp end now */
     uint32_t rise;    /* ticks left of each part, */
     uint32_t even;
     uint32_t fall; /* as many as have risen up to now */

@@ -3,7 +3,7 @@
  * path_bounds: bounds of the first three derivatives of each axis by arc length, on a stretch of the path. Used by the
  * proof of the stops (core/brake_check, for `hodograph verify`). Changes only its struct; no I/O.
  *
- * Each segment is cut into 8 to 64 equal parts. A shorter stretch takes smaller parts. Stored for each part are the
+ * Each segment is divided into 8 to 64 equal parts. A shorter stretch takes smaller parts. Stored for each part are the
  * derivatives at both ends and their greatest difference from the straight line between the ends. This difference
  * follows from a bound of the second derivative (core/path_motion). The parts used last stay stored, because the next
  * stretch is near.

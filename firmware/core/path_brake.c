@@ -10,11 +10,11 @@
 #define MOST_BITS        12         /* of PATH_BRAKE_MOST_TICKS */
 #define SIXTH_Q32        715827882u /* 1/6 */
 #define THREE_HALVES_Q16 98304u     /* 3/2 */
-#define SPARE_HALVES 3 /* half ticks of path_brake_fits: what a brake in whole ticks takes more */
-#define ONE_TICK_Q16 65536u
-#define RISE_BITS    7 /* of an acceleration at which a brake begins, over its deceleration */
-#define LEAST        (1 << 22) /* 2^-34 mm a tick squared, or cubed */
-#define FITS_BITS    57        /* of a deceleration in path_brake_fits */
+#define SPARE_HALVES     3          /* half ticks of path_brake_fits that whole ticks take more */
+#define ONE_TICK_Q16     65536u
+#define RISE_BITS 7 /* of an acceleration at which a path stop begins, over its deceleration */
+#define LEAST     (1 << 22) /* 2^-34 mm a tick squared, or cubed */
+#define FITS_BITS 57        /* of a deceleration in path_brake_fits */
 
 enum phase { FALLING, READY, SETTLING, RESTING };
 
@@ -102,7 +102,7 @@ static int may_settle(int64_t speed_q56, int64_t fall_q56, int64_t jerk_q56)
 
 /* --- Begin --- */
 
-/* Neither too slow nor too fast, and no part of the brake takes more than PATH_BRAKE_MOST_TICKS. */
+/* Neither too slow nor too fast, and no part of the path stop takes more than PATH_BRAKE_MOST_TICKS. */
 static int in_range(const struct path_state *from, const struct path_brake_numbers *n)
 {
     const int64_t rise = qmath_greater(from->acceleration_q56, 0);

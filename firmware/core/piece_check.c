@@ -150,8 +150,8 @@ static int check_last(const struct program *p, const struct program_piece *c)
 /* Two whole pieces between others last longer than two periods: 15625 d > 2 period_us 2^26. */
 static int lasts_long_enough(const struct program *p, uint64_t two_pieces_q32)
 {
-    uint64_t cut = two_pieces_q32 > ((uint64_t)1 << 40) ? (uint64_t)1 << 40 : two_pieces_q32;
-    return cut * 15625u > (uint64_t)p->header.period_us << 27;
+    uint64_t limited = two_pieces_q32 > ((uint64_t)1 << 40) ? (uint64_t)1 << 40 : two_pieces_q32;
+    return limited * 15625u > (uint64_t)p->header.period_us << 27;
 }
 
 static int check_adjacent(const struct program *p, uint32_t i, const struct program_piece *before,

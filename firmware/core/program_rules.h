@@ -60,7 +60,7 @@ enum program_error {
     PROGRAM_ERR_START_MOVING = -47,      /* the program does not begin at rest */
     PROGRAM_ERR_END_MOVING = -48,        /* the program does not end at rest */
     PROGRAM_ERR_PIECE_END = -49,    /* the last piece does not end at the length of the header */
-    PROGRAM_ERR_PIECE_SHORT = -50,  /* two adjacent pieces last no longer than two periods */
+    PROGRAM_ERR_PIECE_SHORT = -50,  /* two adjacent pieces last two periods or less */
     PROGRAM_ERR_BACKWARDS = -51,    /* feed below -2^-10 mm/s */
     PROGRAM_ERR_FEED = -52,         /* above the feed limit of the controller */
     PROGRAM_ERR_ACCELERATION = -53, /* above its acceleration limit */

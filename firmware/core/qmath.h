@@ -15,7 +15,7 @@
  *   NAME_qN          the same without a unit: override_q57, 2^57 = 1
  *   NAME_UNIT        whole units: period_us, feed_um_s
  *   unit of speed    mm_s; of acceleration mm_s2; of jerk mm_s3
- *   q56 of a brake and of a ramp: mm, or 1, a tick, a tick squared or cubed, as their headers say
+ *   q56 of a path stop and of an override ramp: mm, or 1, a tick, a tick squared or cubed, as their headers say
  *
  * A conversion to fewer bits after the point drops bits (floor) unless it is qmath_round; one to more is exact.
  */

@@ -41,7 +41,7 @@ static uint64_t jerk_time_us(uint64_t change_um, uint64_t jerk_q18)
     return qmath_div_up_u64(change_um * 1000u, greater(jerk_q18 >> 18, 1u));
 }
 
-/* --- Motion of a piece in which a brake begins --- */
+/* --- Motion of a piece in which a path stop begins --- */
 
 /* a 1000 / 2^bits, up; a < 2^52 */
 static uint64_t thousands(int64_t a, int bits)
@@ -151,7 +151,7 @@ void stop_piece_extent(const struct program *p, uint32_t piece, uint64_t jerk_up
     extent_waits(out, p, &c, (const int64_t (*)[FEED_PARTS])low, jerk_up_q18);
 }
 
-/* --- The brake --- */
+/* --- The path stop --- */
 
 /* The S-curve to standstill in continuous time. Any deceleration up to the number gives a bound; that of the root is
  * near the least bound. */
@@ -226,7 +226,7 @@ static uint64_t eighths_us(const struct program *p, uint32_t piece, uint32_t cou
     return micro(program_piece_duration(p, piece) * count, 35, NO_BOUND);
 }
 
-/* For a brake that begins at an override of one level. */
+/* For a path stop that begins at an override of one level. */
 static struct stop_bound level_bound(const struct program *p, const struct stop_start *start,
                                      const struct program_stop *stop, enum program_stop_kind kind)
 {
@@ -234,7 +234,7 @@ static struct stop_bound level_bound(const struct program *p, const struct stop_
     uint64_t more_us = STOP_TICKS * (uint64_t)p->header.period_us;
     uint64_t little = number(stop->deceleration) * 125u >> 23;
     if (kind == PROGRAM_STOP_HOLD &&
-        from.slope_um > little) { /* a rising override is cut first, until it adds little */
+        from.slope_um > little) { /* a rising ramp ends early first, until it adds little */
         more_us += from.cut_us;
         from.cut_us = from.slope_um > MOST_CHANGE_UM || from.cut_us >= (uint64_t)1 << 28
                           ? 0u
@@ -250,7 +250,7 @@ static struct stop_bound level_bound(const struct program *p, const struct stop_
                qmath_div_up_u64(from.speed_um * lesser(more_us, MOST_TIME_US), 1000000u));
 }
 
-/* The bound with the numbers of a piece, for a brake that begins in it. */
+/* The bound with the stop parameters of a piece, for a path stop that begins in it. */
 static struct stop_bound brake_bound(const struct program *p, uint32_t piece,
                                      const struct stop_extent *extent,
                                      const struct program_stop *stop, enum program_stop_kind kind)

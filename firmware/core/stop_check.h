@@ -5,7 +5,7 @@
  * parameters (docs/theory/feed.md section 7, "Stops"). A part of program_check; core/brake_check uses it too, and the
  * host tools compute the table with it.
  *
- * The check goes from the last piece to the first, because a stop that cannot brake in one piece continues in the next.
+ * The check goes from the last piece to the first, because a stop that cannot end in one piece continues in the next.
  * Integer arithmetic; every value is rounded so that a bound is never too short. About 10 000 instructions for each
  * piece and kind of stop. Pure, main loop.
  */

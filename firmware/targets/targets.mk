@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 # Makes the firmware for machines other than this one. Included by the Makefile. Writes build/firmware. A target is a
-# core with its flags, a linker script of its name beside this file, and the folders of firmware/port that it is made
+# core with its flags, a linker script of its name in this folder, and the folders of firmware/port that it is made
 # from.
 #
 #   build/firmware/TARGET/IMAGE.elf

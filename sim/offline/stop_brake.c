@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_brake.h (see there): whether a brake along the path keeps given limits. Used by
+/* Implements offline/stop_brake.h (see there): whether a path stop keeps given limits. Used by
  * offline/stop_search, offline/stop_piece and offline/stop_verdict. Changes its arguments only; any thread of a host.
  */
 #include "offline/stop_brake.h"
@@ -8,10 +8,10 @@
 
 #define GREATEST_CODE 255  /* codes of jerk and deceleration are bytes */
 #define LEAST_MM_S    1e-4 /* slower is standstill */
-#define TICKS_MORE    3.0  /* of a brake than of its continuous curve */
-/* ticks of a brake between two tests by bounds: whether these ticks, or all remaining ones, keep the limits */
+#define TICKS_MORE    3.0  /* of a path stop than of its continuous curve */
+/* ticks of a path stop between two tests by bounds: whether these ticks, or all remaining ones, keep the limits */
 #define SURE_EACH   16
-#define SPARE_TIME  1.25 /* bounds of a whole brake cover this multiple of stop_brake_time, */
+#define SPARE_TIME  1.25 /* bounds of a whole path stop cover this multiple of stop_brake_time, */
 #define SPARE_TICKS 10.0 /* and this number of ticks more */
 /* share by which a feed, or an axis' velocity, may exceed its limit at overrides other than 1: the sampled states there
  * include some that the look-ahead of the controller excludes */
@@ -131,8 +131,8 @@ double stop_brake_extent(const struct stop_setting *setting,
     return most->s + extent->speed * most_s;
 }
 
-/* 1: bounds show that the remaining brake keeps the limits; 0: they do not decide. Most brakes at low overrides are far
- * from the limits, and following each of them would take nearly all of the time of a search. */
+/* 1: bounds show that the remaining path stop keeps the limits; 0: they do not decide. Most path stops at low overrides
+ * are far from the limits, and following each of them would take nearly all of the time of a search. */
 static int surely_keeps(const struct stop_setting *setting, const struct stop_inverse *inverse,
                         const struct path_brake *brake, double from_mm, uint32_t row)
 {
@@ -144,7 +144,7 @@ static int surely_keeps(const struct stop_setting *setting, const struct stop_in
     return stop_keeps_up_to(&setting->lookup, inverse, &extent, row, to_mm);
 }
 
-/* 1: bounds show that some ticks of a brake, at[0 ... count], keep the limits; 0: they do not decide. */
+/* 1: bounds show that some ticks of a path stop, at[0 ... count], keep the limits; 0: they do not decide. */
 static int ticks_surely_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                              const struct stop_state *at, int count, uint32_t row)
 {

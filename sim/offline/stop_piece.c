@@ -9,10 +9,10 @@
 #define EVEN_INSTANTS 129  /* of a piece, at equal distances */
 #define ROWS_EACH     4    /* of the path, for an instant between them */
 #define LEAST_MM_S    1e-4 /* slower is standstill */
-/* of the shortest brake: with more jerk the distance of one tick would matter */
+/* of the shortest path stop: with more jerk the distance of one tick would matter */
 #define LEAST_TICKS 6.0
 
-/* Feed overrides at which brakes are followed, and the same shares of the piece's greatest. */
+/* Feed overrides at which path stops are followed, and the same shares of the piece's greatest. */
 static const double SHARES[STOP_SHARES] = {1.0,         511.0 / 512, 509.0 / 512, 504.0 / 512,
                                            488.0 / 512, 448.0 / 512, 0.75,        320.0 / 512,
                                            0.5,         0.25,        0.1};

@@ -11,9 +11,9 @@
 #include "offline/stop_verdict.h"
 
 #define GREATEST_CODE 255 /* codes of jerk and deceleration are bytes */
-/* A piece gets no brake if waiting for that of the next piece takes a share of the brake's mean time below: */
+/* A piece gets no path stop if waiting for that of the next piece takes a share of the path stop's mean time below: */
 #define WAIT_BETTER  0.8   /* this; */
-#define WAIT_AS_GOOD 1.001 /* or this, if the brake could also take much longer */
+#define WAIT_AS_GOOD 1.001 /* or this, if the path stop could also take much longer */
 /* times the least time without limits: codes that take at most this are not searched for from other starts */
 #define NEAR 1.05
 
@@ -23,8 +23,8 @@ struct choice {
 };
 
 /* Takes the codes if they are better; `strict`: at all overrides, and at more instants. The state in which other codes
- * broke a limit last is evaluated first, except where the first test failed last: it then usually fails again, and costs
- * less than a brake that keeps the limits. */
+ * broke a limit last is evaluated first, except where the first test failed last: it then usually fails again, and
+ * costs less than a path stop that keeps the limits. */
 static int better(const struct stop_setting *setting, struct stop_piece *piece, const int codes[3],
                   double after_s, int strict, struct choice *best)
 {
@@ -203,7 +203,7 @@ static void search_quickly(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* A piece without a brake: the nominal motion continues into the next. */
+/* A piece without a path stop: the nominal motion continues into the next. */
 static void wait_for_next(const struct stop_piece *piece, double after_s, struct choice *out)
 {
     double seconds = piece->seconds;
@@ -234,7 +234,7 @@ static void known_choice(const struct stop_setting *setting, const struct stop_p
     out->first_s = times.first_s;
 }
 
-/* Takes the given codes. Returns 1 if they are `kept` and keep the limits also in place of the brake `before`. */
+/* Takes the given codes. Returns 1 if they are `kept` and keep the limits also in place of the path stop `before`. */
 static int kept_choice(const struct stop_setting *setting, struct stop_piece *piece,
                        const struct stop_found *found, double after_s, struct choice *best)
 {
@@ -270,8 +270,8 @@ static void search_or_keep(const struct stop_setting *setting, struct stop_piece
     }
 }
 
-/* If brakes from a piece exceed a limit, those from the previous piece usually do so as well, from its last instant at
- * the same override. These are evaluated first; the result does not depend on the order. */
+/* If path stops from a piece exceed a limit, those from the previous piece usually do so as well, from its last instant
+ * at the same override. These are evaluated first; the result does not depend on the order. */
 static void suspect_as_next(struct stop_piece *piece, const struct stop_overridden suspects[2])
 {
     piece->suspect = piece->count - 1u;

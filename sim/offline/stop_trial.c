@@ -23,7 +23,7 @@ struct course {
     struct interpolator interp;
     double points[HISTORY + 1u][PROGRAM_AXES + 1u]; /* the newest first */
     uint32_t count;
-    uint32_t brake_ticks; /* of the brake up to now; 0: none */
+    uint32_t brake_ticks; /* of the path stop up to now; 0: none */
     double begun_with;    /* acceleration along the path when it began */
     int machine;          /* 1: a fault stop: the machine's limits count */
 };
@@ -71,8 +71,8 @@ static void evaluate_axes(const struct course *course, double period_s,
     }
 }
 
-/* Differences include earlier ticks: those of a brake alone are the ones from its fourth tick on. The acceleration at
- * its start, with a changing override, may be above the program's limit; its difference is late by two ticks. */
+/* Differences include earlier ticks: those of a path stop alone are the ones from its fourth tick on. The acceleration
+ * at its start, with a changing override, may be above the program's limit; its difference is late by two ticks. */
 static void evaluate_along(struct course *course, double period_s, const struct stop_trial *trial,
                            const struct stop_limits *limits, struct stop_use *use)
 {

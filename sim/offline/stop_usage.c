@@ -6,7 +6,7 @@
 #include <math.h>
 
 #define UNLIMITED_MM_S 1e12 /* stands for a feed without limit */
-/* share of a limit that bounds of a whole brake leave free: rounding to whole ticks takes less */
+/* share of a limit that bounds of a whole path stop leave free: rounding to whole ticks takes less */
 #define SPARE_SHARE   1e-4
 #define FEED_ROUNDING 1e-9 /* share of a feed by which the plan may exceed it */
 

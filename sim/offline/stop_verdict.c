@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* Implements offline/stop_verdict.h (see there): whether brakes with given codes keep the limits from all of a feed
+/* Implements offline/stop_verdict.h (see there): whether path stops with given codes keep the limits from all of a feed
  * piece. Used by offline/stop_search. Any thread of a host; the functions change their arguments only. */
 #include "offline/stop_verdict.h"
 
 #include <math.h>
 
-#define STEP_S         0.002  /* between two samples of a brake, */
+#define STEP_S         0.002  /* between two samples of a path stop, */
 #define FINE_S         0.0005 /* and in the strict test */
-#define BRAKE_EACH     5      /* ticks of a brake that another may replace, */
+#define BRAKE_EACH     5      /* ticks of a path stop that another may replace, */
 #define BRAKE_INSTANTS 16u    /* and instants at which it has begun, about */
-#define LONGEST_SHARE  0.1    /* of the longest brake in the cost of codes */
+#define LONGEST_SHARE  0.1    /* of the longest path stop in the cost of codes */
 #define FAR_TICKS                                                                                  \
-    20.0 /* and twice the brake: so far from its end a brake fits before the end of the program */
-#define NO_BRAKE_S 10.0 /* longest brake in the cost of codes with which none begins */
+    20.0 /* and twice the path stop: so far from its end a path stop fits before the end of the program */
+#define NO_BRAKE_S 10.0 /* longest path stop in the cost of codes with which none begins */
 
-/* What a brake has to keep; `surely`: it does. */
+/* What a path stop has to keep; `surely`: it does. */
 struct keeping {
     const struct stop_inverse *inverse;
     int surely;
@@ -33,8 +33,8 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
         double next_s = i == piece->count ? piece->seconds : piece->at_s[i];
         double wait = times->first_s + (next_s - piece->at_s[i - 1u]);
         double left = piece->left_s + (piece->seconds - piece->at_s[i - 1u]);
-        /* A brake that is longer than the remaining program is not begun. The next instant may have a better one. It is
-         * not counted, otherwise the worst numbers would be the best. */
+        /* A path stop that is longer than the remaining program is not begun. The next instant may have a better one.
+         * It is not counted, otherwise the worst numbers would be the best. */
         int begins = stop_brake_begin(&brake, at, numbers, setting->period_s);
         double total_s = begins ? stop_brake_time(at, numbers, setting->period_s) : STOP_NEVER_S;
         if (begins && at->v * piece->factor > 0.5 * piece->fastest.v &&
@@ -55,12 +55,13 @@ int stop_times_of(const struct stop_setting *setting, const struct stop_piece *p
     return 1;
 }
 
-/* Bounds of the states in which brakes begin: greatest speed, and greatest acceleration of either sign. */
+/* Bounds of the states in which path stops begin: greatest speed, and greatest acceleration of either sign. */
 struct begun {
     double speed, rise, fall;
 };
 
-/* Bounds of all brakes that begin in the piece in states within these; returns the arc length of their end at most. */
+/* Bounds of all path stops that begin in the piece in states within these; returns the arc length of their end at most.
+ * */
 static double begun_extent(const struct stop_setting *setting, const struct stop_piece *piece,
                            const struct path_brake_numbers *numbers, const struct begun *begun,
                            struct stop_extent *extent)
@@ -85,7 +86,7 @@ static struct begun begun_at_any_rate(const struct stop_setting *setting,
     return out;
 }
 
-/* Whether bounds alone show that all brakes from such states keep the limits. */
+/* Whether bounds alone show that all path stops from such states keep the limits. */
 static int begun_keep(const struct stop_setting *setting, const struct stop_inverse *inverse,
                       const struct stop_piece *piece, const struct path_brake_numbers *numbers,
                       const struct begun *begun)
@@ -116,7 +117,7 @@ int stop_all_keep(const struct stop_setting *setting, struct stop_piece *piece,
     return 1;
 }
 
-/* Whether a brake fits and keeps the limits, or need not fit. */
+/* Whether a path stop fits and keeps the limits, or need not fit. */
 static int state_keeps(const struct stop_setting *setting, const struct keeping *keeping,
                        const struct stop_state *at, uint32_t row,
                        const struct path_brake_numbers *numbers)
@@ -136,7 +137,7 @@ static double quarter(const struct stop_setting *setting, const struct path_brak
            (setting->period_s * setting->period_s);
 }
 
-/* Whether a brake from this state fits and keeps the limits, or need not fit; 1 for a state that cannot occur. */
+/* Whether a path stop from this state fits and keeps the limits, or need not fit; 1 for a state that cannot occur. */
 static int overridden_keeps(const struct stop_setting *setting, const struct stop_piece *piece,
                             const struct keeping *keeping, const struct stop_overridden *which,
                             const struct path_brake_numbers *numbers)
@@ -152,7 +153,7 @@ static int overridden_keeps(const struct stop_setting *setting, const struct sto
            state_keeps(setting, keeping, &from, row, numbers);
 }
 
-/* Fills for each feed override whether bounds alone show that brakes at it keep the limits: most do at low ones. */
+/* Fills for each feed override whether bounds alone show that path stops at it keep the limits: most do at low ones. */
 static void rates_surely_keep(const struct stop_setting *setting,
                               const struct stop_inverse *inverse, const struct stop_piece *piece,
                               const struct path_brake_numbers *numbers,
@@ -208,7 +209,7 @@ static int close_keep(const struct stop_setting *setting, struct stop_piece *clo
     return 1;
 }
 
-/* Whether a brake keeps the limits that replaces one with the numbers `before`, begun in this state. */
+/* Whether a path stop keeps the limits that replaces one with the numbers `before`, begun in this state. */
 static int out_of_brake_keeps(const struct stop_setting *setting, const struct stop_state *from,
                               uint32_t row, const struct path_brake_numbers *before,
                               const struct path_brake_numbers *numbers)

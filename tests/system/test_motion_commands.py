@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +16,19 @@ import pytest
 
 from bench import EXAMPLES, PAPER_ALPHA, MakeAlpha, MakeBench
 from hodograph.bus.clock import VirtualClock
-from hodograph.bus.sdo.controller import HELD, OFF, READY, RUNNING, Controller
+from hodograph.bus.goto import require_inside_travel
+from hodograph.bus.sdo.controller import (
+    HELD,
+    OFF,
+    READY,
+    RUNNING,
+    CommandRefusedError,
+    Controller,
+)
+from hodograph.bus.sdo.objects import ACTUAL, DISABLE, ENABLE, REFUSED_OUTSIDE_TRAVEL
 from hodograph.cli.main import main
+from hodograph.config import load_machine
+from hodograph.errors import RefusedError
 
 
 @pytest.fixture
@@ -107,9 +120,41 @@ def test_no_drive_is_switched_on_outside_of_its_travel(
     ):
         capsys.readouterr()
         assert main(words) == 5
-        assert "axis x stands at 40 mm, outside of its travel -35 to 35 mm" in (
-            capsys.readouterr().err
+        assert re.search(
+            r"axis x stands at (40|39\.9999|40\.0000)\d* mm, outside of its travel -35 to 35 mm by more than "
+            r"start_tolerance_mm \(0\.005 mm\)",
+            capsys.readouterr().err,
         )
         assert bench.controller.state() == OFF
         assert bench.controller.targets(2) == pytest.approx(stands, abs=1000)
     assert main(["goto", "--to", "0", "0", str(PAPER_ALPHA)]) == 0, "travel_mm is enlarged"
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_host_and_controller_have_one_tolerance(make_bench: MakeBench, side: int) -> None:
+    """They agree to the count on the axes that may be switched on."""
+    controller = make_bench().controller
+    machine = load_machine(PAPER_ALPHA)
+    first, *others = machine.axes
+    tolerance = machine.start_tolerance_counts
+    for beyond, allowed in ((tolerance - 1, True), (tolerance, True), (tolerance + 1, False)):
+        at = controller.read(ACTUAL, 1)
+        edge_mm = (at - side * beyond) / first.counts_per_unit
+        low, high = (edge_mm, 300.0) if side < 0 else (-300.0, edge_mm)
+        near = replace(first, travel_min_mm=low, travel_max_mm=high)
+        moved = replace(machine, axes=(near, *others))
+        controller.configure(moved, machine.kernel)
+        assert controller.state_after_boot() == OFF
+        assert controller.read(ACTUAL, 1) == at
+        if allowed:
+            require_inside_travel(controller, moved)
+            controller.command(ENABLE)
+            controller.command(DISABLE)
+            controller.wait_for((OFF,), 5.0)
+            continue
+        with pytest.raises(RefusedError, match=r"axis x stands at .* by more than start_tolerance"):
+            require_inside_travel(controller, moved)
+        with pytest.raises(CommandRefusedError) as refused:
+            controller.enable()
+        assert refused.value.reason == REFUSED_OUTSIDE_TRAVEL
+        assert controller.state() == OFF

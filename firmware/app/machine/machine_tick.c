@@ -61,7 +61,7 @@ static void step_enabling(struct machine *machine)
     }
 }
 
-/* Without a point no brake along the path is possible. */
+/* Without a point no path stop is possible. */
 static void next_targets(struct machine *machine)
 {
     int32_t target_counts[AXES_MAX];

@@ -335,7 +335,7 @@ class VirtualClock:
         return self
 
     def release(self) -> None:
-        """Removes a user. After the last one, time no longer waits for this thread."""
+        """Removes a user. After the last one, time does not wait for this thread."""
         self._users -= 1
         if self._users == 0:
             self._connection.close()

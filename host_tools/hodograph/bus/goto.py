@@ -21,8 +21,9 @@ from ..program import ProgramOptions, StopTerms, compile_path, encode
 from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
-from .sdo.controller import OFF, Controller
-from .sdo.objects import ACTUAL, OVERRIDE
+from .sdo.configuration import configured_counts, configured_tolerance, configured_travel
+from .sdo.controller import CommandRefusedError, Controller
+from .sdo.objects import ACTUAL, OVERRIDE, REFUSED_OUTSIDE_TRAVEL
 
 GOTO_FEED_MM_S = 100.0
 GOTO_RAMP_S = 0.25
@@ -39,8 +40,6 @@ QUICK_ABOVE_MM = 50.0
 """Stops of longer moves in space are searched with few trials. All trials would take up to 36 s of processor time and
 make stops at most 8 % shorter.
 """
-TRAVEL_SLACK_MM = 0.1
-"""How far outside of its travel an axis may stand when its drive is switched on, mm or degrees."""
 
 Place = tuple[float, ...]
 """A position of path axes, mm or degrees: of the two or three that draw a path, or of all."""
@@ -131,26 +130,35 @@ def legs(start_mm: Place, end_mm: Place, machine: Machine) -> list[tuple[Place, 
 
 def switch_on(controller: Controller, machine: Machine) -> None:
     """Switches the drives on; returns at standstill, ready. Raises RefusedError, naming the axis: it stands outside of
-    its travel. The controller refuses this too, but does not name the axis.
+    its travel by more than the start tolerance. The controller decides this, and does not name the axis.
     """
-    _require_inside_travel(controller, machine)
-    controller.enable()
+    try:
+        controller.enable()
+    except CommandRefusedError as refused:
+        if refused.reason == REFUSED_OUTSIDE_TRAVEL:
+            require_inside_travel(controller, machine)
+        raise
 
 
-def _require_inside_travel(controller: Controller, machine: Machine) -> None:
-    """A drive outside of its software limits moves to them at once, without a ramp. An axis may stand there after a
-    limit switch.
+def require_inside_travel(controller: Controller, machine: Machine) -> None:
+    """Raises RefusedError, naming the axis that stands outside of its travel. A drive outside of its software limits
+    moves to them at once, without a ramp. An axis may stand there after a limit switch.
+
+    With the controller's own values, in counts: so the controller refuses to switch on exactly the same axes.
     """
-    if controller.state_after_boot() != OFF:
-        return
-    for number, axis in enumerate(machine.axes, 1):
-        at = controller.read(ACTUAL, number) / axis.counts_per_unit
-        least, most = axis.travel_min_mm - TRAVEL_SLACK_MM, axis.travel_max_mm + TRAVEL_SLACK_MM
-        if not least <= at <= most:
+    counts = configured_counts(controller, len(machine.axes))
+    for number, (axis, per_unit) in enumerate(zip(machine.axes, counts, strict=True), 1):
+        at = controller.read(ACTUAL, number)
+        least, most = configured_travel(controller, number)
+        tolerance = configured_tolerance(controller, number)
+        if not least - tolerance <= at <= most + tolerance:
+            stands, low, high, allowed = (
+                f"{round(value / per_unit, 6):.10g}" for value in (at, least, most, tolerance)
+            )
             raise RefusedError(
-                f"{controller.who()}: axis {axis.name} stands at {at:g} {axis.unit}, outside of its travel "
-                f"{axis.travel_min_mm:g} to {axis.travel_max_mm:g} {axis.unit}, where its drive must not be switched "
-                "on: move it with the drive's own tool or by hand, or enlarge travel_mm meanwhile"
+                f"{controller.who()}: axis {axis.name} stands at {stands} {axis.unit}, outside of its travel {low} to "
+                f"{high} {axis.unit} by more than start_tolerance_mm ({allowed} {axis.unit}), where its drive must not "
+                "be switched on: move it with the drive's own tool or by hand, or enlarge travel_mm meanwhile"
             )
 
 

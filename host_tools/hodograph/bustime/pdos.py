@@ -25,7 +25,7 @@ STATUSWORD, ACTUAL, VOLTS, INPUTS = 0x60410010, 0x60640020, 0x21000010, 0x60FD00
 
 @dataclass(frozen=True)
 class PdoChoice:
-    """Which optional objects the PDOs of a drive carry, beside setpoint (RPDO1) and position (TPDO1)."""
+    """Which optional objects the PDOs of a drive carry, in addition to setpoint (RPDO1) and position (TPDO1)."""
 
     torque: bool = False
     """A torque offset in RPDO1."""

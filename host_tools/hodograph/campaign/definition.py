@@ -48,7 +48,7 @@ def _fault(table: Table, data: Mapping[str, Any]) -> Fault:
     name = table.text("name")
     if table.has("scenario"):
         if table.has("rules") or table.has("random"):
-            raise table.error("scenario", "is given beside rules: keep one of the two")
+            raise table.error("scenario", "is given together with rules: keep one of the two")
         return Fault(name, load_scenario(table.present("scenario")))
     if table.has("random") and not table.has("rules"):
         raise table.error("random", "is given without rules that use it: add rules, or take it out")

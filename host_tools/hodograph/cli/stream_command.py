@@ -446,8 +446,8 @@ def _coordinate(value: float) -> str:
 
 
 def _off_the_path(machine: Machine, found: Nearest) -> str:
-    """The refusal of axes that stand beside the path. They have left it after the last place in the journal: they are
-    sent back there, so that nothing is left out.
+    """The refusal of axes that do not stand on the path. They have left it after the last place in the journal: they
+    are sent back there, so that no part of it is omitted.
     """
     back = found.passed or found
     return (

@@ -239,7 +239,7 @@ def _path_file(root: Table, table: Table, outputs: Table, number: int | None = N
 def _path(table: Table) -> PathSpec | SpacePathSpec:
     through = table.has("through")
     if through and table.has("control_points"):
-        raise table.error("through", "is given beside control_points: keep one of the two")
+        raise table.error("through", "is given together with control_points: keep one of the two")
     if not through and not table.has("control_points"):
         raise table.error("control_points", "is missing: add it, or through = [[x, y], ...]")
     closed = table.flag("closed")

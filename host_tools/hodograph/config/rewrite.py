@@ -33,7 +33,7 @@ def rewritten(
     output: Path,
     by: str,
 ) -> dict[Path, str]:
-    """The texts of the machine file `output` and of drive files beside it, by path; nothing is written.
+    """The texts of the machine file `output` and of drive files in its folder, by path; nothing is written.
 
     `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by`: name of the command
     that makes the change, for a comment in the drive files.

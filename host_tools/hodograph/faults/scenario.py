@@ -19,7 +19,7 @@ within_ms = 300                     # the same in wall time, where ticks do not 
 rest_ticks = 400                    # from the fault until the axes are at rest
 rest_ms = 400                       # the same in wall time
 on_path = true                      # the setpoints come to rest on the path, within the program's bound of a fault stop
-unseen = true                       # a drive may be silent as its axis comes to rest: the others are judged
+unseen = true                       # a drive may stop sending as its axis comes to rest: the others are judged
 recover_ms = 3000                   # from the reset until the drives are found and configured anew
 """
 
@@ -62,7 +62,7 @@ NEEDED = {
 """Names that an action takes from [random]."""
 
 _OF_SCENARIOS = {"rules", "random", "host", "expect"}
-"""Keys that path and machine files beside the scenarios do not have."""
+"""Keys that path and machine files next to the scenarios do not have."""
 
 Drawn = int | str
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Limits of a motion: one `Limit`, the tables of limits that files give, and the `Peak` beside a limit. Used by all
-modules that plan or check a motion. No I/O.
+"""Limits of a motion: one `Limit`, the tables of limits that files give, and the `Peak` of a limited quantity. Used by
+all modules that plan or check a motion. No I/O.
 
 Limits come from a path file ([limits], [feed]), a machine file (its axes and its controller) and drive files (volts).
 docs/theory/feed.md 5.5.

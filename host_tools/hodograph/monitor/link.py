@@ -293,7 +293,7 @@ class Link:
 
     def _shows_job(self, status: dict[str, Any]) -> bool:
         """Whether the path of a streamed job is the one to show: until the controller has none any more, or runs its
-        program though the job is over, in two looks one after the other.
+        program though the job is over, in two successive reads.
         """
         stream = status["stream"]
         if stream is None:

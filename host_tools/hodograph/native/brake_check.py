@@ -25,7 +25,7 @@ class BrakeCheck:
 
     @property
     def evaluations(self) -> int:
-        """Number of stretches of brakes that the last proof evaluated: its cost."""
+        """Number of stretches of path stops that the last proof evaluated: its cost."""
         return int(self._check.evaluations)
 
     def proves(self, piece: int, kind: int, codes: Sequence[int]) -> bool:

@@ -5,8 +5,8 @@ Run by `make build`; setup.py uses it too. Starts the compiler and writes the mo
     python build_native.py [--build DIR]
 
 Links DIR/host/libhodograph_{sim,core,numerics}.a (DIR: `build` at the root of the tree), which `make c` makes,
-and puts `_native.abi3.so` beside this file. The Makefile calls it. For `pip install`, setup.py takes `extension`, which
-compiles the sources itself.
+and puts `_native.abi3.so` into the folder of this file. The Makefile calls it. For `pip install`, setup.py takes
+`extension`, which compiles the sources itself.
 
 Writes to DIR and next to this file.
 """

@@ -64,7 +64,7 @@ class FeedCommands:
 
     @property
     def time_s(self) -> float:
-        """Program time of the last tick (of a job: in the executed chunk); in a brake that of its start."""
+        """Program time of the last tick (of a job: in the executed chunk); in a path stop that of its start."""
         return float(self._lib.feed_override_time_q42(self._feed)) * 2.0**-42
 
     def hold(self) -> None:
@@ -117,7 +117,7 @@ class FeedOverride(FeedCommands):
 
     @property
     def plan(self) -> PlanStep | None:
-        """The origin of the setpoint of the last step; None: in a brake, or at rest."""
+        """The origin of the setpoint of the last step; None: in a path stop, or at standstill."""
         if self._feed.phase != 0:
             return None
         now = self._feed.plan.now

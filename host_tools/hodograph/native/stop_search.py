@@ -75,7 +75,7 @@ _MARGIN = 1.0 / (1.0 - 0.003) + 1e-6
 class SearchHints:
     """Codes that a search of each piece has to fit, keeps, or tries first.
 
-    before  codes (M, 3) of a brake out of which another may begin, 0: none
+    before  codes (M, 3) of a path stop out of which another may begin, 0: none
     kept    pieces (M,) whose codes keep the limits but for that; they stay if they keep them out of it too
     start   codes (M, 3) that the search tries first, 0: those of the next piece
     """

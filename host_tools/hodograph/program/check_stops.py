@@ -37,7 +37,7 @@ WINDOW = 8
 HALVINGS = 3
 """Each eighth of a piece is checked by itself."""
 LITTLE = 0.25
-"""Share of the deceleration that a rising override may add when the brake of a hold begins."""
+"""Share of the deceleration that a rising override may add when the path stop of a hold begins."""
 _ROUNDING = 1e-12
 """Share of a bound that rounding may change here."""
 _MOST_US = 2.0**32 - 1.0
@@ -162,8 +162,8 @@ def own_bounds(program: Program, kind: int) -> tuple[Real, Real, Real]:
 
 @dataclass(frozen=True, eq=False)
 class _Start:
-    """At the start of brakes (M,): greatest speed, acceleration at constant override, the part that a changing override
-    adds, and the time in which this part decays.
+    """At the start of path stops (M,): greatest speed, acceleration at constant override, the part that a changing
+    override adds, and the time in which this part decays.
     """
 
     speed: Real
@@ -192,7 +192,7 @@ def _level(start: _Start, number: Real, kind: int, period_s: float) -> tuple[Rea
 
 
 def _settled(program: Program, feed: Real, acceleration: Real, jerk_up: Real) -> Bool:
-    """Whether a brake may begin everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
+    """Whether a path stop may begin everywhere in each eighth (M, 8), with their lowest feed and acceleration."""
     factor = program.pieces.override_factor[:, None]
     falling = np.maximum(-acceleration, 0.0) * factor**2
     settle_s = 0.5 * falling / jerk_up[:, None] + 3e-6 * program.period_us

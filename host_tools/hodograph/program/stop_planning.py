@@ -37,7 +37,7 @@ MOST_PARTS = 256
 WORTH_GAIN = 0.05
 """Share by which the numbers of halves have to reduce the mean bound of a part."""
 LONGEST_WAIT_S = 0.04
-"""Pieces in which a hold may wait longer than this for a brake are halved down to FINE_PART_S."""
+"""Pieces in which a hold may wait longer than this for a path stop are halved down to FINE_PART_S."""
 FINE_PART_S = 0.004
 """Least duration of a part of a halved piece."""
 MOST_FINE_PARTS = 1024
@@ -91,7 +91,7 @@ class StopTerms:
 
 def plan_stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     """The program with its stop table. Feed pieces without numbers are halved while that helps: in a narrow bend at its
-    limits no brake may begin, but the remainder of the piece then gets numbers. Long pieces are halved too, so that
+    limits no path stop may begin, but the remainder of the piece then gets numbers. Long pieces are halved too, so that
     such a bend does not make all stops of a piece longer. Raises LongStopError: a fault stop may take longer than
     `stop_time_ms`.
     """
@@ -131,7 +131,7 @@ def stop_codes(
 
 
 def without_long_stops(program: Program) -> Program:
-    """The program without the numbers of pieces whose brakes take longer than continuing to the next piece with
+    """The program without the numbers of pieces whose path stops take longer than continuing to the next piece with
     numbers, or to the end.
     """
     codes = program.stops.codes.copy()
@@ -246,8 +246,8 @@ def _waiting_less(
     tree: _Halves, limits: Sequence[StopLimits], codes: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """Codes (M, 2, 3) of a program whose pieces are halved to short parts where a hold waits long: in a bend at its
-    limits a brake may begin at some instants only. Parts get numbers for holds if these are better than waiting, and if
-    numbers for a fault stop during such a hold are found.
+    limits a path stop may begin at some instants only. Parts get numbers for holds if these are better than waiting,
+    and if numbers for a fault stop during such a hold are found.
     """
     waits = _long_waits(tree.program, limits[HOLD], codes)
     longest_s = max(FINE_PART_S, tree.program.duration_q32_s * 2.0**-32 / MOST_FINE_PARTS)
@@ -289,8 +289,8 @@ def _long_waits(
     program: Program, limits: StopLimits, codes: NDArray[np.uint8]
 ) -> NDArray[np.bool_]:
     """Pieces (M,) in which a hold may wait for more than LONGEST_WAIT_S, except those at the end of the program, where
-    no brake fits. A hold also waits in a piece whose numbers gain nothing: while the program itself brakes hard, no
-    brake with a lower jerk of release can begin.
+    no path stop fits. A hold also waits in a piece whose numbers gain nothing: while the program itself brakes hard, no
+    path stop with a lower jerk of release can begin.
     """
     seconds = program.pieces.duration_s
     mean_s = StopSearch(NativeProgram(encode(program))).mean_s(limits, codes[:, HOLD])
@@ -326,9 +326,9 @@ def _search_round(
     codes: NDArray[np.uint8],
     known: NDArray[np.bool_],
 ) -> None:
-    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may be requested during the brake of a hold.
-    So its codes, although known, are checked again with the codes found for the hold. A search with few trials tries
-    the codes of the fault stop for the hold first, and keeps them if possible.
+    """Finds the codes (M, 2, 3) that are not `known` (M, 2). A fault stop may be requested during the path stop of a
+    hold. So its codes, although known, are checked again with the codes found for the hold. A search with few trials
+    tries the codes of the fault stop for the hold first, and keeps them if possible.
     """
     search, quick = StopSearch(NativeProgram(encode(program))), limits[FAULT].quick
     hold, fault = codes[:, HOLD], codes[:, FAULT]

@@ -17,7 +17,7 @@ Codes = NDArray[np.uint8]
 Unsigned = NDArray[np.uint32]
 
 STOP_KINDS = ("hold", "fault")
-"""Feed hold and stop brake inside the program's limits, a fault stop inside the machine's."""
+"""Feed hold and controlled stop brake inside the program's limits, a fault stop inside the machine's."""
 
 HOLD, FAULT = 0, 1
 JERK_DOWN, DECELERATION, JERK_UP = 0, 1, 2
@@ -87,7 +87,7 @@ class Stops:
 
 
 def no_stops(count: int) -> Stops:
-    """A table without any brake, which no controller accepts. A program has it before its stops are planned."""
+    """A table without any path stop, which no controller accepts. A program has it before its stops are planned."""
     return Stops(
         np.zeros((count, 2, 3), dtype=np.uint8),
         np.zeros((count, 2), dtype=np.uint32),

@@ -47,7 +47,7 @@ def render(template: str, **values: Any) -> str:
 
 
 def write_page(page: Path, text: str, figures: Iterable[tuple[str, Figure]]) -> Path:
-    """Writes the figures, each under the name beside it, then the page; makes the folder. Raises InputError."""
+    """Writes the figures, each under the name that goes with it, then the page; makes the folder. Raises InputError."""
     folder = page.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)

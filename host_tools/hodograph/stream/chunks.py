@@ -549,7 +549,7 @@ class SectionChunks:
             if fault.code == ProgramError.EVENT_DENSE:
                 break
             if fault.code == ProgramError.STOP_LONG and not thorough:
-                break  # more stop parameters are the better remedy; with them, a longer tail has more places for brakes
+                break  # more stop parameters are the better remedy; with them, a longer tail has more places for stops
         return program, fault
 
     def _program_with_events(self, stretch: Stretch, codes: Codes) -> Program:

@@ -81,7 +81,7 @@ class Block:
     feed_mm_s  (n,) programmed feed of each segment; inf: as fast as the machine can
     line       (n,) source line of each
     events     outputs that switch on it; arc lengths from its start
-    chords     of the programmed path; None: they were not asked for, or the path is of another kind
+    chords     of the programmed path; None: they were not requested, or the path is of another kind
     """
 
     curve: Curve

@@ -528,5 +528,5 @@ class Sender:
                 f"{self._section.file}:{status.line}: stopped before its end: the job ends here; "
                 "hodograph stream --continue goes on"
             )
-        controller.wait_for((*BUSY, READY, OFF, BOOT), 0.0)  # drives off: the next status tells why
+        controller.wait_for((*BUSY, READY, OFF, BOOT), 0.0)  # drives off: see the next status
         return False

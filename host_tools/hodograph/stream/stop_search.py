@@ -41,9 +41,9 @@ class StopSearch:
         self._last: tuple[Window, Codes] | None = None
 
     def of_window(self, window: Window) -> Codes:
-        """Stop codes of the pieces of a window; only the kept ones are searched. Their brakes keep the limits on the
-        path that the window knows after them. Of brief pieces only some are searched: a stop in another piece begins in
-        the next one with codes, a little later.
+        """Stop codes of the pieces of a window; only the kept ones are searched. Their path stops keep the limits on
+        the path that the window knows after them. Of brief pieces only some are searched: a stop in another piece
+        begins in the next one with codes, a little later.
         """
         if self._last is not None and self._last[0] is window:
             return self._last[1]

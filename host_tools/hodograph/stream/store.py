@@ -112,7 +112,7 @@ class ChunkStore:
 
 
 def _unlinked(folder: Path) -> int:
-    """A descriptor of a file that has no name, so that nothing of it stays behind."""
+    """A descriptor of a file that has no name, so that nothing of it remains."""
     descriptor, name = tempfile.mkstemp(prefix="hodograph-stream-", dir=folder)
     Path(name).unlink()
     return descriptor

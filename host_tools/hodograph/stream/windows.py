@@ -65,7 +65,7 @@ otherwise.
 """
 
 _EFFORT = Effort(gain=1e-3, patience=9, tolerance=1e-5, spacing=2.0, fewest=24)
-"""Effort of windows, less than that of other plans. Feeds a little below their limits leave brakes more places to
+"""Effort of windows, less than that of other plans. Feeds a little below their limits leave path stops more places to
 begin. Half as many pieces take half of the bytes and cost 0.1 to 0.2 % of the time of the motion.
 """
 

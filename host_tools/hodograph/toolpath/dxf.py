@@ -109,8 +109,8 @@ class _Insert:
 
 @dataclass(slots=True)
 class _Block:
-    """The content of a block: contours, whose groups are numbers of `styles`, copies of other blocks, and what is left
-    out.
+    """The content of a block: contours, whose groups are numbers of `styles`, copies of other blocks, and what is
+    omitted.
     """
 
     base: Point

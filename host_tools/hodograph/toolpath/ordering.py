@@ -121,7 +121,7 @@ def _link(
 ) -> None:
     """Link ends at the same point, then the nearest ones within `reach`, until none is left.
 
-    A contour is linked with itself only where `may_close` says so.
+    A contour is linked with itself only where `may_close` allows it.
     """
     order = np.lexsort((numbers, points[:, 2], points[:, 1], points[:, 0]))
     sorted_points = points[order]

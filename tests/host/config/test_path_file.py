@@ -145,7 +145,7 @@ MISTAKES = [
     (
         "closed = false",
         "closed = false\nthrough = [[0, 0]]",
-        r"through is given beside control_points",
+        r"through is given together with control_points",
     ),
     (
         "closed = false",

@@ -96,7 +96,7 @@ class Recorder:
         return self.frames()
 
     def take(self) -> Frames:
-        """The frames since the last call, which are no longer kept here. Raises BusError as `frames`."""
+        """The frames since the last call, which are then not kept here. Raises BusError as `frames`."""
         self._catch_up()
         self._check()
         chunks = self._chunks[: len(self._chunks)]  # the thread appends only

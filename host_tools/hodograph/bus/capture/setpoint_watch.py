@@ -16,7 +16,7 @@ from .frames import Frames
 from .setpoint_check import Jump, Step, StepLimits, worst_steps
 
 WINDOW = 1000
-"""SYNCs that are checked together. The first and the last quarter are context only; the windows beside check them."""
+"""SYNCs that are checked together. The first and the last quarter are context only; the adjacent windows check them."""
 _STEP, _EDGE = WINDOW // 2, WINDOW // 4
 _MOST_FRAMES = 100_000
 """If no SYNC comes, at most this many frames are kept."""

@@ -73,8 +73,8 @@ REFUSALS = {
     19: "a streamed job is open that was started before or begins elsewhere: end it with an upload, or stream again",
     20: "another client has loaded another program or job meanwhile: upload it again",
     21: "a stop was commanded meanwhile: give the command again",
-    22: "an axis is outside its travel, where its drive must not be switched on: move it with the drive's own tool or "
-    "by hand, or enlarge travel_mm meanwhile",
+    22: "an axis is outside its travel by more than start_tolerance_mm, where its drive must not be switched on: move "
+    "it with the drive's own tool or by hand, or enlarge travel_mm meanwhile",
     16: "the drives are real and this computer does not permit real-time priority: run the controller with "
     "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }

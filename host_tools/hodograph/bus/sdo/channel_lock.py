@@ -40,7 +40,7 @@ class Turns:
     def __init__(self, address: BusAddress, node: int, clock: Clock = REAL_CLOCK) -> None:
         self._clock = clock
         self.while_waiting: Callable[[], None] = _nothing
-        """Called at each look at a lock that is not free; may use the channel without the lock."""
+        """Called at each attempt to take a lock that is not free; may use the channel without the lock."""
         self._who = f"node {node} on {address}"
         self._depth = 0
         self._sign = os.urandom(_SIGN_BYTES)

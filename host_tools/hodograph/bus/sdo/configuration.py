@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The object values that configure a controller for a machine file (docs/reference/protocol.md section 3). Used by
-sdo/controller, sdo/status and cli/record_command.
+bus/goto, sdo/controller, sdo/status and cli/record_command.
 
 `sdo/controller` writes them. `configured_limits` and its like read the present values by SDO; no other I/O.
 """
@@ -100,6 +100,21 @@ def configured_counts(controller: Node, axes: int) -> tuple[int, ...]:
     return tuple(
         controller.read(objects.COUNTS_PER_UNIT, axis) or common for axis in range(1, axes + 1)
     )
+
+
+def configured_travel(controller: Node, axis: int) -> tuple[int, int]:
+    """Least and greatest position of an axis, from 1, in counts as they are now. Raises BusError."""
+    least = controller.read(objects.TRAVEL_MINIMUM, axis)
+    return least, controller.read(objects.TRAVEL_MAXIMUM, axis)
+
+
+def configured_tolerance(controller: Node, axis: int) -> int:
+    """Start tolerance of an axis, from 1, in counts, as the controller computes it (docs/reference/protocol.md
+    section 3, 0x2004 sub 6). Raises BusError.
+    """
+    tolerance, common = (controller.read(CONFIGURATION, n) for n in (6, 7))
+    own = controller.read(objects.COUNTS_PER_UNIT, axis)
+    return min(tolerance * own // common, 2**32 - 1) if own else tolerance
 
 
 def _outputs(outputs: Outputs | None) -> Iterator[tuple[int, int]]:

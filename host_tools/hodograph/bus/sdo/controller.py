@@ -213,7 +213,7 @@ class Controller(Node):
 
     def command(self, command: int) -> None:
         """Sends a command; raises RefusedError with the controller's reason. Commands to stop never wait for the
-        channel. If the answer is lost, the state tells whether the command has been executed.
+        channel. If the answer is lost, the state shows whether the command has been executed.
         """
         self._give(command, COMMAND, None, command)
 

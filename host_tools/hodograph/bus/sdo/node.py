@@ -248,7 +248,7 @@ class Node:
         return _nowhere(int.from_bytes(os.urandom(3), "little"))
 
     def read(self, index: int, sub: int | None = None) -> int:
-        """An integer object. If the answer is lost, or the transfer broke off, it is asked for again, once."""
+        """An integer object. If the answer is lost, or the transfer broke off, it is requested again, once."""
 
         def action() -> int:
             return int(self._variable(index, sub).raw)

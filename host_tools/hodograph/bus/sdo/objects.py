@@ -43,7 +43,7 @@ MOVING = (*ON_PATH, STOPPING)
 """States in which a program runs or is held."""
 BUSY = (*MOVING, HOMING, QUICK_STOPPING)
 """States in which axes move, or may."""
-REFUSED_MOVING, REFUSED_OTHER, REFUSED_STOPPED = 3, 20, 21
+REFUSED_MOVING, REFUSED_OTHER, REFUSED_STOPPED, REFUSED_OUTSIDE_TRAVEL = 3, 20, 21, 22
 
 Object = tuple[int, int | None]
 """Index and sub-index, None for an object without."""

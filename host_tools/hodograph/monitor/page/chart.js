@@ -157,7 +157,7 @@ function stroke(context, { low, high, missing, gap }, at, colour) {
 }
 
 /**
- * When outputs switched, `marks` from left to right: a line each, and names beside it, from the bottom up. A name goes to
+ * When outputs switched, `marks` from left to right: a line each, names next to it, from the bottom up. A name goes to
  * the left of its line at the right edge, above names that it would cover, and is left out where there is no room.
  */
 function drawMarks(context, marks, width, height, colours) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// The WebSocket to the monitor: says hello with the token, comes back when it was cut, gives commands.
+// The WebSocket to the monitor: opens with the token, connects again after an interruption, gives commands.
 // Used by page.js. Opens and closes the WebSocket, keeps the token in sessionStorage, and removes it from the address.
 
 const TOKEN_NEEDED = 4401;

@@ -174,7 +174,7 @@ export class Plane {
     context.lineWidth = 1;
   }
 
-  /** A triangle at each place where outputs switch, and what switches: beside it, to the right where there is room. */
+  /** A triangle at each place where outputs switch, and what switches: next to it, to the right where there is room. */
   outputs(context, px, py, width, colours) {
     context.font = "11px system-ui, sans-serif";
     context.textBaseline = "middle";

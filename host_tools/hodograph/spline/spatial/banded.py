@@ -62,7 +62,7 @@ def _solve(lower: Real, diagonal: Real, upper: Real, rhs: Real) -> Real:
 
 
 def _place(band: Real, blocks: Real, offset: int) -> None:
-    """Writes blocks (n, 3, 3), `offset` block columns beside the diagonal, into the band storage."""
+    """Writes blocks (n, 3, 3), `offset` block columns on either side of the diagonal, into the band storage."""
     first = max(offset, 0) * _BLOCK
     for row in range(_BLOCK):
         for column in range(_BLOCK):

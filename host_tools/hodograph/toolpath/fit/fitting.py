@@ -58,7 +58,7 @@ _LESS_ROOM = (0.95, 0.95, 0.95, 0.75)
 later ones. In the first rounds the new stations help; lower bounds cost time.
 """
 _THIN_SHARE = 0.01
-"""Points nearer than this share of the tolerance to the chord of their neighbours are left out."""
+"""Points nearer than this share of the tolerance to the chord of the adjacent points are omitted."""
 _THIN_ROUNDS = 4
 """How often points are left out."""
 

@@ -105,7 +105,7 @@ class Outline:
 
 
 def turns(point: Real) -> Real:
-    """Change of direction (n,) at points (n, 3), 0 at the ends; rad. NaN beside a leg of length 0."""
+    """Change of direction (n,) at points (n, 3), 0 at the ends; rad. NaN next to a leg of length 0."""
     leg = np.diff(point, axis=0)
     with np.errstate(invalid="ignore"):
         leg = leg / np.linalg.norm(leg, axis=1)[:, None]
@@ -119,7 +119,7 @@ def turns(point: Real) -> Real:
 def outline(
     reference: Reference, tolerance_mm: float, tied: tuple[bool, bool] = (False, False)
 ) -> Outline:
-    """The vertices of a reference, without those that lie nearly on the line between the vertices beside them.
+    """The vertices of a reference, without those that lie nearly on the line between the vertices next to them.
 
     tied  whether the first and the last leg have to be the first and the last chord
     """
@@ -228,7 +228,7 @@ def _is_rough(point: Real, longest_mm: float) -> Flags:
     around = np.convolve(wavers, np.ones(_WINDOW))[_WINDOW // 2 :][: wavers.size]
     wavers &= around > _WINDOW // 2
     near = np.minimum(length[:-1], length[1:]) <= longest_mm
-    straight = turns(point)[1:-1] <= SHARPEST_RAD  # not beside a leg of length 0
+    straight = turns(point)[1:-1] <= SHARPEST_RAD  # not next to a leg of length 0
     return np.asarray(near & (wavers | ~straight))
 
 
