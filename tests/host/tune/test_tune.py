@@ -8,12 +8,14 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hodograph.cli import output as cli_output
 from hodograph.cli.main import main
 from hodograph.config import Drive, Machine, load_machine
 from hodograph.config.rewrite import rewritten
@@ -203,7 +205,7 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     arguments = ("tune", str(machines / "given.toml"), "--bandwidth", "60", "-o", str(output))
     status, out, err = run(capsys, *arguments, "--json")
     assert status == 0, err
-    written = [output, tmp_path / "tuned_x.toml", tmp_path / "tuned_y.toml"]
+    written = [tmp_path / "tuned_x.toml", tmp_path / "tuned_y.toml", output]
     result = json.loads(out)
     assert result["files"] == [str(file) for file in written]
     before, after = tomllib.loads(text + third), tomllib.loads(output.read_text())
@@ -219,7 +221,7 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     assert after == before
     for line in (line for line in text.splitlines() if "#" in line):
         assert line in output.read_text()
-    drive = tomllib.loads(written[1].read_text())
+    drive = tomllib.loads(written[0].read_text())
     given = tomllib.loads((tmp_path / "drives" / "alpha_x.toml").read_text())
     gains = drive.pop("pdff")
     assert gains.keys() == given.pop("pdff").keys()
@@ -231,9 +233,38 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     status, _, err = run(capsys, *arguments)
     assert status == 2
     assert "there already: name another --output, or add --force" in err
-    written[2].write_text("other")
+    written[1].write_text("other")
     assert run(capsys, *arguments, "--force")[0] == 0
-    assert "other" not in written[2].read_text()
+    assert "other" not in written[1].read_text()
+
+
+class _CrashError(Exception):
+    """The process ends here."""
+
+
+@pytest.mark.parametrize("after", [0, 1, 2, 3])
+def test_a_crash_leaves_no_machine_file_without_its_drives(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
+) -> None:
+    """The command ends after so many files."""
+    written: list[Path] = []
+    plain = cli_output.write_file
+
+    def write_file(file: Path, data: bytes) -> None:
+        if len(written) == after:
+            raise _CrashError
+        written.append(file)
+        plain(file, data)
+
+    monkeypatch.setattr(cli_output, "write_file", write_file)
+    file = tmp_path / "tuned.toml"
+    arguments = ("--bandwidth", "60", "-o", str(file))
+    with suppress(_CrashError):
+        main(["tune", str(MACHINES / "paper_alpha.toml"), *arguments])
+    assert len(written) == after
+    assert file.exists() == (after == 3)
+    if file.exists():
+        assert len(load_machine(file).axes) == 2
 
 
 def test_names_that_differ_by_signs_have_files_of_their_own(tmp_path: Path) -> None:
