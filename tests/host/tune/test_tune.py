@@ -149,13 +149,40 @@ def test_each_axis_has_its_own_voltage_limit(drives: tuple[Drive, Drive]) -> Non
     assert outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
 
 
-def test_unstable_gains_of_a_drive_file_are_named(machine: Machine) -> None:
-    """The bandwidth is not the reason."""
+def _with_gains(machine: Machine, **factors: float) -> Machine:
+    """The machine with these gains of x multiplied."""
     x, y = machine.axes
     assert x.drive is not None
-    drive = replace(x.drive, k_pv_nm_s_rad=500 * x.drive.k_pv_nm_s_rad)
-    given = replace(machine, axes=(replace(x, drive=drive), y))
-    with pytest.raises(PlanError, match=r"axis x: .* the gains of the drive file"):
+    gains = {name: factor * getattr(x.drive, name) for name, factor in factors.items()}
+    return replace(machine, axes=(replace(x, drive=replace(x.drive, **gains)), y))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("k_pv_nm_s_rad", 500.0), ("k_iv_per_s", 10000.0), ("k_pp_rad_s_mm", 300.0)],
+)
+def test_unstable_gains_of_a_drive_file_are_named(
+    machine: Machine, name: str, factor: float
+) -> None:
+    """The bandwidth is not the reason. The value that the message recommends is stable."""
+    given = _with_gains(machine, **{name: factor})
+    with pytest.raises(PlanError) as raised:
+        tune(given, [], Asked(bandwidth_hz=60.0))
+    text = str(raised.value)
+    x, y = given.axes
+    assert x.drive is not None
+    assert text.startswith("axis x: the loop is not stable with ")
+    assert f"{name} = {getattr(x.drive, name):g}" in text
+    assert "\n" not in text
+    lower = float(text.partition(f"{name} to ")[2].split()[0])
+    assert 0.0 < lower < getattr(x.drive, name)
+    x = replace(x, drive=replace(x.drive, **{name: lower}))
+    assert tune(replace(given, axes=(x, y)), [], Asked(bandwidth_hz=60.0)).axes
+
+
+def test_gains_of_which_no_smaller_one_is_stable_are_all_named(machine: Machine) -> None:
+    given = _with_gains(machine, k_pp_rad_s_mm=0.0)
+    with pytest.raises(PlanError, match=r"axis x: .* k_pp_rad_s_mm = 0, .*: set all three"):
         tune(given, [], Asked(bandwidth_hz=60.0))
 
 
