@@ -299,9 +299,8 @@ def _run(
             recording=recording,
             override=override,
         )
+        stack.callback(sender.pass_notes)
         done = sender.run()
-        for line in plan.notes:
-            note(line)
     _print(done, options)
 
 
