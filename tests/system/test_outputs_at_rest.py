@@ -25,7 +25,7 @@ from hodograph.events import OutputValues
 from hodograph.job_run import BusCheck, execute_at_rest
 from hodograph.toolpath.moves import SwitchedAtRest
 
-SPINDLE, VALVE = 0b100, 0b001
+SPINDLE, NEEDLE, VALVE = 0b100, 0b010, 0b001
 """Digital outputs of dispenser.toml."""
 JOB = """F6000
 M3 S40
@@ -249,6 +249,40 @@ def test_the_end_of_a_file_is_executed_where_it_ends(
         assert f"{first}:4: glue" in command.err
     assert seen == [(0, 0), (VALVE, 6000), (0, 6000)]
     assert bench.controller.targets(1) == [2_000_000]
+
+
+ENDING = "F6000\nM64 P0\nG1 X6\nG4 P3\nM64 P1\nG4 P1\nM65 P0\nG4 P1\nM30\n"
+"""With a dwell after the last move, and outputs after the dwell."""
+
+
+@pytest.mark.parametrize(("files", "times"), [(1, 1), (2, 2)])
+def test_after_a_stop_in_the_last_dwell_the_rest_of_the_file_is_executed(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path, files: int, times: int
+) -> None:
+    """Also after a second stop in it; of the last file, and of one that another one follows."""
+    first, second = tmp_path / "first.ngc", tmp_path / "second.ngc"
+    first.write_text(ENDING)
+    second.write_text("F6000\nG1 X2\nM30\n")
+    given = words(tmp_path, machine, str(second))[files == 1 :]
+    arguments = (str(first), *given)
+    for _ in range(times):
+        with running(clock, "stream", *arguments, name="stream") as command:
+            while not bench.controller.read(OUTPUTS, 1):
+                assert command.child.poll() is None, command.err
+                clock.sleep(0.01)
+            clock.sleep(1.5)  # in the dwell
+            assert bench.controller.targets(1) == [6_000_000]
+            bench.controller.command(STOP)
+            assert command.wait() == 6, command.err
+        clock.sleep(0.1)
+        assert bench.controller.read(OUTPUTS, 1) == 0
+        arguments = ("--continue", *given[-2:])
+    with running(clock, "stream", *arguments, name="stream") as command:
+        seen = outputs_meanwhile(bench, clock, command)
+        assert command.wait() == 0, command.err
+    assert seen[:-1] == [(state, 6000) for state in (0, VALVE, VALVE | NEEDLE, NEEDLE)]
+    assert seen[-1][0] == 0  # at the end of the job, or with the move to the second file
+    assert bench.controller.targets(1) == [2_000_000 if files == 2 else 6_000_000]
 
 
 def test_switching_by_hand(

@@ -197,8 +197,9 @@ class Sender:
         while item is not None:
             self._job(item[0], item[1])
             item = self._wait_item()
-        if self._ahead:
-            execute_at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
+        self.pass_notes()
+        if self._ahead or acts_at_rest(self.plan.after):
+            execute_at_rest(self.at, self.plan.last_file, self.plan.after, self.operator)
         else:
             self.at.note("nothing of the job is left")
         end_outputs(self.at, self.machine)
