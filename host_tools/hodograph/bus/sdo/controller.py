@@ -12,16 +12,18 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...data import CONTROLLER_EDS, object_dictionary
 from ...errors import BusError, HodographError, InputError, RefusedError, RunError, one_line
 from ...fixed_point import MM_PER_Q40, nearest_q40
 from ..address import BusAddress
+from ..clock import REAL_CLOCK, Clock
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
 from ..diagnostics.texts import (
     PROGRAM_STATES,
@@ -33,6 +35,7 @@ from ..diagnostics.texts import (
 )
 from ..signals import interrupts_ignored
 from .configuration import configuration, configuration_crc32
+from .job_lock import JobLock
 from .network import open_network
 from .node import BROKEN, IDENTITY_OBJECT, NO_OBJECT, Node
 from .objects import (
@@ -122,6 +125,17 @@ class Controller(Node):
     _stops: int | None = None
     """Stop commands at the beginning of a job; None: no job, or the controller does not count them."""
 
+    def __init__(
+        self, address: BusAddress, node_id: int, node: canopen.RemoteNode, clock: Clock = REAL_CLOCK
+    ) -> None:
+        super().__init__(address, node_id, node, clock)
+        self._job = JobLock(address, node_id)
+
+    def close(self) -> None:
+        """Closes the locks."""
+        self._job.close()
+        super().close()
+
     # -- configuration ------------------------------------------------------------------------
 
     def configure(self, machine: Machine, kernel: str) -> bool:
@@ -141,6 +155,7 @@ class Controller(Node):
         return bool(different)
 
     def _write_configuration(self, different: list[tuple[Object, int]]) -> None:
+        self.require_no_other_job()
         state = self.state()
         if state in (*BUSY, ENABLING):
             raise RefusedError(
@@ -329,12 +344,18 @@ class Controller(Node):
         return RunError(f"{self.who()} is in fault: {self.fault_advice()}")
 
     def require_standing(self) -> None:
-        """Raises RefusedError: axes move by another command, which is not interrupted."""
+        """Raises RefusedError: axes move by another command, or its job rests. It is not interrupted."""
         state = self.state()
         if state in BUSY:
             raise RefusedError(
                 f"{self.who()} is {STATES.get(state, state)}: wait until the axes stand, or hodograph stop"
             )
+        self.require_no_other_job()
+
+    def require_no_other_job(self) -> None:
+        """Raises RefusedError: another command of this computer runs a job, which may rest now."""
+        with self.turn():
+            self._job.require_free()
 
     def state_after_boot(self) -> int:
         """The state. Waits while it is boot: until the drives are configured. Raises as `wait_for`."""
@@ -433,17 +454,27 @@ class Controller(Node):
     @contextmanager
     def ending_at_stops(self) -> Iterator[None]:
         """For the length of a job: a stop command of any client also ends it where the axes stand, for example in a
-        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on.
+        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on. Other
+        commands of this computer that would move the axes meanwhile are refused. Raises RefusedError: another one runs
+        a job.
         """
+        with ExitStack() as stack:
+            with self.turn():
+                stack.enter_context(self._job.held())
+            self._stops = self._stop_commands()
+            try:
+                yield
+            finally:
+                self._stops = None
+
+    def _stop_commands(self) -> int | None:
+        """The number of stop commands so far; None: the controller does not count them."""
         try:
-            self._stops = self.read(STOP_COMMANDS, 1)
+            return self.read(STOP_COMMANDS, 1)
         except RefusedError as error:
             if not lacks_object(error):
                 raise
-        try:
-            yield
-        finally:
-            self._stops = None
+            return None
 
     def _expect_no_stop(self) -> None:
         """After a command of this connection that the controller counts as a stop: it does not end the job."""
