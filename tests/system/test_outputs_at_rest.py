@@ -7,15 +7,26 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from canopen.sdo.exceptions import SdoAbortedError
 
 from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.run import RunSession, bring_up
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING
-from hodograph.bus.sdo.objects import DISABLE, ENABLING, OUTPUTS, QUICK_STOP, STOP
+from hodograph.bus.sdo.node import IDENTITY_OBJECT, Node
+from hodograph.bus.sdo.objects import (
+    DISABLE,
+    ENABLING,
+    OUTPUTS,
+    QUICK_STOP,
+    STANDSTILL_OUTPUTS,
+    STOP,
+)
 from hodograph.cli.bus_commands import stopping
 from hodograph.cli.main import main
 from hodograph.config import load_machine
@@ -249,6 +260,47 @@ def test_the_end_of_a_file_is_executed_where_it_ends(
         assert f"{first}:4: glue" in command.err
     assert seen == [(0, 0), (VALVE, 6000), (0, 6000)]
     assert bench.controller.targets(1) == [2_000_000]
+
+
+@pytest.fixture
+def old_firmware(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller is of minor version 1, which has no object 0x2058."""
+    plain = Node._variable
+
+    def variable(self: Node, index: int, sub: int | None) -> Any:
+        if index == STANDSTILL_OUTPUTS:
+            raise SdoAbortedError(0x06020000)
+        if (index, sub) == (IDENTITY_OBJECT, 3):
+            return SimpleNamespace(raw=0x00010001)
+        return plain(self, index, sub)
+
+    monkeypatch.setattr(Node, "_variable", variable)
+
+
+@pytest.mark.usefixtures("old_firmware")
+@pytest.mark.parametrize("off_at_end", [True, False])
+def test_older_firmware_is_named_before_anything_moves(
+    bench: Bench,
+    machine: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    off_at_end: bool,
+) -> None:
+    """With both versions, and what to do."""
+    other = tmp_path / "machine.toml"
+    other.write_text(machine.read_text().replace("off_at_end = true", ""))
+    own = machine if off_at_end else other
+    commands = [
+        ("run", job(tmp_path), "--machine", str(own)),
+        ("stream", *words(tmp_path, own, job(tmp_path))),
+        ("output", str(own), "valve=on"),
+    ]
+    for command in commands:
+        assert main(command) == 5
+        err = capsys.readouterr().err.splitlines()[-1]
+        assert "has firmware version 1.1, and outputs that are switched or kept on" in err
+        assert "need 1.2 or later: install the firmware of these host tools" in err
+        assert bench.controller.targets(1) == [0]
 
 
 ENDING = "F6000\nM64 P0\nG1 X6\nG4 P3\nM64 P1\nG4 P1\nM65 P0\nG4 P1\nM30\n"

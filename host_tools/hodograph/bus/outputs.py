@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Outputs at standstill (object 0x2058): switches and reads the outputs of the I/O module while no program runs. Used
-by job_run and cli/motion_commands. Reads and writes objects of the controller by SDO.
+by job_run, cli/motion_commands and cli/stream_command. Reads and writes objects of the controller by SDO.
 """
 
 from __future__ import annotations
@@ -8,11 +8,17 @@ from __future__ import annotations
 from ..errors import RefusedError
 from ..events import ANALOGUES, OutputValues
 from .diagnostics.texts import STATES
-from .sdo.controller import Controller, lacks_object
+from .sdo.controller import Controller, OutdatedError, needs_standstill_outputs
 from .sdo.objects import READY, STANDSTILL_OUTPUTS
 
 _FIRST_ANALOGUE = 3
 """Subindex of the first analogue output; digital outputs are subs 1 and 2."""
+
+
+def require_standstill_outputs(controller: Controller) -> None:
+    """Raises RefusedError: the firmware cannot switch outputs at standstill, nor keep them on between two programs."""
+    with needs_standstill_outputs(controller):
+        controller.read(STANDSTILL_OUTPUTS, 1)
 
 
 def set_outputs(controller: Controller, values: OutputValues) -> None:
@@ -23,17 +29,18 @@ def set_outputs(controller: Controller, values: OutputValues) -> None:
     """
     controller.acted = True
     try:
-        for i, value in enumerate(values.analogue):
-            controller.write(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i, value)
-        for sub in (1, 2):
-            controller.write(STANDSTILL_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
+        with needs_standstill_outputs(controller):
+            for i, value in enumerate(values.analogue):
+                controller.write(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i, value)
+            for sub in (1, 2):
+                controller.write(STANDSTILL_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
+    except OutdatedError:
+        raise
     except RefusedError as error:
         raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
 
 
 def _reason(controller: Controller, error: RefusedError) -> str:
-    if lacks_object(error):
-        return "its firmware cannot switch outputs at standstill: update it"
     state = controller.state()
     if state != READY:
         return (
@@ -43,7 +50,13 @@ def _reason(controller: Controller, error: RefusedError) -> str:
 
 
 def outputs_of(controller: Controller) -> OutputValues:
-    """The outputs as a program, or `set_outputs`, has switched them last."""
-    digital = controller.read(STANDSTILL_OUTPUTS, 1) | controller.read(STANDSTILL_OUTPUTS, 2) << 8
-    analogue = (controller.read(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i) for i in range(ANALOGUES))
-    return OutputValues(digital, tuple(analogue))
+    """The outputs as a program, or `set_outputs`, has switched them last. Raises RefusedError: the firmware does not
+    tell.
+    """
+    with needs_standstill_outputs(controller):
+        digital = controller.read(STANDSTILL_OUTPUTS, 1)
+        digital |= controller.read(STANDSTILL_OUTPUTS, 2) << 8
+        subs = range(_FIRST_ANALOGUE, _FIRST_ANALOGUE + ANALOGUES)
+        return OutputValues(
+            digital, tuple(controller.read(STANDSTILL_OUTPUTS, sub) for sub in subs)
+        )

@@ -108,8 +108,10 @@ __all__ = [
     "STATISTICS",
     "CommandRefusedError",
     "Controller",
+    "OutdatedError",
     "connect",
     "lacks_object",
+    "needs_standstill_outputs",
 ]
 
 POLL_S = 0.02
@@ -417,7 +419,8 @@ class Controller(Node):
         if self._stops is not None:
             self.write(STOP_COMMANDS, 2, self._stops)
         if outputs_stay:
-            self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 1)
+            with needs_standstill_outputs(self):
+                self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 1)
 
     def _start(self, command: int, image: bytes | None, job: int | None) -> None:
         """One attempt. The start names its program or job, since a client on another computer may replace it at any
@@ -582,6 +585,8 @@ _NAMED_PROGRAM, _NAMED_JOB = {START: 1, START_FROM: 2}, 3
 """Subindices of NAMED_START."""
 _STAY_AT_END = 6
 """Subindex of STANDSTILL_OUTPUTS."""
+_OUTPUTS_SINCE = "1.2"
+"""First firmware version (0x1018 sub 3) with STANDSTILL_OUTPUTS."""
 _PREFIX = 16
 """Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")
@@ -594,6 +599,26 @@ class CommandRefusedError(RefusedError):
     def __init__(self, message: str, reason: int) -> None:
         super().__init__(message)
         self.reason = reason
+
+
+class OutdatedError(RefusedError):
+    """The firmware is older than something needs."""
+
+
+@contextmanager
+def needs_standstill_outputs(node: Node) -> Iterator[None]:
+    """Uses STANDSTILL_OUTPUTS inside the context. Raises OutdatedError: the firmware does not have this object."""
+    try:
+        yield
+    except RefusedError as error:
+        if not lacks_object(error):
+            raise
+        revision = node.read(IDENTITY_OBJECT, 3)
+        raise OutdatedError(
+            f"{node.who()} has firmware version {revision >> 16}.{revision & 0xFFFF}, and outputs that are switched or "
+            f"kept on at standstill need {_OUTPUTS_SINCE} or later: install the firmware of these host tools on the "
+            "controller (docs/guides/flash-and-run.md)"
+        ) from error
 
 
 def lacks_object(error: RefusedError) -> bool:
