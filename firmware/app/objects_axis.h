@@ -54,7 +54,7 @@ uint64_t object_read_outputs_cob_id(struct controller *controller, const struct 
 uint64_t object_read_outputs_mapping(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry);
 
-/* 0x2058 subs 1 ... 5: the outputs at standstill. */
+/* 0x2058 subs 1 ... 5 and 7: the outputs at standstill. */
 uint64_t object_read_rest_outputs(struct controller *controller, const struct od_entry *entry);
 uint32_t object_write_rest_outputs(struct controller *controller, const struct od_entry *entry,
                                    uint64_t number);

@@ -15,6 +15,8 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
+from hodograph.bus.capture.decode import decode_outputs
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.run import RunSession, bring_up
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING
@@ -366,6 +368,45 @@ def test_switching_by_hand(
             clock.sleep(0.05)
         assert main(["output", str(machine), "valve=on"]) == 5
     assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+@pytest.fixture
+def two_bytes(machine: Path, tmp_path: Path) -> Path:
+    """The machine with a module of 16 digital outputs, the needle in the second byte."""
+    file = tmp_path / "two_bytes.toml"
+    file.write_text(
+        machine.read_text().replace("needle = { digital = 1 }", "needle = { digital = 9 }")
+    )
+    return file
+
+
+@pytest.mark.parametrize("minor", [2, 3])
+def test_outputs_of_one_command_switch_in_one_frame(
+    make_bench: MakeBench,
+    two_bytes: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    minor: int,
+) -> None:
+    """Firmware of minor version 2 takes them one by one, the analogue one first."""
+    bench = make_bench(file=two_bytes)
+    if minor == 2:
+        plain = Node._put
+
+        def put(self: Node, index: int, sub: int | None, value: int) -> None:
+            if (index, sub) == (STANDSTILL_OUTPUTS, 7):
+                raise SdoAbortedError(0x06090011)
+            plain(self, index, sub, value)
+
+        monkeypatch.setattr(Node, "_put", put)
+    outputs = load_outputs(two_bytes)
+    with Recorder(bench.bus) as recorder:
+        assert main(["output", str(two_bytes), "valve=on", "needle=on", "power=50"]) == 0
+        bench.clock.sleep(0.2)
+    rows = decode_outputs(recorder.frames(), outputs)
+    found = list(zip(rows["digital"].tolist(), rows["analogue"][:, 0].tolist(), strict=True))
+    states = [one for i, one in enumerate(found) if i == 0 or found[i - 1] != one]
+    last = (VALVE | 1 << 9, 16384)
+    assert states == ([(0, 0), last] if minor == 3 else [(0, 0), (0, 16384), (VALVE, 16384), last])
 
 
 @pytest.mark.parametrize(

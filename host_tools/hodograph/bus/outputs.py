@@ -8,11 +8,11 @@ from __future__ import annotations
 from ..errors import RefusedError
 from ..events import ANALOGUES, OutputValues
 from .diagnostics.texts import STATES
-from .sdo.controller import Controller, OutdatedError, needs_standstill_outputs
+from .sdo.controller import Controller, OutdatedError, lacks_object, needs_standstill_outputs
 from .sdo.objects import READY, STANDSTILL_OUTPUTS
 
-_FIRST_ANALOGUE = 3
-"""Subindex of the first analogue output; digital outputs are subs 1 and 2."""
+_FIRST_ANALOGUE, _ALL = 3, 7
+"""Subindices of the first analogue output and of all outputs as one number; digital outputs are subs 1 and 2."""
 
 
 def require_standstill_outputs(controller: Controller) -> None:
@@ -22,22 +22,38 @@ def require_standstill_outputs(controller: Controller) -> None:
 
 
 def set_outputs(controller: Controller, values: OutputValues) -> None:
-    """Switches the outputs at standstill, with the drives on. They stay until the next start, a stop or a fault.
-    Analogue outputs come first, so that a spindle has its speed when it is switched on.
+    """Switches the outputs at standstill, all at once, with the drives on. They stay until the next start, a stop or a
+    fault.
 
     Raises RefusedError: axes move, the drives are off, there is no I/O module, or the firmware cannot do this.
     """
     controller.acted = True
     try:
         with needs_standstill_outputs(controller):
-            for i, value in enumerate(values.analogue):
-                controller.write(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i, value)
-            for sub in (1, 2):
-                controller.write(STANDSTILL_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
+            _set_together(controller, values)
     except OutdatedError:
         raise
     except RefusedError as error:
         raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
+
+
+def _set_together(controller: Controller, values: OutputValues) -> None:
+    try:
+        controller.write(STANDSTILL_OUTPUTS, _ALL, values.together)
+    except RefusedError as error:
+        if not lacks_object(error):
+            raise
+        _set_one_by_one(controller, values)
+
+
+def _set_one_by_one(controller: Controller, values: OutputValues) -> None:
+    """For a controller of minor version 2, which takes each byte of digital outputs and each analogue output by itself.
+    Analogue outputs come first, so that a spindle has its speed when it is switched on.
+    """
+    for i, value in enumerate(values.analogue):
+        controller.write(STANDSTILL_OUTPUTS, _FIRST_ANALOGUE + i, value)
+    for sub in (1, 2):
+        controller.write(STANDSTILL_OUTPUTS, sub, values.digital >> 8 * (sub - 1) & 0xFF)
 
 
 def _reason(controller: Controller, error: RefusedError) -> str:
