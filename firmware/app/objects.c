@@ -406,6 +406,7 @@ static const struct object objects[] = {
     {0x2057, 0x2057, 1, 1, SHARED, object_read_stop_commands, NULL, NULL, NULL},
     {0x2058, 0x2058, 1, 5, SHARED, object_read_rest_outputs, object_write_rest_outputs, NULL, NULL},
     {0x2058, 0x2058, 6, 6, OWN, NULL, NULL, object_written_outputs_stay, NULL},
+    {0x2058, 0x2058, 7, 7, SHARED, object_read_rest_outputs, object_write_rest_outputs, NULL, NULL},
     {0x2060, 0x2060, 2, 14, SHARED, object_read_stream, NULL, NULL, NULL},
     {0x2060, 0x2060, 15, 15, OWN, NULL, object_write_stream_close, NULL, NULL},
     {0x2060, 0x2060, 16, 16, OWN, object_read_stream, object_write_optional_stop, NULL, NULL},

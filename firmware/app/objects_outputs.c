@@ -56,9 +56,37 @@ uint64_t object_read_outputs(struct controller *controller, const struct od_entr
 
 /* ---- 0x2058: the outputs at standstill ---- */
 
+/* Sub 7: subs 1 to 5 one after the other, from the lowest bit on. */
+#define OUTPUTS_ALL 7u
+
+static uint64_t outputs_together(const struct path_outputs_values *values)
+{
+    uint64_t together = values->digital;
+    for (uint32_t i = 0; i < PROGRAM_ANALOGUES; ++i) {
+        together |= (uint64_t)(uint16_t)values->analogue[i] << (16u * (i + 1u));
+    }
+    return together;
+}
+
+static void set_outputs(struct path_outputs_values *values, uint8_t sub, uint64_t number)
+{
+    if (sub == OUTPUTS_ALL) {
+        values->digital = (uint16_t)number;
+        for (uint32_t i = 0; i < PROGRAM_ANALOGUES; ++i) {
+            values->analogue[i] = (int16_t)(uint16_t)(number >> (16u * (i + 1u)));
+        }
+    } else if (sub <= 2u) {
+        const unsigned shift = 8u * (sub - 1u);
+        values->digital = (uint16_t)((values->digital & ~(0xFFu << shift)) | number << shift);
+    } else {
+        values->analogue[sub - 3u] = (int16_t)number;
+    }
+}
+
 uint64_t object_read_rest_outputs(struct controller *controller, const struct od_entry *entry)
 {
-    return outputs_value(&controller->machine.motion.outputs.values, entry->sub);
+    const struct path_outputs_values *values = &controller->machine.motion.outputs.values;
+    return entry->sub == OUTPUTS_ALL ? outputs_together(values) : outputs_value(values, entry->sub);
 }
 
 uint32_t object_write_rest_outputs(struct controller *controller, const struct od_entry *entry,
@@ -66,12 +94,7 @@ uint32_t object_write_rest_outputs(struct controller *controller, const struct o
 {
     port_lock();
     struct path_outputs_values values = controller->machine.motion.outputs.values;
-    if (entry->sub <= 2u) {
-        const unsigned shift = 8u * (entry->sub - 1u);
-        values.digital = (uint16_t)((values.digital & ~(0xFFu << shift)) | number << shift);
-    } else {
-        values.analogue[entry->sub - 3u] = (int16_t)number;
-    }
+    set_outputs(&values, entry->sub, number);
     const bool possible = machine_set_outputs(&controller->machine, &values);
     port_unlock();
     return possible ? SDO_OK : SDO_ABORT_STATE;

@@ -4,7 +4,8 @@
  *
  *   0x180C, 0x1A0C      parameters of TPDO13, which is RPDO1 of the I/O module. Bit 31 of the COB-ID: there is no module
  *   0x2036              the outputs that TPDO13 sends
- *   0x2058 subs 1 to 5  the outputs at standstill       sub 6  whether they keep their values at the end of a program
+ *   0x2058 subs 1 to 5  the outputs at standstill, and all of them at once in sub 7
+ *          sub 6        whether they keep their values at the end of a program
  *
  * Of 0x2036 and 0x2058, subs 1 and 2 are bytes of digital outputs, subs 3 to 5 analogue outputs.
  *
@@ -24,7 +25,7 @@ uint64_t object_read_outputs_cob_id(struct controller *controller, const struct 
 uint64_t object_read_outputs_mapping(struct controller *controller, const struct od_entry *entry);
 uint64_t object_read_outputs(struct controller *controller, const struct od_entry *entry);
 
-/* 0x2058 subs 1 to 5. SDO_ABORT_STATE: the outputs may not be changed now. */
+/* 0x2058 subs 1 to 5 and 7. SDO_ABORT_STATE: the outputs may not be changed now. */
 uint64_t object_read_rest_outputs(struct controller *controller, const struct od_entry *entry);
 uint32_t object_write_rest_outputs(struct controller *controller, const struct od_entry *entry,
                                    uint64_t number);

@@ -55,6 +55,13 @@ class OutputValues(NamedTuple):
     digital: int = 0
     analogue: tuple[int, ...] = (0,) * ANALOGUES
 
+    @property
+    def together(self) -> int:
+        """All as one number: the digital outputs in its lowest 16 bits, then the analogue ones, 16 bits each."""
+        return sum(
+            (value & 0xFFFF) << 16 * i for i, value in enumerate((self.digital, *self.analogue))
+        )
+
 
 class SwitchedOutputs:
     """The state of the outputs after events, from all off or from the given ones."""

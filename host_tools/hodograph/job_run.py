@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 
@@ -19,7 +20,7 @@ import numpy as np
 from .bus.capture.setpoint_check import SetpointJumpError
 from .bus.diagnostics.texts import STATES
 from .bus.goto import goto
-from .bus.outputs import set_outputs
+from .bus.outputs import require_standstill_outputs, set_outputs
 from .bus.run import BusRun, Progress, RunSession, analysed, bring_up, record_program
 from .bus.sdo.controller import FAULT_STATE, READY, Controller
 from .config import Machine
@@ -146,8 +147,16 @@ def run_job(
     Raises RefusedError, BusError and RunError, naming file and line.
     """
     with at.controller.ending_at_stops():
+        if _switches_at_rest(made.job):
+            require_standstill_outputs(at.controller)
         bring_up(at, made.job.machine, made.kernel)
         return _run_sections(at, made, operator, progress, record, unhomed=unhomed)
+
+
+def _switches_at_rest(job: Job) -> bool:
+    """Whether outputs are switched, or kept on, at a rest of the job."""
+    commands = chain(job.after, *(section.before for section in job.sections))
+    return goes_off_at_end(job.machine) or any(isinstance(one, SwitchedAtRest) for one in commands)
 
 
 def _run_sections(

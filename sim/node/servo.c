@@ -147,6 +147,12 @@ static void begin_operation(struct servo *servo)
     }
 }
 
+/* False too at power-on: mode 0, no mode. */
+static bool follows_setpoints(const struct servo *servo)
+{
+    return servo->values->modes_of_operation_display == CIA402_MODE_CSP;
+}
+
 static bool homes(const struct servo *servo)
 {
     return servo->values->modes_of_operation_display == CIA402_MODE_HOMING;
@@ -301,6 +307,8 @@ static void move(struct servo *servo)
     const enum cia402_action action = cia402_device_action(&servo->device);
     if (action != CIA402_FOLLOW || homes(servo)) {
         move_by_itself(servo, action);
+    } else if (!follows_setpoints(servo)) {
+        move_by_itself(servo, CIA402_HOLD);
     } else if (!follow_setpoint(servo)) {
         move_by_itself(servo, cia402_device_action(&servo->device));
     }
@@ -353,7 +361,8 @@ static uint16_t homing_flags(const struct servo *servo)
 static uint16_t csp_flags(const struct servo *servo)
 {
     const bool follows = cia402_device_action(&servo->device) == CIA402_FOLLOW &&
-                         !servo->software_limit && !servo->limit_switch_hit;
+                         follows_setpoints(servo) && !servo->software_limit &&
+                         !servo->limit_switch_hit;
     const bool error = servo->values->error_code == EMCY_FOLLOWING_ERROR;
     return (uint16_t)((follows ? CIA402_STATUS_FOLLOWS : 0u) |
                       (error ? CIA402_STATUS_FOLLOWING_ERROR : 0u));

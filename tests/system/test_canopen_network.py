@@ -144,6 +144,7 @@ def enabled(drive: Listened) -> canopen.RemoteNode:
     """The drive operational and in Operation enabled, in CSP."""
     node = drive.node
     node.nmt.state = "OPERATIONAL"
+    node.sdo[0x6060].raw = 8
     for controlword in (6, 7, 15):
         node.sdo[0x6040].raw = controlword
     assert node.sdo[0x6041].raw & 0x6F == 0x27

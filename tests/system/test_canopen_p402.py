@@ -101,6 +101,8 @@ def set_up(hub: LocalHub, monkeypatch: pytest.MonkeyPatch, axis: str = "") -> It
         monkeypatch.setattr(p402, "time", SimpleNamespace(monotonic=network.clock.now_s))
         let_pass(network, 0.2)
         assert node.nmt.state == "PRE-OPERATIONAL"
+        assert node.sdo[0x6061].raw == 0  # no mode at power-on
+        node.sdo[0x6060].raw = 8
         node.setup_402_state_machine()
         for pdo in node.tpdo.values():
             pdo.receive_condition = Reception(network, pdo)

@@ -88,6 +88,7 @@ def test_what_python_canopen_reads(drive: canopen.RemoteNode) -> None:
 
 def test_a_tpdo_remapped_by_save(drive: canopen.RemoteNode, bus: LocalBus) -> None:
     """canopen's order: off, number 0, entries, number, on."""
+    drive.sdo[0x6060].raw = 8
     drive.tpdo.read()
     pdo = drive.tpdo[1]
     pdo.clear()

@@ -23,8 +23,10 @@ from hodograph.bus.clock import VirtualClock
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import FAULT_STATE, HELD, READY, RUNNING
 from hodograph.bus.sdo.objects import DISABLE, HOLD, RESUME, STOP
+from hodograph.cli import run_command
 from hodograph.cli.bus_session import await_enter
 from hodograph.cli.main import main
+from hodograph.job_run import BusCheck
 
 MILL = EXAMPLES / "machines" / "mill.toml"
 WAIT_S = 60.0
@@ -213,6 +215,80 @@ def test_a_fault_ends_the_job(
     assert main(["run", *words(job_file(tmp_path, THREE))]) == 6
     assert "0x5400" in capsys.readouterr().err
     assert bench.controller.state() == FAULT_STATE
+
+
+DWELLS = "F6000\nG1 X2\nG4 P20\nG1 X4\nM2\n"
+
+
+@pytest.fixture
+def resting(bench: Bench, clock: VirtualClock, tmp_path: Path) -> Iterator[Command]:
+    """A job in the dwell between its sections."""
+    with running(clock, "run", *words(job_file(tmp_path, DWELLS)), name="first") as command:
+        while bench.controller.targets(1)[0] != 2 * COUNTS_PER_MM:
+            assert command.child.poll() is None, command.err
+            clock.sleep(0.1)
+        clock.sleep(2.0)
+        yield command
+
+
+def test_a_job_that_rests_is_not_disturbed(
+    bench: Bench,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    resting: Command,
+) -> None:
+    """By commands that would move axes or switch drives off; it comes to its end."""
+    monkeypatch.chdir(tmp_path)
+    other = words(job_file(tmp_path, THREE, "other.ngc"))
+    text = f"another hodograph command runs a job (process {resting.child.pid})"
+    commands: tuple[tuple[str, ...], ...] = (
+        ("run", *other),
+        ("stream", *other, "--journal", "stream.json"),
+        ("goto", str(MILL), "--to", "1", "1"),
+        ("start",),
+        ("home",),
+        ("reset",),
+        ("configure", str(EXAMPLES / "machines" / "paper_alpha.toml")),
+    )
+    for command in commands:
+        assert main(command) == 5, command
+        assert text in capsys.readouterr().err.splitlines()[-1]
+    assert bench.controller.state() == READY
+    assert bench.controller.targets(2) == [2 * COUNTS_PER_MM, 0]
+    assert resting.wait() == 0, resting.err
+    assert bench.controller.targets(2) == [4 * COUNTS_PER_MM, 0]
+
+
+def test_a_job_at_a_program_stop_is_not_disturbed(
+    bench: Bench,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Not either by a command of the same process."""
+    other = words(job_file(tmp_path, THREE, "other.ngc"))
+    found: list[int] = []
+
+    def operator(text: str, check: BusCheck) -> None:
+        assert text.endswith("part.ngc:3: M0")
+        found.append(main(["run", *other]))
+        check()
+
+    monkeypatch.setattr(run_command, "await_enter", operator)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    assert main(["run", *words(job_file(tmp_path, "F6000\nG1 X2\nM0\nG1 X4\nM2\n"))]) == 0
+    assert found == [5]
+    assert "another hodograph command runs a job" in capsys.readouterr().err
+    assert bench.controller.targets(2) == [4 * COUNTS_PER_MM, 0]
+
+
+def test_a_job_whose_host_was_killed_is_over(
+    bench: Bench, tmp_path: Path, resting: Command
+) -> None:
+    resting.kill()
+    assert main(["run", *words(job_file(tmp_path, "F6000\nG1 X3\nM2\n"))]) == 0
+    assert bench.controller.targets(2) == [3 * COUNTS_PER_MM, 0]
 
 
 STOPS = "F6000\nG1 X2\nM0\nG1 X4\nM6 T2\nG1 X6\nM1\nM2\n"

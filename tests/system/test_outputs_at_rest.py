@@ -7,15 +7,28 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from canopen.sdo.exceptions import SdoAbortedError
 
 from bench import EXAMPLES, Bench, MakeBench
 from commands import Command, running
+from hodograph.bus.capture.decode import decode_outputs
+from hodograph.bus.capture.recorder import Recorder
 from hodograph.bus.clock import VirtualClock
 from hodograph.bus.run import RunSession, bring_up
 from hodograph.bus.sdo.controller import OFF, READY, RUNNING
-from hodograph.bus.sdo.objects import DISABLE, ENABLING, OUTPUTS, QUICK_STOP, STOP
+from hodograph.bus.sdo.node import IDENTITY_OBJECT, Node
+from hodograph.bus.sdo.objects import (
+    DISABLE,
+    ENABLING,
+    OUTPUTS,
+    QUICK_STOP,
+    STANDSTILL_OUTPUTS,
+    STOP,
+)
 from hodograph.cli.bus_commands import stopping
 from hodograph.cli.main import main
 from hodograph.config import load_machine
@@ -25,7 +38,7 @@ from hodograph.events import OutputValues
 from hodograph.job_run import BusCheck, execute_at_rest
 from hodograph.toolpath.moves import SwitchedAtRest
 
-SPINDLE, VALVE = 0b100, 0b001
+SPINDLE, NEEDLE, VALVE = 0b100, 0b010, 0b001
 """Digital outputs of dispenser.toml."""
 JOB = """F6000
 M3 S40
@@ -251,6 +264,81 @@ def test_the_end_of_a_file_is_executed_where_it_ends(
     assert bench.controller.targets(1) == [2_000_000]
 
 
+@pytest.fixture
+def old_firmware(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The controller is of minor version 1, which has no object 0x2058."""
+    plain = Node._variable
+
+    def variable(self: Node, index: int, sub: int | None) -> Any:
+        if index == STANDSTILL_OUTPUTS:
+            raise SdoAbortedError(0x06020000)
+        if (index, sub) == (IDENTITY_OBJECT, 3):
+            return SimpleNamespace(raw=0x00010001)
+        return plain(self, index, sub)
+
+    monkeypatch.setattr(Node, "_variable", variable)
+
+
+@pytest.mark.usefixtures("old_firmware")
+@pytest.mark.parametrize("off_at_end", [True, False])
+def test_older_firmware_is_named_before_anything_moves(
+    bench: Bench,
+    machine: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    off_at_end: bool,
+) -> None:
+    """With both versions, and what to do."""
+    other = tmp_path / "machine.toml"
+    other.write_text(machine.read_text().replace("off_at_end = true", ""))
+    own = machine if off_at_end else other
+    commands = [
+        ("run", job(tmp_path), "--machine", str(own)),
+        ("stream", *words(tmp_path, own, job(tmp_path))),
+        ("output", str(own), "valve=on"),
+    ]
+    for command in commands:
+        assert main(command) == 5
+        err = capsys.readouterr().err.splitlines()[-1]
+        assert "has firmware version 1.1, and outputs that are switched or kept on" in err
+        assert "need 1.2 or later: install the firmware of these host tools" in err
+        assert bench.controller.targets(1) == [0]
+
+
+ENDING = "F6000\nM64 P0\nG1 X6\nG4 P3\nM64 P1\nG4 P1\nM65 P0\nG4 P1\nM30\n"
+"""With a dwell after the last move, and outputs after the dwell."""
+
+
+@pytest.mark.parametrize(("files", "times"), [(1, 1), (2, 2)])
+def test_after_a_stop_in_the_last_dwell_the_rest_of_the_file_is_executed(
+    bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path, files: int, times: int
+) -> None:
+    """Also after a second stop in it; of the last file, and of one that another one follows."""
+    first, second = tmp_path / "first.ngc", tmp_path / "second.ngc"
+    first.write_text(ENDING)
+    second.write_text("F6000\nG1 X2\nM30\n")
+    given = words(tmp_path, machine, str(second))[files == 1 :]
+    arguments = (str(first), *given)
+    for _ in range(times):
+        with running(clock, "stream", *arguments, name="stream") as command:
+            while not bench.controller.read(OUTPUTS, 1):
+                assert command.child.poll() is None, command.err
+                clock.sleep(0.01)
+            clock.sleep(1.5)  # in the dwell
+            assert bench.controller.targets(1) == [6_000_000]
+            bench.controller.command(STOP)
+            assert command.wait() == 6, command.err
+        clock.sleep(0.1)
+        assert bench.controller.read(OUTPUTS, 1) == 0
+        arguments = ("--continue", *given[-2:])
+    with running(clock, "stream", *arguments, name="stream") as command:
+        seen = outputs_meanwhile(bench, clock, command)
+        assert command.wait() == 0, command.err
+    assert seen[:-1] == [(state, 6000) for state in (0, VALVE, VALVE | NEEDLE, NEEDLE)]
+    assert seen[-1][0] == 0  # at the end of the job, or with the move to the second file
+    assert bench.controller.targets(1) == [2_000_000 if files == 2 else 6_000_000]
+
+
 def test_switching_by_hand(
     bench: Bench,
     clock: VirtualClock,
@@ -280,6 +368,45 @@ def test_switching_by_hand(
             clock.sleep(0.05)
         assert main(["output", str(machine), "valve=on"]) == 5
     assert bench.controller.read(OUTPUTS, 1) == 0
+
+
+@pytest.fixture
+def two_bytes(machine: Path, tmp_path: Path) -> Path:
+    """The machine with a module of 16 digital outputs, the needle in the second byte."""
+    file = tmp_path / "two_bytes.toml"
+    file.write_text(
+        machine.read_text().replace("needle = { digital = 1 }", "needle = { digital = 9 }")
+    )
+    return file
+
+
+@pytest.mark.parametrize("minor", [2, 3])
+def test_outputs_of_one_command_switch_in_one_frame(
+    make_bench: MakeBench,
+    two_bytes: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    minor: int,
+) -> None:
+    """Firmware of minor version 2 takes them one by one, the analogue one first."""
+    bench = make_bench(file=two_bytes)
+    if minor == 2:
+        plain = Node._put
+
+        def put(self: Node, index: int, sub: int | None, value: int) -> None:
+            if (index, sub) == (STANDSTILL_OUTPUTS, 7):
+                raise SdoAbortedError(0x06090011)
+            plain(self, index, sub, value)
+
+        monkeypatch.setattr(Node, "_put", put)
+    outputs = load_outputs(two_bytes)
+    with Recorder(bench.bus) as recorder:
+        assert main(["output", str(two_bytes), "valve=on", "needle=on", "power=50"]) == 0
+        bench.clock.sleep(0.2)
+    rows = decode_outputs(recorder.frames(), outputs)
+    found = list(zip(rows["digital"].tolist(), rows["analogue"][:, 0].tolist(), strict=True))
+    states = [one for i, one in enumerate(found) if i == 0 or found[i - 1] != one]
+    last = (VALVE | 1 << 9, 16384)
+    assert states == ([(0, 0), last] if minor == 3 else [(0, 0), (0, 16384), (VALVE, 16384), last])
 
 
 @pytest.mark.parametrize(

@@ -79,6 +79,31 @@ def test_program_stops_wait_for_the_operator_or_a_resume(
     assert abs(x[-1]) < 1000
 
 
+def test_notes_come_before_the_motion(
+    hub: LocalHub,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The operator at a tool change has to know that the machine does not change the tool."""
+    known: list[str] = []
+
+    def operator(text: str, check: BusCheck) -> None:
+        del text
+        known.append(capsys.readouterr().err)
+        check()
+
+    monkeypatch.setattr(stream_command, "await_enter", operator)
+    part = tmp_path / "part.ngc"
+    part.write_text("F6000\nG1 X4\nM6 T2\nG1 Y3\nM2\n")
+    journal = str(tmp_path / "stream.json")
+    words = ("stream", str(part), "--machine", str(MILL), "--journal", journal)
+    assert main(words) == 0
+    note = f"{part}:3: tool change (M6): done by hand"
+    assert note in known[0]
+    assert note not in capsys.readouterr().err
+
+
 def test_run_streams_what_no_bank_can_hold(
     hub: LocalHub, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

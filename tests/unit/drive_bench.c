@@ -35,6 +35,8 @@ void drive_bench_begin_with(const struct drive_config *config)
     TEST_ASSERT_EQUAL_INT(0,
                           drive_node_init(&bench.node, DRIVE_BENCH_ID, config, bench.target, port));
     drive_node_process(&bench.node, 0);
+    bench.node.values.modes_of_operation = CIA402_MODE_CSP; /* as the controller configures it */
+    servo_take_mode(&bench.node.servo);
     drive_bench_nmt(NMT_START);
 }
 

@@ -504,6 +504,27 @@ static void test_outputs_at_standstill(void)
     run_to_the_end();
 }
 
+/* Sub 7 has all outputs: no frame has only some of them. */
+static void test_outputs_at_standstill_switch_together(void)
+{
+    const uint64_t all = (uint64_t)(LAMP | VALVE) | (uint64_t)(uint16_t)-321 << 32u;
+    make_ready();
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 7, all, 8));
+    for (unsigned i = 0; i < 3; ++i) {
+        app_bench_period(&bench);
+        TEST_ASSERT_TRUE(digital() == 0u || digital() == (LAMP | VALVE));
+        TEST_ASSERT_EQUAL_INT16(digital() == 0u ? 0 : -321, analogue(1));
+    }
+    TEST_ASSERT_EQUAL_HEX16(LAMP | VALVE, digital());
+    TEST_ASSERT_EQUAL_HEX64(all, app_bench_read(&bench, 0x2058, 7));
+    TEST_ASSERT_EQUAL_INT(LAMP, app_bench_read(&bench, 0x2058, 1));
+    TEST_ASSERT_EQUAL_INT(VALVE >> 8, app_bench_read(&bench, 0x2058, 2));
+    TEST_ASSERT_EQUAL_INT(-321, app_bench_read(&bench, 0x2058, 4));
+    TEST_ASSERT_EQUAL_HEX32(SDO_OK, app_bench_write(&bench, 0x2058, 7, 0, 8));
+    app_bench_periods(&bench, 3);
+    TEST_ASSERT_EQUAL_HEX16(0, digital());
+}
+
 static void test_outputs_at_standstill_end_with_a_stop(void)
 {
     static const unsigned stops[] = {COMMAND_STOP, COMMAND_QUICK_STOP, COMMAND_DISABLE};
@@ -530,6 +551,7 @@ static void test_outputs_at_standstill_end_with_a_stop(void)
 static void test_outputs_at_standstill_need_it(void)
 {
     TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, set_outputs(1, LAMP)); /* drives off */
+    TEST_ASSERT_EQUAL_HEX32(SDO_ABORT_STATE, app_bench_write(&bench, 0x2058, 7, LAMP, 8));
     make_ready();
     start();
     app_bench_periods(&bench, 100);
@@ -647,6 +669,7 @@ int main(void)
     RUN_TEST(test_stop_and_quick_stop);
     RUN_TEST(test_end_and_disable);
     RUN_TEST(test_outputs_at_standstill);
+    RUN_TEST(test_outputs_at_standstill_switch_together);
     RUN_TEST(test_outputs_at_standstill_end_with_a_stop);
     RUN_TEST(test_outputs_at_standstill_need_it);
     RUN_TEST(test_outputs_stay_at_the_end_once);

@@ -210,8 +210,8 @@ def connect(
     wait_s   how long to wait for the controller
     note     takes lines for the user; None: they are dropped
 
-    On an error the axes are stopped. Raises BusError, RefusedError if the axes already move, and InputError for a
-    machine whose frames do not fit its period.
+    On an error the axes are stopped. Raises BusError, RefusedError if the axes already move or another process runs a
+    job, and InputError for a machine whose frames do not fit its period.
 
     >>> from hodograph import load_plan, example_file
     >>> program = load_plan(example_file("star")).program()

@@ -82,6 +82,7 @@ def start(options: Namespace) -> None:
     address = bus_address(options.bus)
     to = target(options)
     with reached(address, to.node, to.bitrate, options.wait) as controller:
+        controller.require_no_other_job()
         if options.reset:
             actions.reset(controller)
         if (reason := refused_last(controller)) is not None:

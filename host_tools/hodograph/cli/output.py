@@ -186,10 +186,15 @@ def write_file(file: Path, data: bytes) -> None:
 
 
 def _replace(file: Path, data: bytes) -> None:
-    """Writes a file under another name, then renames it. Raises OSError, and leaves no file then."""
+    """Writes a file under another name, then renames it: after a loss of power the old or the new one is there. Raises
+    OSError, and leaves no file then.
+    """
     fresh = file.with_name(file.name + ".part")
     try:
-        fresh.write_bytes(data)
+        with fresh.open("wb") as out:
+            out.write(data)
+            out.flush()
+            os.fsync(out.fileno())
         fresh.replace(file)
     except OSError:
         fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
@@ -206,7 +211,9 @@ def require_new(*files: Path | None, force: bool) -> None:
 
 
 def write_files(files: Mapping[Path, str], *, force: bool) -> None:
-    """Writes texts by path. Raises InputError, before writing any: a file exists and may not be replaced."""
+    """Writes texts by path, one after the other. Raises InputError, before writing any: a file exists and may not be
+    replaced.
+    """
     require_new(*files, force=force)
     for file, text in files.items():
         write_file(file, text.encode())

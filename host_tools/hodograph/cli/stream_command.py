@@ -25,6 +25,7 @@ from ..bus.capture.recordings import check_suffix
 from ..bus.capture.setpoint_check import step_limits
 from ..bus.capture.setpoint_watch import jumps
 from ..bus.goto import SHORTEST_MOVE_MM
+from ..bus.outputs import require_standstill_outputs
 from ..bus.own_bus import opened_bus
 from ..bus.run import FULL_OVERRIDE, RunSession, bring_up
 from ..bus.sdo.controller import connect
@@ -34,6 +35,7 @@ from ..bustime import machine_bus_time, require_fit
 from ..config import SPACE_AXES, Machine, is_list_of_paths, load_machine, load_paths
 from ..errors import BusError, InputError, RefusedError, RunError
 from ..fixed_point import MM_PER_Q40, nearest_q40
+from ..job_run import goes_off_at_end
 from ..machine_limits import program_limits
 from ..names import PATH_SUFFIX, STANDARD_INPUT, is_toolpath
 from ..native.program import NativeLimits
@@ -270,6 +272,8 @@ def _run(
         recording = stack.enter_context(recorded(options.record, job.machine, address))
         at = stack.enter_context(session(job.machine, address, options))
         stack.enter_context(at.controller.ending_at_stops())
+        if goes_off_at_end(job.machine):
+            require_standstill_outputs(at.controller)
         override = _first_override(at, options, continued=continued)
         bring_up(at, job.machine, kernel, override)
         if isinstance(start, Nearest):
@@ -299,9 +303,8 @@ def _run(
             recording=recording,
             override=override,
         )
+        stack.callback(sender.pass_notes)
         done = sender.run()
-        for line in plan.notes:
-            note(line)
     _print(done, options)
 
 

@@ -33,7 +33,8 @@ def rewritten(
     output: Path,
     by: str,
 ) -> dict[Path, str]:
-    """The texts of the machine file `output` and of drive files in its folder, by path; nothing is written.
+    """The texts of the machine file `output` and of drive files in its folder, by path; nothing is written. The machine
+    file is the last one: written in this order, it never names a drive file that is not there yet.
 
     `drives` and `feedforward` are by axis, as in `machine.axes`; the other axes keep theirs. `by`: name of the command
     that makes the change, for a comment in the drive files.
@@ -59,7 +60,8 @@ def rewritten(
         head = f"# Changed by `hodograph {by}`; it was {source.name}.\n"
         texts[output.with_name(name)] = head + drive_text(source, axis.drive, drives[index])
         table["drive"] = name
-    return {output: tomlkit.dumps(document).rstrip("\n") + "\n", **texts}
+    texts[output] = tomlkit.dumps(document).rstrip("\n") + "\n"
+    return texts
 
 
 def drive_text(source: Path, given: Drive, wanted: Drive) -> str:

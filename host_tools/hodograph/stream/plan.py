@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..config import Machine, load_paths
 from ..errors import InputError, PlanError, RunError, SectionPlanError
-from ..events import Events, OutputValues, SwitchedOutputs, events_after
+from ..events import Events, OutputValues, SwitchedOutputs, events_after, no_events
 from ..fixed_point import MM_PER_Q40
 from ..job_outputs import acts_at_rest
 from ..names import STANDARD_INPUT, is_toolpath
@@ -181,6 +181,11 @@ class JobPlan:
         self._thread.join(_INPUT_WAIT_S if self.reads_input else None)
         if not self._thread.is_alive():
             self._store.forget_all()
+
+    @property
+    def last_file(self) -> Path:
+        """The file whose end is that of the job."""
+        return self._job.files[-1]
 
     @property
     def reads_input(self) -> bool:
@@ -367,6 +372,7 @@ class JobPlan:
         file_end  of the file before it
         """
         place: JobPlace | None = None
+        begins = number <= self._begin.section  # the job begins in this file, or in a later one
         first = number
         reader, switched = self._reader(file), SwitchedOutputs()
         for section in reader.sections():
@@ -375,8 +381,9 @@ class JobPlan:
             block = next(blocks, None) if number >= self._begin.section else None
             if block is not None:
                 before = () if begin_q40 else section.before
-                if number == self._begin.section and (begin_q40 or number > first):
+                if begins and (begin_q40 or number > first):
                     before = _switched_first(section, before, switched.at_rest, block.events)
+                begins = False
                 made = PlannedSection(
                     number,
                     file,
@@ -407,6 +414,8 @@ class JobPlan:
             file_end = None
             number += 1
         self.after = reader.after
+        if begins and number > self._begin.section and acts_at_rest(reader.after):
+            self.after = _switched_first(section, reader.after, switched.at_rest, no_events())
         return number
 
     def _chunks_of(
@@ -499,8 +508,9 @@ class _GreatestRate:
 def _switched_first(
     section: StreamSection, before: tuple[Command, ...], values: OutputValues, events: Events
 ) -> tuple[Command, ...]:
-    """Commands at rest where a job begins within a toolpath, at this section or inside it. The outputs of this place
-    have to be on before a wait; the program of the section switches them with its first setpoint only.
+    """Commands at rest where a job begins within a toolpath: at this section, inside it, or at its end if it is the
+    last one. The outputs of this place have to be on before a wait; the program of the section switches them with its
+    first setpoint only.
 
     values  of the outputs there
     events  of the path from there on

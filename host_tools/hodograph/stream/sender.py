@@ -161,6 +161,8 @@ class Sender:
     """
     _noted: int = -1
     """The section in the journal."""
+    _given_notes: int = 0
+    """Number of notes of the plan that were given to the user."""
     _unplanned: HodographError | None = None
     """The error that ended the planning. What was sent before it is still executed."""
 
@@ -195,8 +197,9 @@ class Sender:
         while item is not None:
             self._job(item[0], item[1])
             item = self._wait_item()
-        if self._ahead:
-            execute_at_rest(self.at, self._ahead[-1].file, self.plan.after, self.operator)
+        self.pass_notes()
+        if self._ahead or acts_at_rest(self.plan.after):
+            execute_at_rest(self.at, self.plan.last_file, self.plan.after, self.operator)
         else:
             self.at.note("nothing of the job is left")
         end_outputs(self.at, self.machine)
@@ -234,8 +237,17 @@ class Sender:
         stands_still = self.at.controller.clock.is_virtual and not self.plan.reads_input
         return self.plan.item(self._next, _VIRTUAL_PLAN_WAIT_S if stands_still else 0.0)
 
+    def pass_notes(self) -> None:
+        """Gives the user the notes of the plan that have come since the last call."""
+        while self._given_notes < len(self.plan.notes):
+            self.at.note(self.plan.notes[self._given_notes])
+            self._given_notes += 1
+
     def _check_bus(self) -> None:
-        """Raises RunError or BusError for an error on the bus since the last call; keeps recorded frames."""
+        """Raises RunError or BusError for an error on the bus since the last call; keeps recorded frames, and gives
+        notes.
+        """
+        self.pass_notes()
         if self.at.rig is not None:
             self.at.rig.check()
         now_s = self.at.controller.clock.now_s()
@@ -245,6 +257,7 @@ class Sender:
 
     def _job(self, section: PlannedSection, chunk: Chunk) -> None:
         """Sends sections that the controller runs as one job, beginning with this one."""
+        self.pass_notes()  # before a wait for the operator, and before the motion
         if section.file_end is not None:
             execute_at_rest(
                 self.at, section.file_end.file, section.file_end.commands, self.operator

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..config import Machine
 from ..config.axis_table import Axis, Feedforward
@@ -20,6 +21,12 @@ from .loop import loop_of, margins
 from .result import AxisResult, CaseResult, PathResult, Side, Tuning
 from .search import Wanted, best_poles
 
+_GAINS = ("k_pp_rad_s_mm", "k_pv_nm_s_rad", "k_iv_per_s")
+"""The gains that decide whether a loop is stable."""
+_HALVINGS, _REFINED = 40, 10
+"""Steps of the search for a stable gain."""
+_OF_STABLE = 0.97
+"""Share of the greatest stable gain found that is reported; the rounding to two digits stays below the gain."""
 DIGITS = 6
 """Significant digits of the gains; the rounded gains are evaluated and written."""
 
@@ -99,11 +106,39 @@ def _given(axis: Axis) -> Side:
     """The axis as in the files."""
     assert axis.drive is not None
     if not loop_of(axis.drive).stable:
-        raise PlanError(
-            f"axis {axis.name}: the loop is not stable with the gains of the drive file: lower them there, or set "
-            "k_pp, k_pv and k_iv to those of a stable loop, to begin with"
-        )
+        raise PlanError(_unstable_text(axis.name, axis.drive))
     return _side(axis.drive, axis.feedforward)
+
+
+def _unstable_text(axis: str, drive: Drive) -> str:
+    """The refusal of gains with which a loop is not stable: each value, and which of them alone can be lowered."""
+    gains = ", ".join(f"{name} = {getattr(drive, name):g}" for name in _GAINS)
+    stable = {name: _stable_below(drive, name) for name in _GAINS}
+    lower = " or ".join(f"{name} to {value:g}" for name, value in stable.items() if value)
+    remedy = f"lower {lower} there" if lower else "set all three to those of a stable loop there"
+    return f"axis {axis}: the loop is not stable with {gains} in its drive file: {remedy}"
+
+
+def _stable_below(drive: Drive, name: str) -> float:
+    """A value of one gain, below its own, with which the loop is stable; 0: none was found."""
+    low, high = getattr(drive, name), getattr(drive, name)
+    for _ in range(_HALVINGS):
+        low, high = 0.5 * low, low
+        if loop_of(_with_gain(drive, name, low)).stable:
+            break
+    else:
+        return 0.0
+    for _ in range(_REFINED):
+        middle = 0.5 * (low + high)
+        stable = loop_of(_with_gain(drive, name, middle)).stable
+        low, high = (middle, high) if stable else (low, middle)
+    shown = float(f"{_OF_STABLE * low:.2g}")
+    return shown if loop_of(_with_gain(drive, name, shown)).stable else low
+
+
+def _with_gain(drive: Drive, name: str, value: float) -> Drive:
+    changed: dict[str, Any] = {name: value}
+    return replace(drive, **changed)
 
 
 def _side(drive: Drive, forward: Feedforward) -> Side:

@@ -142,6 +142,42 @@ def test_what_is_not_the_program(frames: Frames, pipeline: Pipeline, motion: Mot
         replay(lost, "x", pipeline.image, pipeline.machine, "fixed")
 
 
+@pytest.mark.parametrize("file_has", ["nothing", "no setpoints", "all but one"])
+def test_missing_frames_are_no_jump(
+    frames: Frames,
+    pipeline: Pipeline,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    file_has: str,
+) -> None:
+    """Of a log, 30 ms are missing at full feed: all frames, the setpoints of a node, or one of them."""
+    tick = STANDING + 500
+    at = np.arange(frames.size)
+    within = (at >= 7 * tick) & (at < 7 * (tick + 30))
+    if file_has == "no setpoints":
+        within &= frames["id"] == 0x202
+    elif file_has == "all but one":
+        within = at == np.flatnonzero(within & (frames["id"] == 0x202))[0]
+    file = tmp_path / "alpha.log"
+    write_recording(file, frames[~within])
+    assert main(["replay", str(file), str(ALPHA)]) == 6
+    err = capsys.readouterr().err
+    assert "frames missing" in err
+    assert "jump" not in err
+    stamp = int(frames["time_us"][7 * (tick - (file_has == "nothing"))]) / 1e6
+    assert f"at {stamp:.6f} s" in err
+
+
+def test_a_jump_away_from_missing_frames_is_a_jump(motion: Motion, pipeline: Pipeline) -> None:
+    targets, actual, volts = run_of(motion)
+    targets = targets.copy()
+    targets[STANDING + 400 :, 0] += 100_000
+    frames = recorded(targets, actual, volts)
+    lost = np.delete(frames, np.arange(7 * 800, 7 * 830))
+    with pytest.raises(RunError, match=f"setpoint jump at SYNC {STANDING + 400} of the recording"):
+        replay(lost, "x", pipeline.image, pipeline.machine, "fixed")
+
+
 def test_where_the_program_is() -> None:
     setpoints = np.array([[0, 0], [0, 0], [1, 0], [1, 1], [3, 1]], dtype=np.int32)
     still = np.zeros((4, 2), dtype=np.int32)

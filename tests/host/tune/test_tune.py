@@ -8,12 +8,14 @@ from __future__ import annotations
 import json
 import shutil
 import tomllib
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hodograph.cli import output as cli_output
 from hodograph.cli.main import main
 from hodograph.config import Drive, Machine, load_machine
 from hodograph.config.rewrite import rewritten
@@ -147,13 +149,40 @@ def test_each_axis_has_its_own_voltage_limit(drives: tuple[Drive, Drive]) -> Non
     assert outcome(image, 1_000_000, weaker, None, NOMINAL).saturated
 
 
-def test_unstable_gains_of_a_drive_file_are_named(machine: Machine) -> None:
-    """The bandwidth is not the reason."""
+def _with_gains(machine: Machine, **factors: float) -> Machine:
+    """The machine with these gains of x multiplied."""
     x, y = machine.axes
     assert x.drive is not None
-    drive = replace(x.drive, k_pv_nm_s_rad=500 * x.drive.k_pv_nm_s_rad)
-    given = replace(machine, axes=(replace(x, drive=drive), y))
-    with pytest.raises(PlanError, match=r"axis x: .* the gains of the drive file"):
+    gains = {name: factor * getattr(x.drive, name) for name, factor in factors.items()}
+    return replace(machine, axes=(replace(x, drive=replace(x.drive, **gains)), y))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("k_pv_nm_s_rad", 500.0), ("k_iv_per_s", 10000.0), ("k_pp_rad_s_mm", 300.0)],
+)
+def test_unstable_gains_of_a_drive_file_are_named(
+    machine: Machine, name: str, factor: float
+) -> None:
+    """The bandwidth is not the reason. The value that the message recommends is stable."""
+    given = _with_gains(machine, **{name: factor})
+    with pytest.raises(PlanError) as raised:
+        tune(given, [], Asked(bandwidth_hz=60.0))
+    text = str(raised.value)
+    x, y = given.axes
+    assert x.drive is not None
+    assert text.startswith("axis x: the loop is not stable with ")
+    assert f"{name} = {getattr(x.drive, name):g}" in text
+    assert "\n" not in text
+    lower = float(text.partition(f"{name} to ")[2].split()[0])
+    assert 0.0 < lower < getattr(x.drive, name)
+    x = replace(x, drive=replace(x.drive, **{name: lower}))
+    assert tune(replace(given, axes=(x, y)), [], Asked(bandwidth_hz=60.0)).axes
+
+
+def test_gains_of_which_no_smaller_one_is_stable_are_all_named(machine: Machine) -> None:
+    given = _with_gains(machine, k_pp_rad_s_mm=0.0)
+    with pytest.raises(PlanError, match=r"axis x: .* k_pp_rad_s_mm = 0, .*: set all three"):
         tune(given, [], Asked(bandwidth_hz=60.0))
 
 
@@ -203,7 +232,7 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     arguments = ("tune", str(machines / "given.toml"), "--bandwidth", "60", "-o", str(output))
     status, out, err = run(capsys, *arguments, "--json")
     assert status == 0, err
-    written = [output, tmp_path / "tuned_x.toml", tmp_path / "tuned_y.toml"]
+    written = [tmp_path / "tuned_x.toml", tmp_path / "tuned_y.toml", output]
     result = json.loads(out)
     assert result["files"] == [str(file) for file in written]
     before, after = tomllib.loads(text + third), tomllib.loads(output.read_text())
@@ -219,7 +248,7 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     assert after == before
     for line in (line for line in text.splitlines() if "#" in line):
         assert line in output.read_text()
-    drive = tomllib.loads(written[1].read_text())
+    drive = tomllib.loads(written[0].read_text())
     given = tomllib.loads((tmp_path / "drives" / "alpha_x.toml").read_text())
     gains = drive.pop("pdff")
     assert gains.keys() == given.pop("pdff").keys()
@@ -231,9 +260,38 @@ def test_output_keeps_everything_else(capsys: pytest.CaptureFixture[str], tmp_pa
     status, _, err = run(capsys, *arguments)
     assert status == 2
     assert "there already: name another --output, or add --force" in err
-    written[2].write_text("other")
+    written[1].write_text("other")
     assert run(capsys, *arguments, "--force")[0] == 0
-    assert "other" not in written[2].read_text()
+    assert "other" not in written[1].read_text()
+
+
+class _CrashError(Exception):
+    """The process ends here."""
+
+
+@pytest.mark.parametrize("after", [0, 1, 2, 3])
+def test_a_crash_leaves_no_machine_file_without_its_drives(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
+) -> None:
+    """The command ends after so many files."""
+    written: list[Path] = []
+    plain = cli_output.write_file
+
+    def write_file(file: Path, data: bytes) -> None:
+        if len(written) == after:
+            raise _CrashError
+        written.append(file)
+        plain(file, data)
+
+    monkeypatch.setattr(cli_output, "write_file", write_file)
+    file = tmp_path / "tuned.toml"
+    arguments = ("--bandwidth", "60", "-o", str(file))
+    with suppress(_CrashError):
+        main(["tune", str(MACHINES / "paper_alpha.toml"), *arguments])
+    assert len(written) == after
+    assert file.exists() == (after == 3)
+    if file.exists():
+        assert len(load_machine(file).axes) == 2
 
 
 def test_names_that_differ_by_signs_have_files_of_their_own(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...config.outputs import Outputs
 from ...errors import RunError
 from ...events import ANALOGUES
-from .recorder import Frames
+from .frames import Frames, when
 
 SYNC_ID, RPDO1, RPDO2, TPDO1, TPDO2 = 0x080, 0x200, 0x300, 0x180, 0x280
 SDO_REQUEST = 0x600
@@ -69,7 +69,7 @@ def decode_ticks(frames: Frames, nodes: Sequence[int]) -> Ticks:
     sync_at = np.flatnonzero(identifiers == SYNC_ID)
     if sync_at.size < 3:
         raise RunError(f"{sync_at.size} SYNCs recorded: is the controller running?")
-    _check_counters(frames["data"][sync_at, 0].astype(np.int64))
+    _check_counters(frames, sync_at)
     targets = [_by_sync(frames, sync_at, RPDO1 + n, f"setpoints of node {n}") for n in nodes]
     answers = [_by_sync(frames, sync_at, TPDO1 + n, f"positions of node {n}") for n in nodes]
     streams = targets + answers
@@ -124,14 +124,15 @@ def decode_outputs(frames: Frames, outputs: Outputs) -> NDArray[np.void]:
     return found
 
 
-def _check_counters(counters: NDArray[np.int64]) -> None:
+def _check_counters(frames: Frames, sync_at: NDArray[np.intp]) -> None:
+    counters = frames["data"][sync_at, 0].astype(np.int64)
     steps = (np.diff(counters) - 1) % SYNC_OVERFLOW
     bad = np.flatnonzero(steps)
     if bad.size or counters.min() < 1 or counters.max() > SYNC_OVERFLOW:
         at = int(bad[0]) if bad.size else 0
         raise RunError(
-            f"SYNC counter jumps from {counters[at]} to {counters[at + 1]} at SYNC {at}: "
-            "frames were lost, or a second SYNC producer is on the bus"
+            f"SYNC counter jumps from {counters[at]} to {counters[at + 1]} at SYNC {at}: frames missing"
+            f"{when(frames, int(sync_at[at]))}, or a second SYNC producer is on the bus"
         )
 
 
@@ -152,12 +153,19 @@ def _by_sync(
         raise RunError(f"{what}: more than one frame for SYNC {int(interval[early[0]])}")
     late = np.flatnonzero(lag > _LONGEST_LAG)
     if late.size:
-        raise RunError(f"{what}: no frame for SYNC {int(late[0])}: the recording is incomplete")
+        raise _incomplete(frames, sync_at, int(late[0]), what)
     on_time = np.flatnonzero(lag == 0)  # after a lost frame no answer is in time
     sure = int(on_time[-1]) + 1 if on_time.size else 0
     if sure == 0 or sure < sync_at.size - _LEAD_IN:
-        raise RunError(f"{what}: no frame for SYNC {sure}: the recording is incomplete")
+        raise _incomplete(frames, sync_at, sure, what)
     return np.asarray(frames["data"][at[:sure]])
+
+
+def _incomplete(frames: Frames, sync_at: NDArray[np.intp], sync: int, what: str) -> RunError:
+    place = when(frames, int(sync_at[sync]))
+    return RunError(
+        f"{what}: no frame for SYNC {sync}: frames missing{place}: the recording is incomplete"
+    )
 
 
 def _integers(data: NDArray[np.uint8], offset: int, kind: str) -> NDArray[np.generic]:

@@ -18,3 +18,12 @@ RECORD_DTYPE = np.dtype([*FRAME_DTYPE.descr, ("time_us", "<i8")])
 
 Frames = NDArray[np.void]
 """An array of `RECORD_DTYPE`, in the order of the bus. Functions that need no times also take one of `FRAME_DTYPE`."""
+
+
+def when(frames: Frames, at: int) -> str:
+    """The time of a frame for messages, as the file of the recording has it: " at 12.345678 s"; empty: there are no
+    times.
+    """
+    if "time_us" not in (frames.dtype.names or ()):
+        return ""
+    return f" at {int(frames['time_us'][at]) / 1e6:.6f} s"

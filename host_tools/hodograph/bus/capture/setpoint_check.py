@@ -40,6 +40,7 @@ from numpy.typing import NDArray
 
 from ...errors import RunError
 from .decode import RPDO1, SYNC_ID, TPDO1
+from .gaps import gap_text
 from .recorder import Frames
 
 if TYPE_CHECKING:
@@ -178,15 +179,25 @@ def limits_at(
 
 
 class SetpointJumpError(RunError):
-    """A setpoint jumps."""
+    """A setpoint jumps, or frames are missing where it seems to."""
 
 
 def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> None:
-    """Raises SetpointJumpError with the first step that breaks a limit."""
+    """Raises SetpointJumpError with the first step that breaks a limit. If frames are missing beside every such step,
+    the error names the first gap: what was on the bus there is not known.
+    """
     jumps = find_jumps(frames, nodes, limits)
-    if jumps:
-        more = f" ({len(jumps) - 1} more)" if len(jumps) > 1 else ""
-        raise SetpointJumpError(f"{jumps[0]}{more}")
+    if not jumps:
+        return
+    gaps = [gap_text(frames, nodes, jump.sync) for jump in jumps]
+    real = [jump for jump, gap in zip(jumps, gaps, strict=True) if gap is None]
+    if not real:
+        raise SetpointJumpError(
+            f"frames missing in the recording: {gaps[0]}: what the setpoints did there is not known: record again; if "
+            "frames are missing again, look for errors on the bus (hodograph status)"
+        )
+    more = f" ({len(real) - 1} more)" if len(real) > 1 else ""
+    raise SetpointJumpError(f"{real[0]}{more}")
 
 
 def find_jumps(frames: Frames, nodes: Sequence[int], limits: StepLimits) -> list[Jump]:

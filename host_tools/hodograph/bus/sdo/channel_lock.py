@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The SDO channel lock: connections of one computer use the one SDO channel of a controller one after the other. Used
-by sdo/node. Opens and locks files, and waits by the clock of the bus, real or virtual.
+by sdo/node and, for its files, by sdo/job_lock. Opens and locks files, and waits by the clock of the bus, real or
+virtual.
 
 CANopen gives a server one default channel and assumes one client. `hodograph status` during `hodograph run` is a second
 client. A lock file per bus and node lets them alternate, transfer by transfer. A client learns whether another one had
@@ -44,11 +45,10 @@ class Turns:
         self._who = f"node {node} on {address}"
         self._depth = 0
         self._sign = os.urandom(_SIGN_BYTES)
-        name = re.sub(r"[^A-Za-z0-9]+", "-", f"hodograph-{address}-{node}")
         self._files: list[int] = []
         with suppress(OSError):
             for ending in ("next", "lock"):
-                self._files.append(_open(_folder(address) / f"{name}.{ending}"))
+                self._files.append(opened_lock(address, node, ending))
 
     def close(self) -> None:
         """Closes the lock files."""
@@ -114,6 +114,12 @@ def _folder(address: BusAddress) -> Path:
     if address.is_local:
         return Path(address.channel).resolve().parent
     return LOCK_FOLDER if os.access(LOCK_FOLDER, os.W_OK) else Path(tempfile.gettempdir())
+
+
+def opened_lock(address: BusAddress, node: int, ending: str) -> int:
+    """A descriptor of a lock file of one bus and node, made if it is not there. Raises OSError."""
+    name = re.sub(r"[^A-Za-z0-9]+", "-", f"hodograph-{address}-{node}")
+    return _open(_folder(address) / f"{name}.{ending}")
 
 
 def _open(file: Path) -> int:

@@ -12,16 +12,18 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import canopen
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from ...data import CONTROLLER_EDS, object_dictionary
 from ...errors import BusError, HodographError, InputError, RefusedError, RunError, one_line
 from ...fixed_point import MM_PER_Q40, nearest_q40
 from ..address import BusAddress
+from ..clock import REAL_CLOCK, Clock
 from ..diagnostics.boot_texts import BootTrouble, boot_trouble
 from ..diagnostics.texts import (
     PROGRAM_STATES,
@@ -33,6 +35,7 @@ from ..diagnostics.texts import (
 )
 from ..signals import interrupts_ignored
 from .configuration import configuration, configuration_crc32
+from .job_lock import JobLock
 from .network import open_network
 from .node import BROKEN, IDENTITY_OBJECT, NO_OBJECT, Node
 from .objects import (
@@ -105,8 +108,10 @@ __all__ = [
     "STATISTICS",
     "CommandRefusedError",
     "Controller",
+    "OutdatedError",
     "connect",
     "lacks_object",
+    "needs_standstill_outputs",
 ]
 
 POLL_S = 0.02
@@ -121,6 +126,17 @@ class Controller(Node):
     """Whether a command of this connection may have set axes in motion, or switched outputs at standstill."""
     _stops: int | None = None
     """Stop commands at the beginning of a job; None: no job, or the controller does not count them."""
+
+    def __init__(
+        self, address: BusAddress, node_id: int, node: canopen.RemoteNode, clock: Clock = REAL_CLOCK
+    ) -> None:
+        super().__init__(address, node_id, node, clock)
+        self._job = JobLock(address, node_id)
+
+    def close(self) -> None:
+        """Closes the locks."""
+        self._job.close()
+        super().close()
 
     # -- configuration ------------------------------------------------------------------------
 
@@ -141,6 +157,7 @@ class Controller(Node):
         return bool(different)
 
     def _write_configuration(self, different: list[tuple[Object, int]]) -> None:
+        self.require_no_other_job()
         state = self.state()
         if state in (*BUSY, ENABLING):
             raise RefusedError(
@@ -329,12 +346,18 @@ class Controller(Node):
         return RunError(f"{self.who()} is in fault: {self.fault_advice()}")
 
     def require_standing(self) -> None:
-        """Raises RefusedError: axes move by another command, which is not interrupted."""
+        """Raises RefusedError: axes move by another command, or its job rests. It is not interrupted."""
         state = self.state()
         if state in BUSY:
             raise RefusedError(
                 f"{self.who()} is {STATES.get(state, state)}: wait until the axes stand, or hodograph stop"
             )
+        self.require_no_other_job()
+
+    def require_no_other_job(self) -> None:
+        """Raises RefusedError: another command of this computer runs a job, which may rest now."""
+        with self.turn():
+            self._job.require_free()
 
     def state_after_boot(self) -> int:
         """The state. Waits while it is boot: until the drives are configured. Raises as `wait_for`."""
@@ -396,7 +419,8 @@ class Controller(Node):
         if self._stops is not None:
             self.write(STOP_COMMANDS, 2, self._stops)
         if outputs_stay:
-            self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 1)
+            with needs_standstill_outputs(self):
+                self.write(STANDSTILL_OUTPUTS, _STAY_AT_END, 1)
 
     def _start(self, command: int, image: bytes | None, job: int | None) -> None:
         """One attempt. The start names its program or job, since a client on another computer may replace it at any
@@ -433,17 +457,27 @@ class Controller(Node):
     @contextmanager
     def ending_at_stops(self) -> Iterator[None]:
         """For the length of a job: a stop command of any client also ends it where the axes stand, for example in a
-        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on.
+        dwell. Then no start succeeds, and `require_no_stop` raises. Begins before the drives are switched on. Other
+        commands of this computer that would move the axes meanwhile are refused. Raises RefusedError: another one runs
+        a job.
         """
+        with ExitStack() as stack:
+            with self.turn():
+                stack.enter_context(self._job.held())
+            self._stops = self._stop_commands()
+            try:
+                yield
+            finally:
+                self._stops = None
+
+    def _stop_commands(self) -> int | None:
+        """The number of stop commands so far; None: the controller does not count them."""
         try:
-            self._stops = self.read(STOP_COMMANDS, 1)
+            return self.read(STOP_COMMANDS, 1)
         except RefusedError as error:
             if not lacks_object(error):
                 raise
-        try:
-            yield
-        finally:
-            self._stops = None
+            return None
 
     def _expect_no_stop(self) -> None:
         """After a command of this connection that the controller counts as a stop: it does not end the job."""
@@ -551,6 +585,8 @@ _NAMED_PROGRAM, _NAMED_JOB = {START: 1, START_FROM: 2}, 3
 """Subindices of NAMED_START."""
 _STAY_AT_END = 6
 """Subindex of STANDSTILL_OUTPUTS."""
+_OUTPUTS_SINCE = "1.2"
+"""First firmware version (0x1018 sub 3) with STANDSTILL_OUTPUTS."""
 _PREFIX = 16
 """Bytes of a program image that its CRC-32 does not cover."""
 _LONGEST = ("time_us", "distance_um", "piece", "place_um")
@@ -563,6 +599,26 @@ class CommandRefusedError(RefusedError):
     def __init__(self, message: str, reason: int) -> None:
         super().__init__(message)
         self.reason = reason
+
+
+class OutdatedError(RefusedError):
+    """The firmware is older than something needs."""
+
+
+@contextmanager
+def needs_standstill_outputs(node: Node) -> Iterator[None]:
+    """Uses STANDSTILL_OUTPUTS inside the context. Raises OutdatedError: the firmware does not have this object."""
+    try:
+        yield
+    except RefusedError as error:
+        if not lacks_object(error):
+            raise
+        revision = node.read(IDENTITY_OBJECT, 3)
+        raise OutdatedError(
+            f"{node.who()} has firmware version {revision >> 16}.{revision & 0xFFFF}, and outputs that are switched or "
+            f"kept on at standstill need {_OUTPUTS_SINCE} or later: install the firmware of these host tools on the "
+            "controller (docs/guides/flash-and-run.md)"
+        ) from error
 
 
 def lacks_object(error: RefusedError) -> bool:
