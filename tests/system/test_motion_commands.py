@@ -149,6 +149,7 @@ def test_host_and_controller_have_one_tolerance(make_bench: MakeBench, side: int
         if allowed:
             require_inside_travel(controller, moved)
             controller.command(ENABLE)
+            controller.wait_for((READY,), 5.0)
             controller.command(DISABLE)
             controller.wait_for((OFF,), 5.0)
             continue

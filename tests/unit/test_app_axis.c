@@ -6,6 +6,8 @@
 
 #define TOLERANCE 100u
 
+static const struct axis_travel travel = {-20000, 20000};
+
 static struct axis axis;
 
 void setUp(void)
@@ -27,7 +29,7 @@ static void answer(enum cia402_state state, int32_t position_counts, uint32_t no
 static struct pdo_setpoint sent(void)
 {
     struct pdo_setpoint setpoint;
-    axis_setpoint(&axis, TOLERANCE);
+    axis_setpoint(&axis, TOLERANCE, &travel);
     axis_sent(&axis);
     TEST_ASSERT_EQUAL_INT(5, pdo_decode_setpoint(&axis.setpoint, &setpoint));
     return setpoint;
@@ -50,6 +52,18 @@ static void test_target_follows_until_the_drive_is_seen_enabled(void)
     TEST_ASSERT_EQUAL_INT32(1020, sent().target_counts);
 }
 
+static void test_the_target_of_a_drive_that_comes_on_is_inside_the_travel(void)
+{
+    answer(CIA402_SWITCH_ON_DISABLED, 20003, 0);
+    TEST_ASSERT_EQUAL_INT32_MESSAGE(20003, sent().target_counts, "off");
+    axis.goal = CIA402_GOAL_ENABLED;
+    TEST_ASSERT_EQUAL_INT32(20000, sent().target_counts);
+    answer(CIA402_SWITCHED_ON, -20001, 0);
+    TEST_ASSERT_EQUAL_INT32(-20000, sent().target_counts);
+    axis.moves_by_drive = true;
+    TEST_ASSERT_EQUAL_INT32_MESSAGE(-20001, sent().target_counts, "homing");
+}
+
 /* A frame that did not leave moved nothing: the quick stop's target is the one before. */
 static void test_a_quick_stop_takes_the_target_that_was_sent(void)
 {
@@ -58,7 +72,7 @@ static void test_a_quick_stop_takes_the_target_that_was_sent(void)
     axis.target_counts = 60;
     (void)sent();
     axis.target_counts = 70;
-    axis_setpoint(&axis, TOLERANCE);
+    axis_setpoint(&axis, TOLERANCE, &travel);
     axis_command(&axis, CIA402_GOAL_QUICK_STOP);
     TEST_ASSERT_EQUAL_INT32(60, sent().target_counts);
 }
@@ -260,6 +274,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_target_follows_until_the_drive_is_seen_enabled);
+    RUN_TEST(test_the_target_of_a_drive_that_comes_on_is_inside_the_travel);
     RUN_TEST(test_a_quick_stop_takes_the_target_that_was_sent);
     RUN_TEST(test_a_statusword_that_lies_once_does_not_move_the_target);
     RUN_TEST(test_a_quick_stop_leaves_the_target_until_the_drive_is_off);

@@ -108,6 +108,7 @@ void setUp(void)
     counter = 0;
     TEST_ASSERT_EQUAL_INT(0, drive_node_init(&node, ID, &drive_bench_config, 1000000, port));
     drive_node_process(&node, 0);
+    TEST_ASSERT_EQUAL_HEX32(0, refusal(0x6060, 0, CIA402_MODE_CSP, 1));
     nmt(NMT_START);
 }
 
@@ -395,26 +396,6 @@ static void test_bad_figures_are_refused(void)
     TEST_ASSERT_EQUAL_INT(DRIVE_ERR_PLANT, drive_node_init(&node, ID, &bad, 0, port));
 }
 
-/* Mode 0: enabled, it holds its position and says that it does not follow, until it is given a mode. */
-static void test_no_mode_at_power_on(void)
-{
-    drive_bench_nmt(NMT_RESET_NODE);
-    drive_bench_nmt(NMT_START);
-    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x6060, 0));
-    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x6061, 0));
-    drive_bench_enable();
-    const int32_t place = drive_bench_position();
-    bench.target += 1000;
-    drive_bench_run(20);
-    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_FOLLOWS);
-    TEST_ASSERT_INT_WITHIN(10, place, drive_bench_position());
-    TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6060, 0, CIA402_MODE_CSP));
-    drive_bench_run(500);
-    TEST_ASSERT_EQUAL_HEX16(CIA402_STATUS_FOLLOWS,
-                            drive_bench_statusword() & CIA402_STATUS_FOLLOWS);
-    TEST_ASSERT_INT_WITHIN(10, place + 1000, drive_bench_position());
-}
-
 int main(void)
 {
     UNITY_BEGIN();
@@ -435,6 +416,5 @@ int main(void)
     RUN_TEST(test_controlword_by_sdo_after_pdo);
     RUN_TEST(test_reset_node_is_power_on);
     RUN_TEST(test_bad_figures_are_refused);
-    RUN_TEST(test_no_mode_at_power_on);
     return UNITY_END();
 }

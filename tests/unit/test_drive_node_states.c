@@ -478,6 +478,26 @@ static void test_csp_without_sync(void)
     TEST_ASSERT_EQUAL_HEX16(0, drive_bench_read(0x603F, 0));
 }
 
+/* Mode 0: enabled, it holds its position and says that it does not follow, until it is given a mode. */
+static void test_no_mode_at_power_on(void)
+{
+    drive_bench_nmt(NMT_RESET_NODE);
+    drive_bench_nmt(NMT_START);
+    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x6060, 0));
+    TEST_ASSERT_EQUAL_INT64(0, drive_bench_read(0x6061, 0));
+    drive_bench_enable();
+    const int32_t place = drive_bench_position();
+    bench.target += 1000;
+    drive_bench_run(20);
+    TEST_ASSERT_EQUAL_HEX16(0, drive_bench_statusword() & CIA402_STATUS_FOLLOWS);
+    TEST_ASSERT_INT_WITHIN(10, place, drive_bench_position());
+    TEST_ASSERT_EQUAL_HEX32(0, drive_bench_write(0x6060, 0, CIA402_MODE_CSP));
+    drive_bench_run(500);
+    TEST_ASSERT_EQUAL_HEX16(CIA402_STATUS_FOLLOWS,
+                            drive_bench_statusword() & CIA402_STATUS_FOLLOWS);
+    TEST_ASSERT_INT_WITHIN(10, place + 1000, drive_bench_position());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -499,5 +519,6 @@ int main(void)
     RUN_TEST(test_error_behaviour);
     RUN_TEST(test_the_masters_heartbeat_is_not_missed_early);
     RUN_TEST(test_csp_without_sync);
+    RUN_TEST(test_no_mode_at_power_on);
     return UNITY_END();
 }

@@ -131,12 +131,23 @@ static void note_enabled(struct axis *axis)
     }
 }
 
-static void follow_position(struct axis *axis)
+static int32_t within(const struct axis_travel *travel, int32_t counts)
+{
+    const int32_t above = counts < travel->min_counts ? travel->min_counts : counts;
+    return above > travel->max_counts ? travel->max_counts : above;
+}
+
+/* A drive that is switched on and gets a target beyond its software limit (0x607D) reports that it does not follow. */
+static void follow_position(struct axis *axis, const struct axis_travel *travel)
 {
     if (axis->goal == CIA402_GOAL_QUICK_STOP) {
         axis->target_counts = axis->target_sent_counts;
-    } else if (axis->moves_by_drive || !axis->was_enabled) {
+    } else if (axis->moves_by_drive) {
         axis->target_counts = axis->position_counts;
+    } else if (!axis->was_enabled) {
+        axis->target_counts = axis->goal == CIA402_GOAL_ENABLED
+                                  ? within(travel, axis->position_counts)
+                                  : axis->position_counts;
     }
 }
 
@@ -152,11 +163,11 @@ static void set_controlword(struct axis *axis)
     }
 }
 
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts)
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, const struct axis_travel *travel)
 {
     set_controlword(axis);
     note_enabled(axis);
-    follow_position(axis);
+    follow_position(axis, travel);
     pdo_put_target(&axis->setpoint, axis->target_counts);
     count_standstill(axis, tolerance_counts);
     count_unmoved(axis, tolerance_counts);

@@ -67,6 +67,11 @@ struct axis {
     uint32_t standstill_syncs;
 };
 
+/* Range of the targets of an axis. */
+struct axis_travel {
+    int32_t min_counts, max_counts;
+};
+
 void axis_init(struct axis *axis, uint8_t node);
 
 /* Forgets the drive, which has to be found and configured again. Whether it is homed stays, when the node is the same:
@@ -87,9 +92,10 @@ void axis_receive(struct axis *axis, const struct pdo_actual *actual, uint32_t n
 void axis_restarted(struct axis *axis);
 
 /* Makes the setpoint frame of this tick, `setpoint`. Until the drive has been in Operation enabled its target follows
- * its position, so that switching on moves nothing. From then on the target changes by commands only, also in a quick
+ * its position, so that switching on moves nothing; it stays inside the travel, in which machine_enable lets the axis
+ * stand but for the start tolerance. From then on the target changes by commands only, also in a quick
  * stop. When the drive is off, the target follows the position again. Timer. */
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts);
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, const struct axis_travel *travel);
 
 /* The port has taken that frame. Timer. */
 static inline void axis_sent(struct axis *axis)
