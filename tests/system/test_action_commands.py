@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -202,3 +203,19 @@ def test_follow_says_why_nothing_moves(
         assert child.wait(LIMIT_S) == 0
         assert child.out == "done\n"
         assert child.err.count("\n") == 2, child.err
+
+
+def test_follow_reports_a_stop_before_the_end(
+    make_bench: MakeBench, alpha_at: MakeAlpha, clock: VirtualClock
+) -> None:
+    controller = make_bench().controller
+    assert main(["goto", str(alpha_at(20))]) == 0
+    with running(clock, "start", "--follow") as child:
+        assert controller.wait_for((RUNNING,), LIMIT_S) == RUNNING
+        clock.sleep(1.0)
+        assert main(["stop"]) == 0
+        assert child.wait(LIMIT_S) == 6
+        assert child.out == ""
+        assert re.search(
+            r"the program was stopped at \d+\.\d+ of 99\.942 mm, before its end", child.err
+        )

@@ -19,12 +19,14 @@ from hodograph.bus.capture.recordings import read_recording
 from hodograph.bus.capture.setpoint_check import find_jumps, step_limits
 from hodograph.bus.hub import LocalHub
 from hodograph.bus.sdo.controller import connect
-from hodograph.bus.sdo.objects import HELD, RESUME
-from hodograph.bus.sdo.stream_channel import PROGRAM_STOP, stream_status
+from hodograph.bus.sdo.node import Node
+from hodograph.bus.sdo.objects import HELD, QUICK_STOP, RESUME, RUNNING, STATE, STOP
+from hodograph.bus.sdo.stream_channel import PROGRAM_STOP, STOPPED, stream_status
 from hodograph.cli import stream_command
 from hodograph.cli.main import main
 from hodograph.config import load_machine
 from hodograph.job_run import BusCheck
+from hodograph.stream import sender
 
 MILL = EXAMPLES / "machines" / "mill.toml"
 ENABLE_OPERATION = 0x0F
@@ -102,6 +104,46 @@ def test_notes_come_before_the_motion(
     note = f"{part}:3: tool change (M6): done by hand"
     assert note in known[0]
     assert note not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", [STOP, QUICK_STOP])
+def test_a_stop_just_before_a_chunk_ends_the_job(
+    hub: LocalHub,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: int,
+) -> None:
+    """The controller refuses the chunk. The user has to hear of the stop, not of the chunk."""
+    sent, waited = sender.send_chunk, []
+
+    def stopped(node: Node, data: bytes, job: int, sequence: int, place: str) -> bool:
+        if not waited and node.read(STATE, None) == RUNNING:
+            with connect(hub.address, 1, 1_000_000) as other:
+                other.command(command)
+                for _ in range(100):
+                    waited.append(stream_status(node).state)
+                    if waited[-1] == STOPPED:
+                        break
+                    node.clock.sleep(0.05)
+        return sent(node, data, job, sequence, place)
+
+    monkeypatch.setattr(sender, "send_chunk", stopped)
+    part = tmp_path / "part.ngc"
+    part.write_text("F120\n" + "".join(f"G1 X{10 * k} Y{k % 2}\n" for k in range(1, 6)) + "M2\n")
+    words = (
+        "stream",
+        str(part),
+        "--machine",
+        str(MILL),
+        "--journal",
+        str(tmp_path / "stream.json"),
+    )
+    assert main(words) == 6
+    assert waited[-1] == STOPPED
+    err = capsys.readouterr().err
+    assert "stopped before its end: the job ends here; hodograph stream --continue goes on" in err
+    assert "refused" not in err
 
 
 def test_run_streams_what_no_bank_can_hold(

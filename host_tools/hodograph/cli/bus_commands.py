@@ -92,6 +92,7 @@ def start(options: Namespace) -> None:
             controller.start(from_mm=options.from_mm, unhomed=options.unhomed)
             if options.follow:
                 controller.wait_for_end(tick=Follower(controller, note))
+                controller.require_program_end()
     print("done" if options.follow else "running")
 
 

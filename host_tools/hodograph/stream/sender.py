@@ -439,10 +439,8 @@ class Sender:
             if not send_chunk(self.at.controller, data, header.job, header.sequence, place):
                 return None
         except RefusedError:
-            kept = status is None or stream_status(self.at.controller).job == header.job
-            if kept and self.at.controller.state() not in (BOOT, OFF):
-                raise
-            raise self._lost() from None
+            self._require_job(header.job, first=status is None)
+            raise
         self._sending_s += self.at.controller.clock.now_s() - begun_s
         self._job_number = header.job
         self._next += 1
@@ -451,6 +449,16 @@ class Sender:
         if header.rest is not None:
             self._ahead.append(section)
         return header.last
+
+    def _require_job(self, job: int, *, first: bool) -> None:
+        """Raises RunError if a chunk was refused because this job is over in the controller. `first`: the chunk would
+        have opened the job.
+        """
+        status = stream_status(self.at.controller)
+        if status.job == job and status.state == STOPPED:  # since the last look
+            self._over(status, all_sent=False)
+        if (status.job != job and not first) or self.at.controller.state() in (BOOT, OFF):
+            raise self._lost() from None
 
     def _lost(self) -> RunError:
         return RunError(

@@ -54,7 +54,7 @@ STORED = {
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
     2: "the axes are away from the program's start: hodograph goto FILE; for `start --from MM` first hodograph goto "
-    "--to the point of `hodograph spline FILE --at MM`, then hodograph upload FILE",
+    "--to the point of `hodograph spline FILE --at MM` plus [work] offset_mm, then hodograph upload FILE",
     3: "the axes are moving: wait, or hodograph stop",
     4: "the drives are off: hodograph start switches them on",
     5: "a fault is present: see hodograph status",

@@ -59,6 +59,7 @@ from .objects import (
     HOME,
     HOMING,
     LOAD,
+    MOTION,
     MOVING,
     NAMED_START,
     NODE_NUMBER,
@@ -84,6 +85,7 @@ from .objects import (
     STOP,
     STOP_COMMANDS,
     STORE,
+    STREAM,
     TARGET,
     UNHOMED_START,
     Object,
@@ -310,6 +312,18 @@ class Controller(Node):
                 "restart of the controller: hodograph status, then hodograph goto"
             )
 
+    def require_program_end(self) -> None:
+        """Raises RunError: the motion is over, but the axes stand before the end of the program in the controller. Says
+        nothing of a streamed job.
+        """
+        if self._read_if_there(STREAM, 2) or self.read(PROGRAM, _STATE) != _READY:
+            return
+        place_mm, end_mm = (self.read(*at) * MM_PER_Q40 for at in ((MOTION, 1), (PROGRAM, _LENGTH)))
+        if place_mm < end_mm - ROUNDING_MM:
+            raise RunError(
+                f"{self.who()}: the program was stopped at {place_mm:.3f} of {end_mm:.3f} mm, before its end"
+            )
+
     def _waiting_for(self, state: int) -> str:
         if state == BOOT and (trouble := self.boot_trouble()) is not None:
             return f"{trouble.text}: {trouble.remedy}"
@@ -472,8 +486,12 @@ class Controller(Node):
 
     def _stop_commands(self) -> int | None:
         """The number of stop commands so far; None: the controller does not count them."""
+        return self._read_if_there(STOP_COMMANDS, 1)
+
+    def _read_if_there(self, index: int, sub: int) -> int | None:
+        """The value of an object; None: a controller of an older minor version does not have it."""
         try:
-            return self.read(STOP_COMMANDS, 1)
+            return self.read(index, sub)
         except RefusedError as error:
             if not lacks_object(error):
                 raise
