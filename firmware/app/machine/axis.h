@@ -69,7 +69,8 @@ struct axis {
 
 /* Range of the targets of an axis. */
 struct axis_travel {
-    int32_t min_counts, max_counts;
+    int32_t min_counts;
+    int32_t max_counts;
 };
 
 void axis_init(struct axis *axis, uint8_t node);
