@@ -11,8 +11,8 @@
  * a path stop may not begin, the nominal motion continues for another tick. If the program would end before a path stop
  * would, it ends without one. So at an override of 100 % a stop takes at most the bound of the piece in which it was
  * requested. docs/reference/protocol.md 1.4 has the exceptions: a lower override, a rising override, the end of the
- * program. A hold or stop that is requested while the override rises first ends the rise. If the program is in another
- * piece by then, the bound of that piece counts from that instant.
+ * program. A hold or stop that is requested while the override rises first ends the rise. If the motion enters another
+ * piece before that, the bound of that piece counts from the tick in which the motion enters it.
  *
  * At standstill of a hold the program time of the place is searched, one step in each tick, to 2^-42 s. A resume
  * continues from there.

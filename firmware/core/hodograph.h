@@ -2,7 +2,7 @@
 /*
  * hodograph: the core, from a program image to one setpoint in each period. This header is its manual, and includes
  * what an application needs. Each function is described in the header that declares it. Included by applications that
- * take the core as a library.
+ * take the core as a library (docs/guides/embed.md: files, compilers, memory). Licence: MIT.
  *
  * ## What to call, in this order
  *
@@ -18,7 +18,7 @@
  *   tick        feed_override_next           the next setpoint, as a point in mm
  *               counts_from_q40_mm           the same in counts, for the bus
  *               feedforward_next             velocity and torque offsets, where drives take them
- *   of a job in chunks, in place of all calls of the main loop above but kernel_find (core/chunk.h):
+ *   A job in chunks (core/chunk.h): kernel_find and the calls of the tick as above. These calls replace the others:
  *   main loop   coefficient_cache_init       memory for the coefficient records near the motion
  *               chunk_open                   reads a chunk and the program in it
  *               chunk_check                  checks this program, and that the chunk continues its predecessor
@@ -27,19 +27,20 @@
  *               coefficient_cache_begin      records from its start on
  *               interpolator_begin_window    the cursor on the curve
  *               feed_override_begin_job      the motion, at rest
- *               again and again; those with * need the tick held off:
+ *               again and again; * marks calls with the tick held off (see Context):
  *               feed_override_place *        where the motion needs records
  *               coefficient_cache_prepare    makes them; NULL: they are there already
  *               feed_override_use *          1: the motion uses them
  *               coefficient_cache_used       after this 1
  *               with the next chunk:
- *               feed_override_may_take_over *    now? Where does the motion need records of it?
+ *               feed_override_may_take_over *    1: it can be taken over now; gives where it needs records
  *               coefficient_cache_prepare    makes them
  *               feed_override_take_over *    1: the next chunk is the program under way
  *               coefficient_cache_used       after this 1
- *   any time    feed_override_hold, _resume, _set, _stop, _fault_stop         commands; they need the tick held off
+ *   any time: in the tick, or in the main loop with the tick held off
+ *               feed_override_hold, _resume, _set, _stop, _fault_stop         commands
  *               feed_override_state, _late, _waits, _feed_q32, _time_q42, _bound_us, _saturated, _actual_q30
- *                                            state at the last setpoint; they need the tick held off, too
+ *                                            state at the last setpoint
  *   main loop, as needed, with an interpolator that no motion uses:
  *               interpolator_seek, interpolator_at, interpolator_at_q42, interpolator_at_arc_length   points of the path
  *               interpolator_ends            its first and last point
@@ -47,10 +48,12 @@
  *
  * ## Context
  *
- * The main loop calls what reads the whole program. A tick is one run of the timer interrupt; it calls only what its
- * headers mark "tick context", which takes bounded time. One owner calls everything of one motion; nothing here locks.
- * Structs are the caller's, and no function allocates or has state of its own. The image, the records and the structs
- * must stay where they are while a motion uses them; the image and the records must not change.
+ * The main loop calls what reads the whole program. A tick is one run of the timer interrupt. It calls only the
+ * functions listed for it above, which take bounded time, and those listed for any time. Nothing here locks: no two
+ * calls for the same motion may overlap. So the main loop holds the tick off (masks the timer interrupt) during each
+ * call that changes or reads a motion under way. Structs are the caller's, and no function allocates or has state of
+ * its own. The image, the records and the structs must stay where they are while a motion uses them; the image and the
+ * records must not change.
  *
  * ## Path axes
  *
@@ -58,14 +61,15 @@
  * 1). program.header.axis_count is their number; positions, limits and offsets are arrays of PROGRAM_AXES elements, of
  * which the first axis_count are used. A controller with a fixed number of axes sets program_limits.axis_count.
  * program_check then refuses programs with another number, and programs whose first axis is not the machine's first
- * axis (core/first_axis.h). With an axis_count of 0 it takes both: the caller then has to evaluate first_axis().
+ * axis (core/first_axis.h). If program_limits.axis_count is 0, it accepts such programs. The caller then has to
+ * evaluate first_axis().
  *
  * ## Limits
  *
  * program_check compares a program with struct program_limits (core/program_rules.h). 0 means no limit for feed,
  * acceleration and jerk along the path, for velocity, acceleration and jerk of each axis, for axis count, period and
- * stop time. Travel is always checked: min_q40_mm and max_q40_mm need values for each path axis; for no limit, -4096
- * and 4096 mm times 2^40.
+ * stop time. Travel is always checked: min_q40_mm and max_q40_mm need values for each path axis. Travel from -4096 to
+ * 4096 mm (times 2^40) allows all that the format allows.
  *
  * ## Cost
  *
@@ -78,13 +82,16 @@
  *
  * ## Errors
  *
- * Functions return 0 or a negative code. A tick with an error leaves its result as it was. program_open and
- * program_check: enum program_error (core/program_rules.h), program_error_text. coefficients_make_in:
- * COEFFICIENTS_ERR_SIZE. interpolator_begin and feed_override_next: INTERPOLATOR_ERR_... With a program that passed
- * program_check and has all its coefficient records a tick never fails. In a job in chunks it fails
- * (INTERPOLATOR_ERR_JUMP) if the main loop has not made the next records in time (core/coefficient_cache.h). Only
- * program_check and chunk_check validate: what a header demands of the caller is not checked again. Predicates return
- * an int, 1 (true) or 0 (false).
+ * Functions return 0 or a negative code:
+ *
+ *   program_open, program_check              enum program_error (core/program_rules.h); text: program_error_text
+ *   coefficients_make_in                     COEFFICIENTS_ERR_SIZE
+ *   interpolator_begin, feed_override_next   INTERPOLATOR_ERR_...
+ *
+ * If feed_override_next fails, the point that it was given keeps its values. With a program that passed program_check
+ * and has all its coefficient records a tick never fails. In a job in chunks it fails (INTERPOLATOR_ERR_JUMP) if the
+ * main loop has not made the next records in time (core/coefficient_cache.h). Only program_check and chunk_check
+ * validate: what a header demands of the caller is not checked again. Predicates return an int, 1 (true) or 0 (false).
  *
  * ## Numbers
  *
@@ -122,7 +129,7 @@
  *         return error;
  *     }
  *
- *     // Timer interrupt, once in each period. 1: this was the last setpoint.
+ *     // Timer interrupt, once in each period, for axes with 1000000 counts for each mm. 1: this was the last setpoint.
  *     int tick(int32_t counts[2])
  *     {
  *         struct interpolator_point point;

@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: MIT */
 /*
- * port.h: everything that the controller needs of a machine. Used by firmware/app and the ports.
+ * port.h: everything that the controller needs of its hardware and operating system (the *platform*). Used by
+ * firmware/app and the ports.
  *
- * A port is a folder port/<name>/ that defines these functions; they are bound at link time. It includes this file,
- * can/, port/common, port/cortex_m, port/semihost and its own files only. docs/guides/port-to-your-board.md makes one.
+ * A port is a folder port/<name>/ that defines these functions for one platform; they are bound at link time. It
+ * includes this file, can/, port/common, port/cortex_m, port/semihost and its own files only.
+ * docs/guides/port-to-your-board.md makes one.
  *
  * Three contexts (drawn in docs/reference/architecture.md):
  *   receive   the CAN receive interrupt: calls port_handlers.receive for every accepted frame
  *   timer     the timer interrupt: calls port_handlers.tick once a period
  *   main loop  main(): everything that may wait
- * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each
- * other nor a critical section of the main loop, so data shared with the main loop needs no other
- * guard. (A board whose timer interrupt may preempt its receive interrupt masks the timer interrupt around each call of
- * `receive`; port_lock() is for the main loop only.) On Linux one thread stands for both interrupts.
+ * The port calls both handlers as if between port_lock() and port_unlock(): they never overlap each other nor a
+ * critical section of the main loop. So data shared with the main loop needs no other guard. Only the main loop calls
+ * port_lock(). If the timer interrupt of a board may preempt its receive interrupt, the board therefore masks the timer
+ * interrupt around each call of `receive`. On Linux one thread stands for both interrupts.
  *
  * Errors: 0 or a negative PORT_ERR_... Only port_wait() sleeps. port_lock() waits for a handler that runs (Linux).
  * port_store_erase() and port_store_write() return when the memory has finished, which takes 22 ms for a page of the
@@ -32,7 +34,7 @@
 enum port_error {
     PORT_ERR_FULL = -1,   /* no room to send: the frame is not queued */
     PORT_ERR_STORE = -2,  /* outside the bank, or the memory did not take it */
-    PORT_ERR_SYSTEM = -3, /* the machine cannot do it; the port has logged why */
+    PORT_ERR_SYSTEM = -3, /* the platform cannot do it; the port has logged why */
 };
 
 /* --- Life --- */
@@ -42,8 +44,8 @@ enum port_error {
  * once, before all others. */
 int port_begin(int argc, char **argv);
 
-/* Stops both interrupts, leaves the bus. Returns 0, or the exit status for main() when the machine
- * has failed (the bus is gone); that has been reported. Main loop. */
+/* Stops both interrupts, leaves the bus. Returns 0. If the platform has failed (the bus is gone), it returns the exit
+ * status for main(), and the failure has been reported. Main loop. */
 int port_end(void);
 
 /* True when the end of the controller is requested (SIGTERM, SIGINT, SIGHUP); never on a board without such a
@@ -59,17 +61,17 @@ uint8_t port_node_id(void);
 
 /* --- CAN, classic frames --- */
 
-/* Lets only frames that pass one of them through to the receive handler. At most PORT_FILTERS of them. Main loop,
- * before port_start(). */
+/* Sets the filters, at most PORT_FILTERS of them. Only frames that pass at least one filter come to the receive
+ * handler. 0 or PORT_ERR_SYSTEM. Main loop, before port_start(). */
 #define PORT_FILTERS 16
 int port_can_accept(const struct can_match *filters, size_t count);
 
-/* Queues one frame for sending, in call order per context. 0 or PORT_ERR_FULL. */
+/* Queues one frame for sending. Frames of one context are sent in the order of the calls. 0 or PORT_ERR_FULL. */
 int port_can_send(const struct can_msg *message);
 
-/* False while a frame that a tick has sent still waits for the bus; true when each has been sent on the bus, or is lost
- * (bus-off), and where the port cannot know. SYNC has a higher priority than setpoints, so a tick that finds its
- * predecessor's frames waiting sends none. First in a tick. Timer. */
+/* False while a frame that a tick has sent still waits for the bus. True when each of them has been sent on the bus or
+ * is lost (bus-off), and where the port cannot know. A tick calls it first. SYNC has a higher priority than setpoints,
+ * so a tick that finds frames of its predecessor waiting sends no frame. Timer. */
 bool port_can_delivered(void);
 
 /* --- Time and tick --- */
@@ -78,10 +80,11 @@ struct port_handlers {
     void *self; /* handed to both */
     /* now_us: port_time_us() of this interrupt, so that the clock is read once only. */
     void (*receive)(void *self, const struct can_msg *message, uint32_t now_us);
-    /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A late tick is called late.
-     * Where the port has the choice it skips none, and no two are closer than three quarters of a period; a timer whose
-     * interrupts merge (SysTick) drops those that are a whole period late and is on time with the next. In both cases a
-     * program continues with its next tick: only time is lost. */
+    /* late_ns: how long after its due time the tick began (4.29 s at most are reported). A tick that is late is called
+     * as soon as possible. Two ticks are at least three quarters of a period apart. If a tick is late by more than a
+     * period, the periods that have passed are not made up for: due times count from this tick. The interrupts of some
+     * timers merge (SysTick). Such a port loses a tick that is a whole period late, is on time with the next, and does
+     * not keep the distance. In all cases a program continues with its next setpoint: only time is lost. */
     void (*tick)(void *self, uint32_t now_us, uint32_t late_ns);
 };
 
@@ -92,28 +95,29 @@ uint32_t port_time_us(void); /* wraps after 71 minutes */
 /* Turns both interrupts on; the first tick comes one period later. Main loop, once. */
 int port_start(const struct port_handlers *handlers, uint32_t period_us);
 
-/* Changes the period. The new value applies to the interval that ends with the next tick, or to the following one if
- * the timer has already loaded that interval. Main loop, in a critical section. */
+/* Changes the period. The new value applies to the interval up to the next tick. If the timer has already loaded this
+ * interval, it applies to the one after it. Main loop, in a critical section. */
 void port_tick_period(uint32_t period_us);
 
-/* For simulated drives, which run on a host that may stall, and can be faster than the clock. A tick that calls
- * port_tick_await() makes the next tick wait for port_tick_ready(), which the receive handler calls when all drives have
- * answered. The wait ends guard_us after the start of the present tick at the latest; while the host as a whole stalls,
- * this time does not run. If the wait goes beyond the due time of the next tick, that tick is late. At fast pace, and if
- * `hurry`, the next tick starts as soon as port_tick_ready() is called, before its due time. A board, whose timer knows
- * nothing but the clock, ignores both calls. */
+/* For simulated drives. They run on a computer that may stall, and they can be faster than the clock. A tick that calls
+ * port_tick_await() makes the next tick wait for port_tick_ready(). The receive handler calls this function when all
+ * drives have answered. The wait ends guard_us after the start of the present tick at the latest. Time in which the
+ * whole computer stalls does not count. If the wait ends after the due time of the next tick, that tick is late. At
+ * fast pace, if `hurry` is true, the next tick starts as soon as port_tick_ready() is called, also before its due time.
+ * A board whose timer follows the clock alone ignores both calls. */
 void port_tick_await(uint32_t guard_us, bool hurry); /* timer */
 void port_tick_ready(void);                          /* receive */
 
-/* Whether ticks have to come in time because drives are real: then none is delayed for a main loop that gets no
- * processor time. Initially false. Boards, on which ticks are interrupts, ignore it. Main loop. */
+/* urgent: drives are real, so ticks have to come in time. While it is false, as at the beginning, a hosted port may
+ * delay ticks so that the main loop gets processor time. While it is true it delays none. Boards, on which ticks are
+ * interrupts, ignore it. Main loop. */
 void port_tick_urgent(bool urgent);
 
 /* How well ticks come in time. Boards: PORT_TIMING_KEPT. Any context. */
 enum port_timing {
     PORT_TIMING_KEPT = 0,     /* by an interrupt, a real-time thread, or virtual time */
-    PORT_TIMING_REFUSED = 1,  /* the machine does not permit it: real drives must not be enabled */
-    PORT_TIMING_ACCEPTED = 2, /* the same, and the user has accepted it by an option */
+    PORT_TIMING_REFUSED = 1,  /* not permitted by the computer: real drives must not be enabled */
+    PORT_TIMING_ACCEPTED = 2, /* not permitted, but the user has accepted this by an option */
 };
 enum port_timing port_timing(void);
 
@@ -145,9 +149,12 @@ void port_progress(void);
 
 uint32_t port_store_size(unsigned bank); /* bytes of a bank; equal in a pair */
 
-/* port_store_erase: erases a bank, its last 16 bytes first. port_store_write: the caller writes at ascending offsets
- * without gaps. Only before the last 16 bytes, which it writes by one call, there may be a gap. Between two writes the
- * data below the last whole multiple of 8 bytes can be read, after the last write all. 0 or PORT_ERR_STORE. */
+/* The last 16 bytes of a bank are its commit record, which makes the content valid.
+ * port_store_erase: erases a bank, its last 16 bytes first.
+ * port_store_write: the caller writes at ascending offsets. There is no gap between two writes, except before the last
+ * 16 bytes, which are one call. A port may keep back up to 7 bytes until they make 8 with those of the next write. So
+ * between two writes the caller reads only data below the last multiple of 8 bytes, and after the last write all.
+ * Both return 0 or PORT_ERR_STORE. */
 int port_store_erase(unsigned bank);
 int port_store_write(unsigned bank, uint32_t offset, const uint8_t *data, uint32_t size);
 
@@ -156,12 +163,11 @@ const uint8_t *port_store_data(unsigned bank);
 
 /* --- RAM for chunks of streamed jobs --- */
 
-/* The memory of the ring (app/stream), aligned to 8, and its bytes; 0: this port streams nothing. Lost with the power.
- * Always the same. Main loop. */
+/* The memory of the ring (app/stream), aligned to 8, and its size in bytes. Size 0: the controller refuses streamed
+ * jobs. Each call returns the same memory. Its content may be lost at power-off. Main loop. */
 uint8_t *port_stream_memory(uint32_t *size);
 
-/* The memory of the coefficient cache of streamed jobs (app/chunk_records), likewise; without any, nothing is
- * streamed. */
+/* The same for the memory of the coefficient cache of streamed jobs (app/chunk_records). */
 uint8_t *port_cache_memory(uint32_t *size);
 
 /* --- Console --- */
