@@ -26,8 +26,10 @@ def status_rows(
     rows.append(("configuration", _configuration_words(status)))
     rows.append(("program", _program_words(status.program)))
     rows += _stop_rows(status.program)
-    rows += [] if status.stream is None else [("stream", stream_words(status.stream))]
-    rows.append(("position", _position_words(status)))
+    if status.stream is not None:  # the length of `program` is not that of the job
+        rows.append(("stream", stream_words(status.stream)))
+    else:
+        rows.append(("position", _position_words(status)))
     rows.append(("feed", f"{status.motion.feed_mm_s:.3f} mm/s"))
     rows.append(("override", _override_words(status.override)))
     if status.unhomed_nodes:

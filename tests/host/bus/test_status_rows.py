@@ -24,6 +24,7 @@ from hodograph.bus.sdo.status import (
     Statistics,
     Status,
 )
+from hodograph.bus.sdo.stream_channel import OPEN, StreamStatus
 from hodograph.bus.status_text import status_line, status_rows
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -94,6 +95,14 @@ def test_a_run() -> None:
     assert status_line(RUNNING, LOAD) == (
         "running, 45.000 mm, 100.0 mm/s, override 120/150 %, missed ticks 2, bus 61.3 %"
     ).replace("61.3", f"{61.25:.1f}")
+
+
+def test_a_streamed_job_has_its_own_place() -> None:
+    """The program in the bank is another one: its length is not that of the job."""
+    stream = StreamStatus(OPEN, 7, 5, 4096, 2.5, 4, 31, 28.87, 12.0, 0)
+    text = shown(replace(RUNNING, stream=stream))
+    assert "stream: open, line 31, 28.870 mm, 2.5 s ahead in the controller, 12 s left" in text
+    assert "position: " not in text
 
 
 def test_an_axis_without_a_homing_method_needs_no_homing() -> None:

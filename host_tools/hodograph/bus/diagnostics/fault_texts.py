@@ -140,7 +140,7 @@ _SINGLE = {
     ),
     0xFF09: (
         "no SYNC for longer than real drives can interpolate: the axes left the path",
-        "give the controller real-time priority (docs/reference/cli.md, status) and an idle processor; home "
+        "give the controller real-time priority (docs/guides/machine.md section 3) and an idle processor; home "
         "if in doubt",
     ),
     0xFF0A: (
