@@ -152,6 +152,7 @@ class Job:
     machine    its file among the examples
     outputs    whether the machine has the outputs of OUTPUTS_MACHINE
     slowness   factor of the period, where five axes would fill the bus
+    least_us   least period, where three axes and the outputs would fill the bus at a lower one
     """
 
     name: str
@@ -159,6 +160,7 @@ class Job:
     machine: str = "mill"
     outputs: bool = False
     slowness: int = 1
+    least_us: int = 1000
 
     def write(self, folder: Path) -> list[Path]:
         """The files, in this folder."""
@@ -178,8 +180,8 @@ JOBS = (
     Job("engraving", (TOOLPATHS / "engraving.ngc",)),
     Job("several", (_slow(), _there_and_back(), _stairs())),
     Job("five_axes", (TOOLPATHS / "five_axes.ngc",), machine="mill_five_axes", slowness=2),
-    Job("dispensing", (TOOLPATHS / "dispensing.ngc",), outputs=True),
-    Job("pulses", (_pulses(),), outputs=True),
+    Job("dispensing", (TOOLPATHS / "dispensing.ngc",), outputs=True, least_us=2000),
+    Job("pulses", (_pulses(),), outputs=True, least_us=2000),
 )
 _SHARES = (0.18, 0.17, 0.12, 0.1, 0.02, 0.09, 0.1, 0.08, 0.14)
 """Of the jobs among the seeds: long ones are rare."""
@@ -378,7 +380,7 @@ def draw(seed: int, kinds: Sequence[str] = KINDS, jobs: Sequence[Job] = JOBS) ->
     return Case(
         seed,
         job,
-        int(rng.choice([1000, 2000])) * job.slowness,
+        max(int(rng.choice([1000, 2000])) * job.slowness, job.least_us),
         int(rng.choice([12, 16, 24, 48])),
         cuts,
         "\n".join(rules) + "\n",
