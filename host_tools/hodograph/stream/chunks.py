@@ -66,8 +66,9 @@ takes longer delays the takeover.
 """
 
 FEWEST_SHARED_PIECES = 4
-"""Shared pieces if LEAST_SHARED_PIECES take too many bytes because they have many segments. An override ramp with a
-larger look-ahead window then delays the takeover; a motion at 100 % is not affected.
+"""Shared pieces if LEAST_SHARED_PIECES take too many bytes because they have many segments, or if the controller would
+refuse the chunk with them. An override ramp with a larger look-ahead window then delays the takeover; a motion at 100 %
+is not affected.
 """
 
 _TAIL_SHARE = 0.8
