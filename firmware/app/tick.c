@@ -74,9 +74,8 @@ static void send_setpoints(struct tick *tick, const struct feedforward_offset *o
     struct machine *machine = tick->machine;
     for (uint32_t i = 0; i < machine->config.axis_count; ++i) {
         struct axis *axis = &machine->axes[i];
-        const struct axis_travel travel = {machine->config.travel_min_counts[i],
-                                           machine->config.travel_max_counts[i]};
-        axis_setpoint(axis, config_tolerance_counts(&machine->config, i), &travel);
+        axis_setpoint(axis, config_tolerance_counts(&machine->config, i),
+                      &machine->config.travel[i]);
         if (axis->torque_mapped) {
             axis->torque_offset_permille = offset[i].torque_permille;
             pdo_add_torque(&axis->setpoint, axis->torque_offset_permille);

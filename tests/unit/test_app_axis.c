@@ -6,7 +6,7 @@
 
 #define TOLERANCE 100u
 
-static const struct axis_travel travel = {-20000, 20000};
+static const struct config_travel travel = {-20000, 20000};
 
 static struct axis axis;
 

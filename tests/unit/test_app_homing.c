@@ -250,11 +250,11 @@ static void test_time_for_the_whole_travel(void)
     struct config config = {0};
     config.axis[2].homing_speed_towards_counts_s = 10000000;
     config.axis[2].homing_speed_away_counts_s = 1000000;
-    config.travel_min_counts[2] = -50000000;
-    config.travel_max_counts[2] = 50000000;
+    config.travel[2].min_counts = -50000000;
+    config.travel[2].max_counts = 50000000;
     TEST_ASSERT_EQUAL_UINT32(10u + 100u + HOMING_SPARE_S, homing_time_s(&config, 2));
-    config.travel_min_counts[2] = INT32_MIN;
-    config.travel_max_counts[2] = INT32_MAX;
+    config.travel[2].min_counts = INT32_MIN;
+    config.travel[2].max_counts = INT32_MAX;
     TEST_ASSERT_EQUAL_UINT32(HOMING_MAX_S, homing_time_s(&config, 2));
 }
 

@@ -16,8 +16,7 @@ static const struct config config = {
     .jerk_limit_mm_s3 = 8000,
     .counts_per_mm = 1000000,
     .axis_count = 2,
-    .travel_min_counts = {-100000000, -100000000},
-    .travel_max_counts = {100000000, 100000000},
+    .travel = {{-100000000, 100000000}, {-100000000, 100000000}},
     .crc32 = 1,
 };
 static struct program_slot slot;
@@ -200,8 +199,8 @@ static void test_a_new_configuration_is_applied_to_the_old_program(void)
     TEST_ASSERT_EQUAL_INT(0, upload());
     other.jerk_limit_mm_s3 = 1900;
     other.counts_per_mm = 1000;
-    other.travel_max_counts[0] = 100000;
-    other.travel_max_counts[1] = 100000;
+    other.travel[0].max_counts = 100000;
+    other.travel[1].max_counts = 100000;
     program_slot_refresh(&slot, &other);
     TEST_ASSERT_TRUE_MESSAGE(slot.acceptable, "its CRC says that it is the same");
     other.crc32 = 2;

@@ -37,8 +37,7 @@ static const struct config config = {
     .period_us = 1000,
     .counts_per_mm = 1000000,
     .axis_count = 2,
-    .travel_min_counts = {-1000000000, -1000000000},
-    .travel_max_counts = {1000000000, 1000000000},
+    .travel = {{-1000000000, 1000000000}, {-1000000000, 1000000000}},
 };
 /* The elder one is the longest, so that a part of it would be left where a page is not erased. */
 static const char *const names[IMAGES] = {"star_minimax.hdgp", "alpha_minimax.hdgp",

@@ -526,9 +526,9 @@ static uint32_t value_of(const struct drive_configuration *configuration,
     case FROM_PERIOD_MS:
         return config->period_us / 1000u;
     case FROM_TRAVEL_MIN:
-        return (uint32_t)config->travel_min_counts[configuration->axis];
+        return (uint32_t)config->travel[configuration->axis].min_counts;
     case FROM_TRAVEL_MAX:
-        return (uint32_t)config->travel_max_counts[configuration->axis];
+        return (uint32_t)config->travel[configuration->axis].max_counts;
     case FROM_OWN_NODE:
         return ((uint32_t)config->own_node << 16) | row->argument;
     case FROM_SETPOINT_TIMEOUT:

@@ -26,7 +26,7 @@ uint32_t homing_time_s(const struct config *config, uint8_t axis)
 {
     const struct config_axis *settings = &config->axis[axis];
     const uint32_t travel_counts =
-        (uint32_t)config->travel_max_counts[axis] - (uint32_t)config->travel_min_counts[axis];
+        (uint32_t)config->travel[axis].max_counts - (uint32_t)config->travel[axis].min_counts;
     const uint64_t time_s = (uint64_t)travel_counts / settings->homing_speed_towards_counts_s +
                             travel_counts / settings->homing_speed_away_counts_s + HOMING_SPARE_S;
     return time_s < HOMING_MAX_S ? (uint32_t)time_s : HOMING_MAX_S;

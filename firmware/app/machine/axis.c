@@ -131,14 +131,14 @@ static void note_enabled(struct axis *axis)
     }
 }
 
-static int32_t within(const struct axis_travel *travel, int32_t counts)
+static int32_t within(const struct config_travel *travel, int32_t counts)
 {
     const int32_t above = counts < travel->min_counts ? travel->min_counts : counts;
     return above > travel->max_counts ? travel->max_counts : above;
 }
 
 /* A drive that is switched on and gets a target beyond its software limit (0x607D) reports that it does not follow. */
-static void follow_position(struct axis *axis, const struct axis_travel *travel)
+static void follow_position(struct axis *axis, const struct config_travel *travel)
 {
     if (axis->goal == CIA402_GOAL_QUICK_STOP) {
         axis->target_counts = axis->target_sent_counts;
@@ -163,7 +163,7 @@ static void set_controlword(struct axis *axis)
     }
 }
 
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, const struct axis_travel *travel)
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, const struct config_travel *travel)
 {
     set_controlword(axis);
     note_enabled(axis);

@@ -12,6 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "app/machine/config.h"
 #include "app/machine/statusword_monitor.h"
 #include "app/machine/tpdo_monitor.h"
 #include "can/can_frame.h"
@@ -67,12 +68,6 @@ struct axis {
     uint32_t standstill_syncs;
 };
 
-/* Range of the targets of an axis. */
-struct axis_travel {
-    int32_t min_counts;
-    int32_t max_counts;
-};
-
 void axis_init(struct axis *axis, uint8_t node);
 
 /* Forgets the drive, which has to be found and configured again. Whether it is homed stays, when the node is the same:
@@ -96,7 +91,8 @@ void axis_restarted(struct axis *axis);
  * its position, so that switching on moves nothing; it stays inside the travel, in which machine_enable lets the axis
  * stand but for the start tolerance. From then on the target changes by commands only, also in a quick
  * stop. When the drive is off, the target follows the position again. Timer. */
-void axis_setpoint(struct axis *axis, uint32_t tolerance_counts, const struct axis_travel *travel);
+void axis_setpoint(struct axis *axis, uint32_t tolerance_counts,
+                   const struct config_travel *travel);
 
 /* The port has taken that frame. Timer. */
 static inline void axis_sent(struct axis *axis)

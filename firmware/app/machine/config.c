@@ -211,8 +211,8 @@ void config_read(struct config *config, const struct od *od)
     for (uint8_t i = 0; i < AXES_MAX; ++i) {
         const uint8_t sub = (uint8_t)(i + 1u);
         config->node[i] = (uint8_t)number(od, NODE, sub);
-        config->travel_min_counts[i] = (int32_t)number(od, TRAVEL_MIN, sub);
-        config->travel_max_counts[i] = (int32_t)number(od, TRAVEL_MAX, sub);
+        config->travel[i].min_counts = (int32_t)number(od, TRAVEL_MIN, sub);
+        config->travel[i].max_counts = (int32_t)number(od, TRAVEL_MAX, sub);
         read_axis(&config->axis[i], od, sub);
         read_window(config, i);
         config->rotary_tolerance_counts[i] = rotary_tolerance_counts(config, i);
@@ -293,9 +293,9 @@ static void limits_of_axis(const struct config *config, uint32_t axis, uint32_t 
                            struct program_limits *limits)
 {
     const uint32_t counts_per_unit = config_counts_per_unit(config, axis);
-    limits->min_q40_mm[i] = q40_from_counts(config->travel_min_counts[axis], counts_per_unit, true);
+    limits->min_q40_mm[i] = q40_from_counts(config->travel[axis].min_counts, counts_per_unit, true);
     limits->max_q40_mm[i] =
-        q40_from_counts(config->travel_max_counts[axis], counts_per_unit, false);
+        q40_from_counts(config->travel[axis].max_counts, counts_per_unit, false);
     limits->axis_velocity_um_s[i] = config->axis[axis].velocity_limit_um_s;
     limits->axis_acceleration_um_s2[i] = config->axis[axis].acceleration_limit_um_s2;
     limits->axis_jerk_mm_s3[i] = config->axis[axis].jerk_limit_mm_s3;

@@ -78,6 +78,12 @@ struct config_outputs {
     uint8_t delay_ticks;    /* 0 ... CONFIG_OUTPUTS_DELAY_MAX */
 };
 
+/* Travel of an axis. */
+struct config_travel {
+    int32_t min_counts;
+    int32_t max_counts;
+};
+
 struct config {
     uint32_t period_us; /* 1000, 2000, 4000 or 8000 */
     uint32_t feed_limit_um_s;
@@ -85,8 +91,7 @@ struct config {
     uint32_t jerk_limit_mm_s3;
     uint32_t start_tolerance_counts; /* of axes in mm */
     uint32_t counts_per_mm;
-    int32_t travel_min_counts[AXES_MAX];
-    int32_t travel_max_counts[AXES_MAX];
+    struct config_travel travel[AXES_MAX];
     struct config_axis axis[AXES_MAX];
     uint16_t answer_wait_ms;      /* wall time before an answer counts as missed */
     uint16_t setpoint_timeout_ms; /* a drive without setpoints for so long stops by itself */

@@ -28,8 +28,8 @@ static bool any_outside_travel(const struct machine *machine)
     for (uint32_t i = 0; i < config->axis_count; ++i) {
         const int64_t position_counts = machine->axes[i].position_counts;
         const int64_t slack_counts = config_tolerance_counts(config, i);
-        if (position_counts < config->travel_min_counts[i] - slack_counts ||
-            position_counts > config->travel_max_counts[i] + slack_counts) {
+        if (position_counts < config->travel[i].min_counts - slack_counts ||
+            position_counts > config->travel[i].max_counts + slack_counts) {
             return true;
         }
     }
