@@ -106,6 +106,7 @@ PYTHON_RULES: dict[str, set[str]] = {
     "fixed_point": set(),
     "names": {"errors"},
     "events": set(),
+    "whole_files": set(),
     "data": set(),
     "native.library": {"errors"},
     "native.override_headroom": {"native.library"},
@@ -192,6 +193,7 @@ PYTHON_RULES: dict[str, set[str]] = {
         *("toolpath", "job", "job_outputs", "job_run", "names", "events", "path_outputs"),
         "fixed_point",
         "machine_limits",
+        "whole_files",
     },
     "paper": {
         "errors",

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
+from ..whole_files import replace_file
 from .waiting import held, is_terminal, remove_line
 
 LINE_AFTER_S, LINE_EVERY_S = 5.0, 10.0
@@ -180,25 +181,9 @@ def write_file(file: Path, data: bytes) -> None:
         if direct:
             file.write_bytes(data)
         else:
-            _replace(place, data)
+            replace_file(place, data)
     except OSError as error:
         raise InputError(f"{place}: cannot be written: {error.strerror}") from None
-
-
-def _replace(file: Path, data: bytes) -> None:
-    """Writes a file under another name, then renames it: after a loss of power the old or the new one is there. Raises
-    OSError, and leaves no file then.
-    """
-    fresh = file.with_name(file.name + ".part")
-    try:
-        with fresh.open("wb") as out:
-            out.write(data)
-            out.flush()
-            os.fsync(out.fileno())
-        fresh.replace(file)
-    except OSError:
-        fresh.unlink(missing_ok=True) if fresh.parent.is_dir() else None
-        raise
 
 
 def require_new(*files: Path | None, force: bool) -> None:

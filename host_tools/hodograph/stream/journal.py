@@ -21,6 +21,7 @@ from filelock import lock_descriptor
 
 from ..config import Machine
 from ..errors import InputError
+from ..whole_files import replace_file
 
 VERSION = 4
 
@@ -165,14 +166,9 @@ class Journal:
 
     def _write(self) -> None:
         text = json.dumps({"version": VERSION, **asdict(self.entry)}, indent=1)
-        fresh = self.file.with_name(self.file.name + ".new")
         try:
             self.file.parent.mkdir(parents=True, exist_ok=True)
-            with fresh.open("w", encoding="utf-8") as out:
-                out.write(text + "\n")
-                out.flush()
-                os.fsync(out.fileno())
-            fresh.replace(self.file)
+            replace_file(self.file, (text + "\n").encode())
         except OSError as error:
             raise _cannot_be_written(self.file, error) from None
 
