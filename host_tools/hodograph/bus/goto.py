@@ -21,7 +21,8 @@ from ..program import ProgramOptions, StopTerms, compile_path, encode
 from ..program.stop_planning import LongStopError
 from ..spline import PHSpline, line
 from ..spline.spatial import SpatialPHSpline, spatial_through_points
-from .sdo.configuration import configured_counts, configured_tolerance, configured_travel
+from .diagnostics.texts import OUTSIDE_TRAVEL_REMEDY
+from .sdo.configuration import configured_counts, configured_tolerances, configured_travel
 from .sdo.controller import CommandRefusedError, Controller
 from .sdo.objects import ACTUAL, OVERRIDE, REFUSED_OUTSIDE_TRAVEL
 
@@ -147,18 +148,18 @@ def require_inside_travel(controller: Controller, machine: Machine) -> None:
     With the controller's own values, in counts: so the controller refuses to switch on exactly the same axes.
     """
     counts = configured_counts(controller, len(machine.axes))
-    for number, (axis, per_unit) in enumerate(zip(machine.axes, counts, strict=True), 1):
+    tolerances = configured_tolerances(controller, counts)
+    axes = zip(machine.axes, counts, tolerances, strict=True)
+    for number, (axis, per_unit, tolerance) in enumerate(axes, 1):
         at = controller.read(ACTUAL, number)
         least, most = configured_travel(controller, number)
-        tolerance = configured_tolerance(controller, number)
         if not least - tolerance <= at <= most + tolerance:
             stands, low, high, allowed = (
                 f"{round(value / per_unit, 6):.10g}" for value in (at, least, most, tolerance)
             )
             raise RefusedError(
                 f"{controller.who()}: axis {axis.name} stands at {stands} {axis.unit}, outside of its travel {low} to "
-                f"{high} {axis.unit} by more than start_tolerance_mm ({allowed} {axis.unit}), where its drive must not "
-                "be switched on: move it with the drive's own tool or by hand, or enlarge travel_mm meanwhile"
+                f"{high} {axis.unit} by more than start_tolerance_mm ({allowed} {axis.unit}), {OUTSIDE_TRAVEL_REMEDY}"
             )
 
 

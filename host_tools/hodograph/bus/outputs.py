@@ -8,7 +8,7 @@ from __future__ import annotations
 from ..errors import RefusedError
 from ..events import ANALOGUES, OutputValues
 from .diagnostics.texts import STATES
-from .sdo.controller import Controller, OutdatedError, lacks_object, needs_standstill_outputs
+from .sdo.controller import Controller, lacks_object, needs_standstill_outputs
 from .sdo.objects import READY, STANDSTILL_OUTPUTS
 
 _FIRST_ANALOGUE, _ALL = 3, 7
@@ -28,13 +28,13 @@ def set_outputs(controller: Controller, values: OutputValues) -> None:
     Raises RefusedError: axes move, the drives are off, there is no I/O module, or the firmware cannot do this.
     """
     controller.acted = True
-    try:
-        with needs_standstill_outputs(controller):
+    with needs_standstill_outputs(controller):
+        try:
             _set_together(controller, values)
-    except OutdatedError:
-        raise
-    except RefusedError as error:
-        raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
+        except RefusedError as error:
+            if lacks_object(error):
+                raise
+            raise RefusedError(f"{controller.who()}: {_reason(controller, error)}") from error
 
 
 def _set_together(controller: Controller, values: OutputValues) -> None:

@@ -455,7 +455,7 @@ class Sender:
         have opened the job.
         """
         status = stream_status(self.at.controller)
-        if status.job == job and status.state == STOPPED:  # since the last look
+        if status.job == job and status.state == STOPPED:  # since it was read last
             self._over(status, all_sent=False)
         if (status.job != job and not first) or self.at.controller.state() in (BOOT, OFF):
             raise self._lost() from None

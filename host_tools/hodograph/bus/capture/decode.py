@@ -124,10 +124,19 @@ def decode_outputs(frames: Frames, outputs: Outputs) -> NDArray[np.void]:
     return found
 
 
+def sync_counters(frames: Frames, sync_at: NDArray[np.intp]) -> NDArray[np.int64]:
+    """Counters (n,) of the SYNCs at these places of the recording."""
+    return np.asarray(frames["data"][sync_at, 0].astype(np.int64))
+
+
+def missing_syncs(counters: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The number of SYNCs (n - 1,) that are missing after each but the last, by their counters (n,)."""
+    return np.asarray((np.diff(counters) - 1) % SYNC_OVERFLOW)
+
+
 def _check_counters(frames: Frames, sync_at: NDArray[np.intp]) -> None:
-    counters = frames["data"][sync_at, 0].astype(np.int64)
-    steps = (np.diff(counters) - 1) % SYNC_OVERFLOW
-    bad = np.flatnonzero(steps)
+    counters = sync_counters(frames, sync_at)
+    bad = np.flatnonzero(missing_syncs(counters))
     if bad.size or counters.min() < 1 or counters.max() > SYNC_OVERFLOW:
         at = int(bad[0]) if bad.size else 0
         raise RunError(

@@ -10,46 +10,49 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .decode import RPDO1, SYNC_ID, SYNC_OVERFLOW
+from .decode import RPDO1, SYNC_ID, missing_syncs, sync_counters
 from .frames import Frames, when
 
 _DIFFERENCES = 3
 """SYNCs before a step that its check takes into account: it forms differences up to the third."""
 
 
-def gap_text(frames: Frames, nodes: Sequence[int], sync: int) -> str | None:
-    """Which frames are missing beside the step at a SYNC of the recording, and when; None: none."""
-    sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
-    first, last = max(0, sync - _DIFFERENCES - 1), min(sync + 1, sync_at.size - 1)
-    return _without_syncs(frames, sync_at, range(first, last)) or next(
-        filter(None, (_without_setpoint(frames, sync_at, n, first, last) for n in nodes)), None
-    )
+class Gaps:
+    """The gaps of a recording, with the setpoints of these nodes."""
 
+    def __init__(self, frames: Frames, nodes: Sequence[int]) -> None:
+        self._frames = frames
+        self._sync_at = np.flatnonzero(frames["id"] == SYNC_ID)
+        self._counters = sync_counters(frames, self._sync_at)
+        self._missing = missing_syncs(self._counters)
+        self._lacking = [(node, self._without_setpoint(node)) for node in nodes]
 
-def _without_syncs(frames: Frames, sync_at: NDArray[np.intp], syncs: range) -> str | None:
-    """The first place where the counters of a SYNC among these and of the next one are not consecutive."""
-    counters = frames["data"][sync_at, 0].astype(np.int64)
-    for k in syncs:
-        lost = int(counters[k + 1] - counters[k] - 1) % SYNC_OVERFLOW
-        if lost:
-            place = (
-                f"{when(frames, int(sync_at[k]))}, the next one{when(frames, int(sync_at[k + 1]))}"
-            )
-            return f"SYNC {k}{place}, and their counters are {counters[k]} and {counters[k + 1]}"
-    return None
-
-
-def _without_setpoint(
-    frames: Frames, sync_at: NDArray[np.intp], node: int, first: int, last: int
-) -> str | None:
-    """The first of these SYNCs after which a node gets no setpoint, although it gets some before and later."""
-    at = np.flatnonzero(frames["id"] == RPDO1 + node)
-    interval = np.searchsorted(sync_at, at) - 1
-    begun = interval[interval >= 0]
-    if not begun.size:
+    def text(self, sync: int) -> str | None:
+        """Which frames are missing beside the step at this SYNC, and when; None: none."""
+        first, last = max(0, sync - _DIFFERENCES - 1), min(sync + 1, self._sync_at.size - 1)
+        jumping = np.flatnonzero(self._missing[first:last])
+        if jumping.size:
+            k = first + int(jumping[0])
+            next_one = f"the next one{self._when(k + 1)}"
+            counters = f"{self._counters[k]} and {self._counters[k + 1]}"
+            return f"SYNC {k}{self._when(k)}, {next_one}, and their counters are {counters}"
+        for node, lacking in self._lacking:
+            without = np.flatnonzero(lacking[first : last + 1])
+            if without.size:
+                k = first + int(without[0])
+                return f"no setpoint of node {node} after SYNC {k}{self._when(k)}"
         return None
-    among = range(max(first, int(begun[0])), min(last + 1, int(begun[-1])))
-    missing = sorted(set(among).difference(begun.tolist()))
-    if not missing:
-        return None
-    return f"no setpoint of node {node} after SYNC {missing[0]}{when(frames, int(sync_at[missing[0]]))}"
+
+    def _when(self, sync: int) -> str:
+        return when(self._frames, int(self._sync_at[sync]))
+
+    def _without_setpoint(self, node: int) -> NDArray[np.bool_]:
+        """SYNCs (n,) after which a node gets no setpoint, although it gets some before and later."""
+        at = np.flatnonzero(self._frames["id"] == RPDO1 + node)
+        interval = np.searchsorted(self._sync_at, at) - 1
+        begun = interval[interval >= 0]
+        lacking = np.zeros(self._sync_at.size, dtype=np.bool_)
+        if begun.size:
+            lacking[begun[0] : begun[-1]] = True
+            lacking[begun] = False
+        return lacking

@@ -40,7 +40,7 @@ from numpy.typing import NDArray
 
 from ...errors import RunError
 from .decode import RPDO1, SYNC_ID, TPDO1
-from .gaps import gap_text
+from .gaps import Gaps
 from .recorder import Frames
 
 if TYPE_CHECKING:
@@ -189,12 +189,13 @@ def require_no_jump(frames: Frames, nodes: Sequence[int], limits: StepLimits) ->
     jumps = find_jumps(frames, nodes, limits)
     if not jumps:
         return
-    gaps = [gap_text(frames, nodes, jump.sync) for jump in jumps]
-    real = [jump for jump, gap in zip(jumps, gaps, strict=True) if gap is None]
+    gaps = Gaps(frames, nodes)
+    beside = [gaps.text(jump.sync) for jump in jumps]
+    real = [jump for jump, gap in zip(jumps, beside, strict=True) if gap is None]
     if not real:
         raise SetpointJumpError(
-            f"frames missing in the recording: {gaps[0]}: what the setpoints did there is not known: record again; if "
-            "frames are missing again, look for errors on the bus (hodograph status)"
+            f"frames missing in the recording: {beside[0]}: what the setpoints did there is not known: record again; "
+            "if frames are missing again, look for errors on the bus (hodograph status)"
         )
     more = f" ({len(real) - 1} more)" if len(real) > 1 else ""
     raise SetpointJumpError(f"{real[0]}{more}")

@@ -51,6 +51,11 @@ STORED = {
 }
 """Object 0x2050 sub 4."""
 
+OUTSIDE_TRAVEL_REMEDY = (
+    "where its drive must not be switched on: move it with the drive's own tool or by hand, or enlarge travel_mm "
+    "meanwhile"
+)
+
 REFUSALS = {
     1: "no program is loaded: hodograph upload FILE",
     2: "the axes are away from the program's start: hodograph goto FILE; for `start --from MM` first hodograph goto "
@@ -73,8 +78,7 @@ REFUSALS = {
     19: "a streamed job is open that was started before or begins elsewhere: end it with an upload, or stream again",
     20: "another client has loaded another program or job meanwhile: upload it again",
     21: "a stop was commanded meanwhile: give the command again",
-    22: "an axis is outside its travel by more than start_tolerance_mm, where its drive must not be switched on: move "
-    "it with the drive's own tool or by hand, or enlarge travel_mm meanwhile",
+    22: f"an axis is outside its travel by more than start_tolerance_mm, {OUTSIDE_TRAVEL_REMEDY}",
     16: "the drives are real and this computer does not permit real-time priority: run the controller with "
     "CAP_SYS_NICE and CAP_IPC_LOCK (or as root), or with --no-realtime at your own risk",
 }

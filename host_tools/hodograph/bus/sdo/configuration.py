@@ -108,13 +108,14 @@ def configured_travel(controller: Node, axis: int) -> tuple[int, int]:
     return least, controller.read(objects.TRAVEL_MAXIMUM, axis)
 
 
-def configured_tolerance(controller: Node, axis: int) -> int:
-    """Start tolerance of an axis, from 1, in counts, as the controller computes it (docs/reference/protocol.md
-    section 3, 0x2004 sub 6). Raises BusError.
+def configured_tolerances(controller: Node, counts: Sequence[int]) -> tuple[int, ...]:
+    """Start tolerance of each axis in counts, as the controller computes it (docs/reference/protocol.md section 3,
+    0x2004 sub 6). Raises BusError.
+
+    counts  of a mm or degree of each axis (`configured_counts`)
     """
     tolerance, common = (controller.read(CONFIGURATION, n) for n in (6, 7))
-    own = controller.read(objects.COUNTS_PER_UNIT, axis)
-    return min(tolerance * own // common, 2**32 - 1) if own else tolerance
+    return tuple(min(tolerance * own // common, 2**32 - 1) for own in counts)
 
 
 def _outputs(outputs: Outputs | None) -> Iterator[tuple[int, int]]:

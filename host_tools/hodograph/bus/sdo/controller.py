@@ -110,7 +110,6 @@ __all__ = [
     "STATISTICS",
     "CommandRefusedError",
     "Controller",
-    "OutdatedError",
     "connect",
     "lacks_object",
     "needs_standstill_outputs",
@@ -619,20 +618,16 @@ class CommandRefusedError(RefusedError):
         self.reason = reason
 
 
-class OutdatedError(RefusedError):
-    """The firmware is older than something needs."""
-
-
 @contextmanager
 def needs_standstill_outputs(node: Node) -> Iterator[None]:
-    """Uses STANDSTILL_OUTPUTS inside the context. Raises OutdatedError: the firmware does not have this object."""
+    """Uses STANDSTILL_OUTPUTS inside the context. Raises RefusedError: the firmware does not have this object."""
     try:
         yield
     except RefusedError as error:
         if not lacks_object(error):
             raise
         revision = node.read(IDENTITY_OBJECT, 3)
-        raise OutdatedError(
+        raise RefusedError(
             f"{node.who()} has firmware version {revision >> 16}.{revision & 0xFFFF}, and outputs that are switched or "
             f"kept on at standstill need {_OUTPUTS_SINCE} or later: install the firmware of these host tools on the "
             "controller (docs/guides/flash-and-run.md)"
