@@ -35,10 +35,16 @@ ENABLE_OPERATION = 0x0F
 PART = "F6000\nG61\nG1 X4\nG4 P0.1\nM0\nG1 Y3\nM1\nG1 X0 Y0\nM2\n"
 
 
-def _part(folder: Path) -> str:
+def _part(folder: Path, text: str = PART) -> str:
     file = folder / "part.ngc"
-    file.write_text(PART)
+    file.write_text(text)
     return str(file)
+
+
+def _streamed(file: str, folder: Path, machine: Path = MILL) -> tuple[str, ...]:
+    """The words of a command that streams a file, with a journal in the folder."""
+    journal = str(folder / "stream.json")
+    return ("stream", file, "--machine", str(machine), "--journal", journal)
 
 
 def test_program_stops_wait_for_the_operator_or_a_resume(
@@ -65,12 +71,7 @@ def test_program_stops_wait_for_the_operator_or_a_resume(
 
     monkeypatch.setattr(stream_command, "await_enter", operator)
     part, log = _part(tmp_path), tmp_path / "bus.log"
-    journal = str(tmp_path / "stream.json")
-    found = result(
-        capsys,
-        *("stream", part, "--machine", str(MILL), "--journal", journal, "--json"),
-        *("--record", str(log)),
-    )
+    found = result(capsys, *_streamed(part, tmp_path), "--json", "--record", str(log))
     assert [text.removeprefix(part) for text in asked] == [":5: M0", ":7: M1"]
     assert (found["sections"], found["chunks"]) == (3, 3)
     frames = read_recording(log, None)
@@ -96,11 +97,8 @@ def test_notes_come_before_the_motion(
         check()
 
     monkeypatch.setattr(stream_command, "await_enter", operator)
-    part = tmp_path / "part.ngc"
-    part.write_text("F6000\nG1 X4\nM6 T2\nG1 Y3\nM2\n")
-    journal = str(tmp_path / "stream.json")
-    words = ("stream", str(part), "--machine", str(MILL), "--journal", journal)
-    assert main(words) == 0
+    part = _part(tmp_path, "F6000\nG1 X4\nM6 T2\nG1 Y3\nM2\n")
+    assert main(_streamed(part, tmp_path)) == 0
     note = f"{part}:3: tool change (M6): done by hand"
     assert note in known[0]
     assert note not in capsys.readouterr().err
@@ -129,17 +127,9 @@ def test_a_stop_just_before_a_chunk_ends_the_job(
         return sent(node, data, job, sequence, place)
 
     monkeypatch.setattr(sender, "send_chunk", stopped)
-    part = tmp_path / "part.ngc"
-    part.write_text("F120\n" + "".join(f"G1 X{10 * k} Y{k % 2}\n" for k in range(1, 6)) + "M2\n")
-    words = (
-        "stream",
-        str(part),
-        "--machine",
-        str(MILL),
-        "--journal",
-        str(tmp_path / "stream.json"),
-    )
-    assert main(words) == 6
+    moves = "".join(f"G1 X{10 * k} Y{k % 2}\n" for k in range(1, 6))
+    part = _part(tmp_path, f"F120\n{moves}M2\n")
+    assert main(_streamed(part, tmp_path)) == 6
     assert waited[-1] == STOPPED
     err = capsys.readouterr().err
     assert "stopped before its end: the job ends here; hodograph stream --continue goes on" in err
@@ -168,12 +158,8 @@ def test_axes_that_turn_alone_are_jobs_between_the_others(
     file, log = tmp_path / "turned.ngc", tmp_path / "bus.log"
     file.write_text("G21 G90 G61 F6000\nG0 A6 C20\nG1 X6 C23\nG4 P0.1\nG1 A3\nM2\n")
     machine = EXAMPLES / "machines" / "mill_five_axes.toml"
-    journal = str(tmp_path / "stream.json")
-    found = result(
-        capsys,
-        *("stream", str(file), "--machine", str(machine), "--journal", journal, "--json"),
-        *("--record", str(log)),
-    )
+    words = _streamed(str(file), tmp_path, machine)
+    found = result(capsys, *words, "--json", "--record", str(log))
     assert (found["sections"], found["underruns"]) == (3, 0)
     frames = read_recording(log, None)
     assert _last_setpoints(frames, range(2, 7)) == [6_000_000, 0, 0, 300_000, 2_300_000]

@@ -8,14 +8,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import canopen
 import pytest
 
+from canopen_server import canopen_server
 from hodograph.bus.address import BusAddress
 from hodograph.bus.sdo.controller import Controller, connect
 from hodograph.bus.sdo.node import _Answers
 from hodograph.bus.sdo.objects import COMMAND, READY, RESUME, RUNNING, START, STATE
-from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import BusError, RefusedError
 
 BUS = BusAddress("virtual", "lost-answers")
@@ -24,17 +23,13 @@ TIME_OUT, UNEXPECTED, READ_ONLY = 0x05040000, 0x05040001, 0x06010002
 
 @pytest.fixture
 def controller() -> Iterator[Controller]:
-    """Python canopen's own server, with our EDS, in the controller's place."""
-    network = canopen.Network()
-    network.connect(interface=BUS.interface, channel=BUS.channel)
-    local = network.create_node(1, str(CONTROLLER_EDS))
-    state: Any = local.sdo[STATE]
-    state.raw = READY
-    with connect(BUS, 1, 1_000_000) as found:
-        found.require(5.0)
-        found.sdo.RESPONSE_TIMEOUT = 0.2
-        yield found
-    network.disconnect()
+    with canopen_server(BUS) as local:
+        state: Any = local.sdo[STATE]
+        state.raw = READY
+        with connect(BUS, 1, 1_000_000) as found:
+            found.require(5.0)
+            found.sdo.RESPONSE_TIMEOUT = 0.2
+            yield found
 
 
 class Spoilt:

@@ -16,6 +16,7 @@ from canopen import SdoAbortedError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from canopen_server import canopen_server
 from hodograph.bus.address import BusAddress
 from hodograph.bus.goto import (
     SHORTEST_MOVE_MM,
@@ -27,7 +28,6 @@ from hodograph.bus.goto import (
 )
 from hodograph.bus.sdo.controller import OFF, Controller, connect
 from hodograph.config import Machine, load_machine
-from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import PlanError, RefusedError
 from hodograph.machine_limits import program_limits
 from hodograph.native import NativeLimits, NativeProgram
@@ -96,16 +96,10 @@ def test_outside_the_travel() -> None:
 
 @contextmanager
 def fake_controller() -> Iterator[tuple[Controller, canopen.LocalNode]]:
-    """A node with the controller's dictionary and none of its behaviour, and the client that reads it."""
+    """The server, and the client that reads it."""
     bus = BusAddress("virtual", "goto")
-    network = canopen.Network()
-    network.connect(interface=bus.interface, channel=bus.channel)
-    try:
-        node = network.create_node(1, str(CONTROLLER_EDS))
-        with connect(bus, 1, 1_000_000) as controller:
-            yield controller, node
-    finally:
-        network.disconnect()
+    with canopen_server(bus) as node, connect(bus, 1, 1_000_000) as controller:
+        yield controller, node
 
 
 def test_an_override_of_0_is_said() -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 import canopen
 import pytest
 
+from canopen_server import canopen_server
 from hodograph.bus.address import BusAddress
 from hodograph.bus.sdo.controller import Controller, connect
-from hodograph.data import CONTROLLER_EDS
 from hodograph.errors import BusError
 
 BUS = BusAddress("virtual", "identity")
@@ -21,13 +21,9 @@ BUS = BusAddress("virtual", "identity")
 
 @pytest.fixture
 def node() -> Iterator[canopen.LocalNode]:
-    """Python canopen's own server, with our EDS, in the controller's place."""
-    network = canopen.Network()
-    network.connect(interface=BUS.interface, channel=BUS.channel)
-    local = network.create_node(1, str(CONTROLLER_EDS))
-    local.sdo[0x2002].raw = 1
-    yield local
-    network.disconnect()
+    with canopen_server(BUS) as local:
+        local.sdo[0x2002].raw = 1
+        yield local
 
 
 @pytest.fixture

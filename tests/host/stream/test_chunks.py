@@ -35,7 +35,12 @@ from hodograph.stream.chunks import FEWEST_SHARED_PIECES, RAMP_S, SectionChunks
 from hodograph.stream.geometry import Block, StreamPath, blocks_from, with_joints
 from hodograph.stream.plan import JobFiles, JobPlan, Place, PlanRests
 from hodograph.stream.reading import StreamReader
-from hodograph.stream.simulation import concatenated, from_rest_to_rest, simulate_chunks
+from hodograph.stream.simulation import (
+    StreamedMotion,
+    concatenated,
+    from_rest_to_rest,
+    simulate_chunks,
+)
 from hodograph.stream.tails import Tails
 from hodograph.stream.windows import SectionFeed
 from hodograph.toolpath.files import ReadOptions
@@ -92,8 +97,9 @@ def _verify(
     shared: int | None = None,
     *,
     rests: bool = False,
-) -> None:
+) -> StreamedMotion:
     """Both checks of every chunk, the shared parts, and one program of all, whose setpoints are those of the stream.
+    Returns the motion of the stream.
 
     `rests`: where the axes rest between two chunks, the second one may be taken over at that rest, then a longer one.
     """
@@ -120,13 +126,14 @@ def _verify(
     assert sum(run.takeovers) == len(chunks) - 1
     if rests and run.takeovers[1]:
         assert run.ticks >= sum(program.ticks for program in programs)
-        return
+        return run
     (program,) = programs
     _, setpoints = program.setpoints("fixed", machine.counts_per_mm)
     # A chunk that shares little may be shorter than a slice of the simulation, which takes it over at its rest.
     assert shared is not None or run.takeovers == (len(chunks) - 1, 0)
     assert run.ticks == program.ticks
     assert run.setpoints_sha256 == hashlib.sha256(setpoints.tobytes()).hexdigest()
+    return run
 
 
 @pytest.mark.parametrize(

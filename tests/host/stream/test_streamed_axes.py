@@ -149,8 +149,7 @@ def test_example_takes_the_time_of_the_whole_plan(machine: Machine) -> None:
     file = ROOT / "examples" / "toolpaths" / "five_axes.ngc"
     (chunks,) = _sections(file, machine)
     # The controller would refuse the first ones with more.
-    _verify(chunks, machine, shared=FEWEST_SHARED_PIECES)
-    run = simulate_chunks(chunks, _limits(machine), "fixed", machine.counts_per_mm)
+    run = _verify(chunks, machine, shared=FEWEST_SHARED_PIECES)
     assert run.takeovers == (len(chunks) - 1, 0)
     (section,) = load_job(file, machine).sections
     assert concatenated(chunks).duration_s < 1.005 * section.pipeline.plan.duration_s
