@@ -180,11 +180,14 @@ static struct layout layout_of_next(void)
 static struct program_fault fault_with_bit(uint32_t at)
 {
     struct program_fault fault;
+    uint8_t *sound = malloc(chain.sizes[1]);
+    TEST_ASSERT_NOT_NULL(sound);
+    memcpy(sound, chain.bytes[1], chain.sizes[1]);
     chain.bytes[1][at] ^= 1u;
     chunked_seal(chain.bytes[1], chain.sizes[1]);
     (void)check_chunk(1, &fault);
-    chain.bytes[1][at] ^= 1u;
-    chunked_seal(chain.bytes[1], chain.sizes[1]);
+    memcpy(chain.bytes[1], sound, chain.sizes[1]);
+    free(sound);
     return fault;
 }
 
