@@ -101,10 +101,6 @@ def test_a_source_and_its_header_are_one_module(tmp_path: Path) -> None:
     assert "circle: firmware/core/nearest -> firmware/core/search" in found
 
 
-def test_this_tree_has_none() -> None:
-    assert check_directions.main([]) == 0
-
-
 def test_the_tables_have_no_circle() -> None:
     """Else the rule against circles between packages would rest on files alone."""
     for rules in (check_directions.C_RULES, check_directions.PYTHON_RULES):

@@ -45,7 +45,3 @@ def found(root: Path, *more: str) -> list[str]:
 )
 def test_names_that_are_taken(more: tuple[str, ...], named: list[str], tmp_path: Path) -> None:
     assert found(tmp_path, *more) == named
-
-
-def test_this_tree_has_none() -> None:
-    assert list(breaches(ROOT)) == []

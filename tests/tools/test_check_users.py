@@ -158,7 +158,3 @@ def test_users_and_effects_in_the_first_screen(
     ]
     assert len(lines) == len(lacks)
     assert all(f"does not name the {word}" in line for line, word in zip(lines, lacks, strict=True))
-
-
-def test_the_tree_is_clean(capsys: pytest.CaptureFixture[str]) -> None:
-    assert check_users.main([]) == 0, capsys.readouterr().out
