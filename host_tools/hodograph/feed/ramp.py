@@ -164,6 +164,7 @@ def make_shape(request: FeedRequest, feed_mm_s: float) -> Shape:
     return Shape(ramp)
 
 
+@lru_cache(maxsize=64)
 def optimise_n_c(feed_mm_s: float, time_s: float) -> Shape:
     """The exponential ramp of least peak jerk, by the paper's search; the plain quintic if none is better."""
 
