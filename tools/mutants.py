@@ -6,7 +6,8 @@ Run by `make mutants`. Starts compilers and tests; writes to BUILD/mutation only
 
 Plants one mistake at a time (a comparison turned round, a constant one off, a statement left out) in the
 sources of an area and runs the area's tests: C sources with the unit tests that link them, under the
-sanitizers; Python modules in a copy of the tree with the tests of their folder. A mistake that no test
+sanitizers; Python modules, and C sources of the native module that no unit test links, in a copy of the
+tree with Python tests. A mistake that no test
 notices has survived: it is printed with its place. Mistakes are a random sample that depends on the
 seed alone. What is known from an earlier run (BUILD/mutation/AREA.jsonl) is not tried again for as long
 as the source stays as it is; --again tries those that survived once more. Exit status 0 whatever
@@ -110,9 +111,9 @@ def main() -> int:
     c_tests = None
     lines = []
     for area in areas:
-        if area.in_c and c_tests is None:
+        if not area.tests and c_tests is None:
             c_tests = CTests(ROOT, (ROOT / options.build).resolve())
-        lines.append(summary(area.name, run_area(area, options, c_tests if area.in_c else None)))
+        lines.append(summary(area.name, run_area(area, options, None if area.tests else c_tests)))
         print(lines[-1], flush=True)
     print("\n".join(["", *lines]) if len(lines) > 1 else "")
     return 0

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Planted mistakes: each kind is found in a small source, at its line, and a known outcome is kept. Run by pytest;
-writes to temporary folders.
+starts the compiler, and writes to temporary folders.
 """
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,9 +12,11 @@ import pytest
 import mutants
 from mutation import c_sites, python_sites
 from mutation.areas import AREAS, Area
+from mutation.native_module import NativeModule
 from mutation.outcome import KILLED, SURVIVED, Ledger, Outcome
 from mutation.sites import Mutant
 
+ROOT = Path(__file__).resolve().parents[2]
 C_SOURCE = """\
 /* a < b && 7 */
 #define MOST 12
@@ -154,3 +158,22 @@ def test_every_area_has_sources_and_tests() -> None:
         assert area.files(mutants.ROOT), area.name
         for test in area.tests:
             assert (mutants.ROOT / test).exists(), test
+
+
+def test_a_mistake_is_planted_in_the_native_module(tmp_path: Path) -> None:
+    module = tmp_path / "tree/host_tools/hodograph/native/_native.abi3.so"
+    module.parent.mkdir(parents=True)
+    native = NativeModule(ROOT, ROOT / "build", tmp_path / "tree")
+    native.work = tmp_path
+    path = "sim/offline/stop_usage.c"
+    source = (ROOT / path).read_text(encoding="utf-8")
+    changed = source.replace("share < 0.0", "share >= 0.0")
+    assert native.plant(path, changed) is True
+    asked = "import cffi, sys; lib = cffi.FFI().dlopen(sys.argv[1])"
+    subprocess.run([sys.executable, "-c", asked, str(module)], check=True)
+    native.restore()
+    sound = (ROOT / "host_tools/hodograph/native/_native.abi3.so").read_bytes()
+    assert module.read_bytes() == sound
+    assert native.plant(path, source.replace("/* SPDX", "/*  SPDX")) is False
+    assert native.plant(path, changed + "}") is None
+    assert module.read_bytes() == sound

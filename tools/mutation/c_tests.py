@@ -116,6 +116,8 @@ class CTests:
         words = ["-o", str(self.work / name), str(compiled), str(self.objects / "unity.o")]
         words += [*support, "-Wl,--no-as-needed", *self.libraries, *boards]
         words += ["-Wl,-rpath," + str(self.work), "-rdynamic", "-Wl,--allow-shlib-undefined"]
+        # A test may replace functions of a module. Its own come first.
+        words += ["-Wl,-z,muldefs"]
         self._compile([*words, "-Wl,-z,lazy", "-lm", "-lpthread"])
 
     def _make_shared(self, name: str, words: list[str]) -> None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""Runs an area's Python tests with a mistake in a copy of the tree. Used by tools/mutants. Starts processes; writes to
-BUILD/mutation only.
+"""Runs an area's Python tests with a mistake in a copy of the tree: in a module of Python, or in a C source of the
+native module. Used by tools/mutants. Starts processes; writes to BUILD/mutation only.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import time
 from pathlib import Path
 
 from mutation.areas import Area
-from mutation.outcome import INVALID, KILLED, SURVIVED
+from mutation.native_module import NativeModule
+from mutation.outcome import INVALID, KILLED, SAME, SURVIVED
 from mutation.sites import Mutant
 
 _TIMED = re.compile(r"^([\d.]+)s (?:call|setup|teardown) +([^\s:]+)::", re.MULTILINE)
@@ -29,6 +30,7 @@ class PythonTests:
         self.area = area
         self.tree = build / "mutation" / "tree"
         _copy(root, self.tree)
+        self.native = NativeModule(root, build, self.tree)
         began = time.monotonic()
         status, said = self._pytest([*area.tests, "--durations=0", "-vv"], 1200.0)
         if status != 0:
@@ -40,6 +42,8 @@ class PythonTests:
     def try_out(self, mutant: Mutant, source: str) -> tuple[str, str]:
         """The outcome of the mutant, and the test that found it."""
         changed = mutant.applied(source)
+        if mutant.path.endswith(".c"):
+            return self._try_in_c(mutant.path, changed)
         try:
             compile(changed, mutant.path, "exec")
         except SyntaxError:
@@ -49,6 +53,16 @@ class PythonTests:
             by = self._run()
         finally:
             self._write(mutant.path, source)
+        return (KILLED, by) if by else (SURVIVED, "")
+
+    def _try_in_c(self, path: str, changed: str) -> tuple[str, str]:
+        planted = self.native.plant(path, changed)
+        if not planted:
+            return (INVALID if planted is None else SAME), ""
+        try:
+            by = self._run()
+        finally:
+            self.native.restore()
         return (KILLED, by) if by else (SURVIVED, "")
 
     def _write(self, path: str, text: str) -> None:
