@@ -150,8 +150,8 @@ def aside(pipeline: Pipeline, places: NDArray[np.float64]) -> NDArray[np.float64
     curve = pipeline.curve
     table = np.asarray(curve.axes_point(np.linspace(0.0, curve.length_mm, STEPS)))
     worst = np.zeros(6)
-    nearest = cKDTree(table[:, :3]).query(places[:, :3])[1]
-    for place, near in zip(places, nearest.tolist(), strict=True):
+    nearest = np.asarray(cKDTree(table[:, :3]).query(places[:, :3])[1])
+    for place, near in zip(places, nearest, strict=True):
         first, second = table[max(near - 1, 0)], table[min(near + 1, STEPS - 1)]
         chord = second - first
         share = float(np.dot(place[:3] - first[:3], chord[:3]) / np.dot(chord[:3], chord[:3]))
