@@ -32,6 +32,7 @@ from hodograph.cli.main import main
 from hodograph.errors import BusError, RefusedError
 from hodograph.pipeline import load_pipeline
 from hodograph.program.image import LARGEST_BANK, RECORD_BYTES
+from marks import long
 
 ALPHA = EXAMPLES / "alpha.toml"
 LIMIT_S = 60.0
@@ -144,7 +145,7 @@ def children_of(process: int) -> list[int]:
     return found
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.1, 1.0, 20.0])
+@pytest.mark.parametrize("after_s", [0.0, 0.1, 1.0, long(20.0)])
 def test_interrupt_stops_the_axes_of_others(
     controller: Controller, slow_run: Start, clock: VirtualClock, after_s: float
 ) -> None:

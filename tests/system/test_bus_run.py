@@ -49,6 +49,7 @@ def test_two_files_and_a_report(capsys: pytest.CaptureFixture[str], tmp_path: Pa
         assert run["encoders_sha256"] == simulated["encoders_sha256"]
     html = (tmp_path / "report" / "report.html").read_text()
     assert "recorded on the bus" in html
+    assert "Bus load" in html
     assert html.count("figure of the search: as for alpha") == 1
     assert not (tmp_path / "report" / "heart_search.png").exists()
     assert found[0]["encoders_sha256"] in html

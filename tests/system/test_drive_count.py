@@ -18,6 +18,7 @@ from hodograph.bus.sdo.objects import ACTUAL, TARGET
 from hodograph.bustime import axis_choice, drive_pdos
 from hodograph.cli.main import main
 from hodograph.data import DRIVE_EDS
+from marks import long
 from runs import same_motion
 
 ALPHA = str(EXAMPLES / "alpha.toml")
@@ -39,18 +40,22 @@ def machine_of(folder: Path, drives: int, period_us: int) -> Path:
     return file
 
 
-@pytest.mark.parametrize(("drives", "period_us"), [(3, 1000), (6, 2000)])
+@pytest.mark.parametrize(
+    ("drives", "period_us", "is_reported"),
+    [(3, 1000, False), (6, 2000, False), long(6, 2000, True)],
+)
 def test_the_plane_moves_as_with_two_drives(
     hub: LocalHub,
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     drives: int,
     period_us: int,
+    is_reported: bool,
 ) -> None:
     two = machine_of(tmp_path, 2, period_us)
     many = machine_of(tmp_path, drives, period_us)
     simulated = result(capsys, "simulate", ALPHA, "--machine", str(two), "--json")
-    report = ("--report", str(tmp_path / "report")) if drives == 6 else ()
+    report = ("--report", str(tmp_path / "report")) if is_reported else ()
     recorded = result(capsys, "run", ALPHA, "--machine", str(many), "--json", *report)
     assert same_motion(recorded, simulated)
     load = recorded["bus_load"]

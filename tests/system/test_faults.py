@@ -13,6 +13,7 @@ from hodograph.cli.main import main
 from hodograph.data import EXAMPLES
 from hodograph.faults.case_runner import run_campaign
 from hodograph.faults.scenario import find_scenarios
+from marks import long
 
 pytestmark = pytest.mark.usefixtures("one_core")
 
@@ -38,7 +39,7 @@ SOME = [
     "optimal-heartbeat-lost",
     "rpdo1-corrupt-target",
     "rpdo1-lost",
-    "space-drive-fault",
+    long("space-drive-fault"),
     "sync-lost",
     "tpdo1-late",
     "tpdo1-lost",

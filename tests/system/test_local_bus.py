@@ -14,6 +14,7 @@ import pytest
 
 from hodograph.bus.processes import find_program
 from lateness import Lateness
+from marks import long
 
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
@@ -52,14 +53,17 @@ def test_alpha_on_the_other_cores(one_core: None) -> None:
     assert same_bits(done), done.stderr
 
 
-def test_the_float_kernel_in_the_interrupt_of_the_boards(one_core: None, tmp_path: Path) -> None:
+@pytest.mark.parametrize("boards", [("an386",), long(("an500", "an505"))])
+def test_the_float_kernel_in_the_interrupt_of_the_boards(
+    one_core: None, tmp_path: Path, boards: tuple[str, ...]
+) -> None:
     """The FPU's registers are stacked and restored around each tick: any that was not would change a bit."""
     machine = (EXAMPLES / "machines/paper_alpha.toml").read_text()
     machine = machine.replace('kernel = "fixed"', 'kernel = "float"')
     (tmp_path / "machine.toml").write_text(machine.replace("../drives", str(EXAMPLES / "drives")))
     path = (EXAMPLES / "alpha.toml").read_text().replace("machines/paper_alpha", "machine")
     (tmp_path / "alpha.toml").write_text(path)
-    done = in_the_loop(tmp_path / "alpha.toml", "fifo", "an386", "an500", "an505")
+    done = in_the_loop(tmp_path / "alpha.toml", "fifo", *boards)
     assert same_bits(done), done.stderr
 
 

@@ -5,7 +5,6 @@ and a machine on a local bus, and writes to temporary folders.
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -82,7 +81,7 @@ def job(tmp_path: Path) -> tuple[str, str]:
     return str(machine), str(path)
 
 
-def test_a_job_of_five_axes(
+def test_a_job_of_five_axes_and_a_page_that_joins_in_mid_run(
     hub: LocalHub,
     clock: VirtualClock,
     browser: Browser,
@@ -95,12 +94,13 @@ def test_a_job_of_five_axes(
         page.wait(f"{STATE} === 'off'")
         page.js(LABELS)
         assert main(["goto", path]) == 0
-        assert main(["override", "30"]) == 0
+        assert main(["override", "20"]) == 0
         page.wait(f"document.querySelector('#plane-canvas').dataset.marks === {MARKS!r}")
         page.click("[data-command=start]")
         page.wait(f"{STATE} === 'running'")
         page.wait(f"{AXES}.every(c => Number(c.dataset.points) > 200)")
         _held_and_resumed(live, capsys)
+        _joins_in_mid_run(live, browser)
         page.wait(f"{STATE} === 'ready'")
         _labels_are_inside(page)
         # those of the move to the start are drawn on the path, but have no arc length on it
@@ -135,27 +135,17 @@ def _labels_are_inside(page: Page) -> None:
         assert 0 <= left < right <= width, text
 
 
-def test_a_page_that_joins_in_mid_run(
-    hub: LocalHub, clock: VirtualClock, browser: Browser, job: tuple[str, str]
-) -> None:
-    machine, path = job
-    with contextlib.ExitStack() as stack:
-        first = stack.enter_context(monitored(hub.address, clock, browser, machine))
-        stack.enter_context(rig(first, machine))
-        first.page.wait(f"{STATE} === 'off'")
-        assert main(["goto", path]) == 0
-        assert main(["override", "20"]) == 0
-        assert main(["start"]) == 0
-        first.page.wait(f"{AXES}.length === 2 && {AXES}.every(c => Number(c.dataset.points) > 100)")
-        page = browser.open(first.url)
-        page.meanwhile = first.page.meanwhile
-        page.wait(f"{STATE} === 'running'")
-        page.wait(f"document.querySelector('#plane-canvas').dataset.marks === {MARKS!r}")
-        page.wait(f"{AXES}.every(c => Number(c.dataset.planned) > 1000)")
-        page.click("[data-command=hold]")
-        page.wait(f"{STATE} === 'held'")
-        drawn = page.js("Number(document.querySelector('#plane-canvas').dataset.points)")
-        assert page.js(f"{AXES}.every(c => Number(c.dataset.points) < {drawn} - 100)")
-        page.click("[data-command=resume]")
-        page.wait(f"{STATE} === 'ready'")
-        assert page.complaints == []
+def _joins_in_mid_run(live: Live, browser: Browser) -> None:
+    """A page that is opened now has the whole path, and draws what it has seen."""
+    page = browser.open(live.url)
+    page.meanwhile = live.page.meanwhile
+    page.wait(f"{STATE} === 'running'")
+    page.wait(f"document.querySelector('#plane-canvas').dataset.marks === {MARKS!r}")
+    page.wait(f"{AXES}.every(c => Number(c.dataset.planned) > 1000)")
+    page.click("[data-command=hold]")
+    page.wait(f"{STATE} === 'held'")
+    drawn = page.js("Number(document.querySelector('#plane-canvas').dataset.points)")
+    assert page.js(f"{AXES}.every(c => Number(c.dataset.points) < {drawn} - 100)")
+    page.click("[data-command=resume]")
+    page.wait(f"{STATE} === 'ready'")
+    assert page.complaints == []

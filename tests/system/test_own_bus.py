@@ -64,6 +64,12 @@ def simulated_machine(environment: Mapping[str, str]) -> Iterator[subprocess.Pop
             machine.send_signal(signal.SIGINT)
 
 
+@pytest.fixture(scope="module")
+def simulated() -> str:
+    """The hash of the setpoints that `simulate` gives."""
+    return setpoints(hodograph(os.environ, "simulate", str(ALPHA), "--json"))
+
+
 def setpoints(kernel_run: subprocess.CompletedProcess[str]) -> str:
     assert kernel_run.returncode == 0, kernel_run.stderr
     return str(json.loads(kernel_run.stdout)["setpoints_sha256"])
@@ -86,10 +92,11 @@ def test_a_long_folder_for_temporary_files_is_left_out(
         parse_address(f"local:{folder}/bus")
 
 
-def test_run_serves_a_bus_of_its_own_and_says_so(environment: Mapping[str, str]) -> None:
+def test_run_serves_a_bus_of_its_own_and_says_so(
+    environment: Mapping[str, str], simulated: str
+) -> None:
     run = hodograph(environment, "run", str(ALPHA), "--json", "--pace", "fast")
-    simulated = hodograph(environment, "simulate", str(ALPHA), "--json")
-    assert setpoints(run) == setpoints(simulated)
+    assert setpoints(run) == simulated
     assert "using the local bus local:" in run.stderr
 
 
@@ -154,13 +161,12 @@ def test_a_bus_whose_hub_was_killed_is_served_again(tmp_path: Path) -> None:
     assert file.read_text() == "not a bus"
 
 
-def test_demo(environment: Mapping[str, str], tmp_path: Path) -> None:
+def test_demo(environment: Mapping[str, str], simulated: str, tmp_path: Path) -> None:
     """Live page, run and report, with the setpoints of `simulate`."""
     demo = hodograph(
         environment, "demo", "--no-browser", "--json", "--output", str(tmp_path / "out")
     )
-    simulated = hodograph(environment, "simulate", str(ALPHA), "--json")
-    assert setpoints(demo) == setpoints(simulated)
+    assert setpoints(demo) == simulated
     reported = json.loads(demo.stdout)
     assert reported["page"].startswith("http://127.0.0.1:")
     assert Path(reported["report"]).stat().st_size > 100_000

@@ -19,6 +19,7 @@ from commands import result
 from hodograph.bus.sdo.controller import OFF, RUNNING, connect
 from hodograph.bustime import machine_bus_time
 from hodograph.config import load_machine
+from marks import long
 from runs import same_motion
 
 pytestmark = pytest.mark.bus
@@ -55,7 +56,7 @@ def test_the_load_is_what_the_model_says(
         assert 0.95 * least <= classes[name]["percent"] / nominal <= 1.05 * most, name
 
 
-@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+@pytest.mark.parametrize(("number", "status"), [long(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_nothing_is_left_running(alpha_at: MakeAlpha, number: signal.Signals, status: int) -> None:
     command = [sys.executable, "-m", "hodograph", "run", str(alpha_at(2))]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as child:

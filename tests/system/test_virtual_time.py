@@ -32,6 +32,7 @@ from hodograph.data import EXAMPLES
 from hodograph.errors import BusError
 from hodograph.faults.case_runner import run_case
 from hodograph.faults.scenario import draw, find_scenarios
+from marks import long
 
 STOP_S = 1.0
 
@@ -93,7 +94,7 @@ def busy_processes(count: int) -> Iterator[None]:
             child.wait()
 
 
-@pytest.mark.parametrize("scenario", ["tpdo1-lost", "kill-host"])
+@pytest.mark.parametrize("scenario", [long("tpdo1-lost"), "kill-host"])
 def test_the_same_bytes_with_any_process_stopped(scenario: str) -> None:
     plain = bus_log(scenario)
     assert plain.count(b"\n") > 5000
