@@ -310,7 +310,7 @@ ENDING = "F6000\nM64 P0\nG1 X6\nG4 P3\nM64 P1\nG4 P1\nM65 P0\nG4 P1\nM30\n"
 """With a dwell after the last move, and outputs after the dwell."""
 
 
-@pytest.mark.parametrize(("files", "times"), [(1, 1), long(2, 2)])
+@pytest.mark.parametrize(("files", "times"), [long(1, 1), (2, 2)])
 def test_after_a_stop_in_the_last_dwell_the_rest_of_the_file_is_executed(
     bench: Bench, clock: VirtualClock, machine: Path, tmp_path: Path, files: int, times: int
 ) -> None:

@@ -7,6 +7,7 @@ and writes to temporary folders.
 from __future__ import annotations
 
 import random
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +31,6 @@ LIMITS: dict[str, Limits] = dict.fromkeys(("x", "y", "z"), (60.0, 600.0, 20000.0
     "b": (60.0, 600.0, 20000.0),
     "c": (90.0, 900.0, 30000.0),
 }
-SWINGS = (17.0, 17.0, 17.0, 14.0, 20.0, 34.0)
-"""Of each axis, in mm and degrees: long enough to reach its velocity."""
 RESERVE = 0.2
 COMMANDS = 25
 STEPS = 400_000
@@ -40,14 +39,30 @@ ASIDE = np.array([2e-6] * 3 + [5e-5] * 3)
 """Counts of 1 nm and 1e-5 degrees, the kernel, and the chords of the table."""
 
 
-def swings() -> list[list[float]]:
-    """Each axis goes forth in turn, by two steps, while the others drift."""
+@dataclass(frozen=True)
+class Swings:
+    """A path on which each axis swings in turn, while the others drift by up to `drift`; mm and degrees.
+
+    most    way of each axis, long enough to reach its velocity
+    shares  of this way, of each step
+    """
+
+    most: tuple[float, ...]
+    shares: tuple[float, ...]
+    drift: float
+
+
+FORTH = Swings((17.0, 17.0, 17.0, 14.0, 20.0, 34.0), (0.5, 0.5), 0.5)
+FORTH_AND_BACK = Swings((24.0, 24.0, 24.0, 20.0, 28.0, 48.0), (0.5, 0.5, -0.35), 1.0)
+
+
+def points_of(swings: Swings) -> list[list[float]]:
     rng = random.Random(5)
     at, points = [0.0] * 6, [[0.0] * 6]
-    for k, swing in enumerate(SWINGS):
-        for share in (0.5, 0.5):
-            at = [one + rng.uniform(-0.5, 0.5) for one in at]
-            at[k] += share * swing
+    for k, most in enumerate(swings.most):
+        for share in swings.shares:
+            at = [one + rng.uniform(-swings.drift, swings.drift) for one in at]
+            at[k] += share * most
             if k >= 3:  # the tool moves on
                 at[0] += 2.0
                 at[1] += 1.5
@@ -56,11 +71,14 @@ def swings() -> list[list[float]]:
 
 
 @pytest.fixture
-def pipeline(tmp_path: Path) -> Pipeline:
+def pipeline(request: pytest.FixtureRequest, tmp_path: Path) -> Pipeline:
+    """Of the swings that the parameter of a test gives."""
     machine = six_axis_machine(tmp_path, LIMITS, stop_time_ms=5000)
-    return load_pipeline(six_axis_path(tmp_path, machine, swings()), allow_space=True)
+    path = six_axis_path(tmp_path, machine, points_of(request.param))
+    return load_pipeline(path, allow_space=True)
 
 
+@pytest.mark.parametrize("pipeline", [FORTH, long(FORTH_AND_BACK)], indirect=True)
 def test_the_plan_uses_all_limits_of_all_axes(pipeline: Pipeline) -> None:
     setpoints = NativeProgram(pipeline.image).setpoints("fixed", pipeline.machine.path_counts)[1]
     used = shares(pipeline, setpoints)
@@ -81,7 +99,11 @@ def shares(pipeline: Pipeline, targets: NDArray[np.int32]) -> NDArray[np.float64
     return out
 
 
-@pytest.mark.parametrize("seed", [0, *(long(seed) for seed in range(1, 6))])
+@pytest.mark.parametrize(
+    ("pipeline", "seed"),
+    [(FORTH, 0), *(long(FORTH_AND_BACK, seed) for seed in range(6))],
+    indirect=["pipeline"],
+)
 def test_commands_at_any_instant(make_bench: MakeBench, pipeline: Pipeline, seed: int) -> None:
     bench = make_bench(file=pipeline.machine.file)
     bench.controller.upload(pipeline.image)
