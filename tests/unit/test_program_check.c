@@ -11,6 +11,8 @@
 #include "golden.h"
 #include "unity.h"
 
+enum { PREIMAGE_AT = 24 }; /* in a planar segment; docs/reference/protocol.md 1.2 */
+
 void setUp(void)
 {
 }
@@ -96,6 +98,49 @@ static void test_feed_bound_is_tight(void)
     golden_open(&p, "alpha_quintic.hdgp");
     TEST_ASSERT_UINT32_WITHIN(20, 100000, least_feed_limit(&p, golden_no_limits()));
     golden_close(&p);
+}
+
+/* The code of the line with a straight first segment whose preimage is u_0, u_1, u_2. Its speed then has the Bernstein
+ * coefficients u_0^2, u_0 u_1, (u_0 u_2 + 2 u_1^2) / 3, u_1 u_2, u_2^2. */
+static int code_with_preimage(double u_0, double u_1, double u_2)
+{
+    const struct program_limits limits = golden_no_limits();
+    const double u[3] = {u_0, u_1, u_2};
+    struct program p;
+    struct program_fault fault;
+    golden_open(&p, "line.hdgp");
+    uint8_t *a = (uint8_t *)p.image + p.header.header_size + PREIMAGE_AT;
+    for (int k = 0; k < 3; k++) {
+        const int64_t u_q44 = (int64_t)(u[k] * 0x1p44);
+        memcpy(a + 16 * k, &u_q44, 8);
+        memset(a + 16 * k + 8, 0, 8);
+    }
+    const int code = program_check(&p, &limits, &fault);
+    if (code == PROGRAM_ERR_SIGMA || code == PROGRAM_ERR_SIGMA_RATIO) {
+        TEST_ASSERT_EQUAL_UINT32(0, fault.index);
+    }
+    golden_close(&p);
+    return code;
+}
+
+static void expect_ratio_checked(double u_0, double u_1, double u_2, double passing)
+{
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIGMA_RATIO, code_with_preimage(u_0, u_1, u_2));
+    const int code = code_with_preimage(u_0 == 1.0 ? 1.0 : passing, u_1 == 1.0 ? 1.0 : passing,
+                                        u_2 == 1.0 ? 1.0 : passing);
+    TEST_ASSERT_NOT_EQUAL(PROGRAM_ERR_SIGMA_RATIO, code);
+    TEST_ASSERT_NOT_EQUAL(PROGRAM_ERR_SIGMA, code);
+}
+
+/* The greatest coefficient of the speed is at most twice the least one, wherever it is. */
+static void test_speed_ratio_is_tight(void)
+{
+    expect_ratio_checked(1.415, 1.0, 1.0, 1.414);
+    expect_ratio_checked(1.0, 1.0, 1.415, 1.414);
+    expect_ratio_checked(1.0, 1.5812, 1.0, 1.5811); /* that in the middle */
+    expect_ratio_checked(1.0, 0.4999, 1.0, 0.5001);
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIGMA, code_with_preimage(1.0, -0.5, 1.0));
+    TEST_ASSERT_EQUAL_INT(PROGRAM_ERR_SIGMA, code_with_preimage(1.0, 0.0, 1.0));
 }
 
 /* The alpha starts at its least x. */
@@ -206,6 +251,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_golden_programs);
     RUN_TEST(test_feed_bound_is_tight);
+    RUN_TEST(test_speed_ratio_is_tight);
     RUN_TEST(test_travel_is_tight);
     RUN_TEST(test_a_check_attends_to_other_work_all_the_time);
     RUN_TEST(test_any_flipped_bit_is_refused);
