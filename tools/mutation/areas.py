@@ -53,6 +53,7 @@ AREAS = (
             "tests/host/feed/test_optimal.py",
             "tests/host/feed/test_optimal_random.py",
             "tests/host/program/test_stop_planning.py",
+            "tests/host/program/test_stop_rows.py",
             "tests/host/program/test_stops.py",
             "tests/host/simulate",
         ),
