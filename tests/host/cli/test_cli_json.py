@@ -144,7 +144,7 @@ def test_feed_of_a_dense_path_is_that_of_its_program(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     """Short segments lower the feed; `feed` has to say so, not only `simulate`."""
-    points = [[0.05 * k, float(2.0 * np.sin(0.025 * k))] for k in range(120)]
+    points = [[0.05 * k, float(2.0 * np.sin(0.025 * k))] for k in range(60)]
     file = tmp_path / "dense.toml"
     file.write_text(
         f"[path]\nclosed = false\ncontrol_points = {points}\n[feed]\nnominal_mm_s = 200\n"

@@ -200,7 +200,7 @@ def plans(draw: st.DrawFn) -> FeedPlan:
         raise
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(plans())
 def test_pieces_join_and_end_exactly_and_keep_the_rules_of_the_format(plan: FeedPlan) -> None:
     join_and_end_exactly(plan)

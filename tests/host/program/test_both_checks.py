@@ -139,7 +139,7 @@ COMPILED = given(
 
 
 @example("exponential", 19.0, 1.0, 5, 1000, 0)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=12, deadline=None)
 @COMPILED
 def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us, seed) -> None:
     accepted(profile, feed, ramp, degree, period_us, seed)

@@ -35,6 +35,7 @@ from hodograph.spline.spatial.quaternion import (
     turned,
 )
 from hodograph.spline.spatial.system import SpaceSystem, cubic_end, tangent_end
+from marks import long
 
 
 def lengths(p, closed):
@@ -329,9 +330,10 @@ def test_bad_points_are_refused(arguments, words):
         spatial_through_points(*arguments)
 
 
-def test_wild_points_are_solved_or_refused_naming_the_span():
+@pytest.mark.parametrize("seeds", [range(25), long(range(25, 85))])
+def test_wild_points_are_solved_or_refused_naming_the_span(seeds):
     refusals, results = [], []
-    for seed in range(60):
+    for seed in seeds:
         try:
             results.append(spatial_through_points(walk(seed, np.pi, 3.0), False, knots="uniform"))
         except PlanError as error:

@@ -388,7 +388,7 @@ def test_pieces_that_the_proof_refuses_are_slower_and_allow_less_override(
 ) -> None:
     """The proof of the axis limits may find more between two samples than the planner. Here it finds it everywhere."""
     file = tmp_path / "walk.ngc"
-    file.write_text(_walk(0, 8, 2.0, 0.5))
+    file.write_text(_walk(0, 6, 2.0, 0.5))
     (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
     made = SectionChunks(machine, "walk", section.blocks, 1, MOST)
     limits = made._limits

@@ -193,17 +193,18 @@ def test_paths_with_outputs_about_a_turn(tmp_path: Path, five: Machine) -> None:
 
 
 def test_all_axes_meet(tmp_path: Path, five: Machine) -> None:
-    for old, new, words in (
+    for begin, old, new, words in (
         (
+            0,
             "[[22, 32, 10, 0, 0]",
             "[[22, 32, 10, 0, 1]",
             r"path 2 begins 1 deg of c from the end of path 1",
         ),
-        ("[[22, 32, 10, 12, 120]", "[[22, 32, 11, 12, 120]", r"path 3 begins 1 mm of z"),
+        (1, "[[22, 32, 10, 12, 120]", "[[22, 32, 11, 12, 120]", r"path 3 begins 1 mm of z"),
     ):
         file = tmp_path / "facets.toml"
         file.write_text(FACETS.read_text().replace(old, new, 1))
-        made = PathsJob(file, five, 1, CHUNK_BYTES, True).chunks(0, 0)
+        made = PathsJob(file, five, 1, CHUNK_BYTES, True).chunks(begin, 0)
         with pytest.raises(InputError, match=words):
             list(made)
 
