@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -20,7 +21,7 @@ from hodograph.spline import line
 Q40 = 1 << 40
 Q44 = 1 << 44
 COMPONENTS = 4
-_SHARES = (Fraction(1), Fraction(1), Fraction(1, 3), Fraction(1), Fraction(1))
+_DIVISORS = (1, 1, 3, 1, 1)
 
 
 @dataclass
@@ -42,16 +43,17 @@ class Segment:
 
     def hodograph(self) -> list[list[Fraction]]:
         """Bernstein coefficients (4 of 5, mm) of x', y', z' and sigma, exact."""
-        rows = []
-        for form in (_x, _y, _z, _sigma):
-            e = [Fraction(0)] * 5
-            for i, j, weight, to in (
-                (0, 0, 1, 0), (0, 1, 1, 1), (0, 2, 1, 2), (1, 1, 2, 2), (1, 2, 1, 3), (2, 2, 1, 4),
-            ):  # fmt: skip
-                u, v = ([row[k] for row in self.a] for k in (i, j))
-                e[to] += weight * Fraction(form(u, v), Q44 * Q44)
-            rows.append([c * share for c, share in zip(e, _SHARES, strict=True)])
-        return rows
+        return [self._coefficients(form) for form in (_x, _y, _z, _sigma)]
+
+    def _coefficients(self, form: Callable[[list[int], list[int]], int]) -> list[Fraction]:
+        """Of one of them. Sums are of integers, which takes a small part of the time of fractions."""
+        columns = [[row[k] for row in self.a] for k in range(3)]
+        e = [0] * 5
+        for i, j, weight, to in (
+            (0, 0, 1, 0), (0, 1, 1, 1), (0, 2, 1, 2), (1, 1, 2, 2), (1, 2, 1, 3), (2, 2, 1, 4),
+        ):  # fmt: skip
+            e[to] += weight * form(columns[i], columns[j])
+        return [Fraction(c, d * Q44 * Q44) for c, d in zip(e, _DIVISORS, strict=True)]
 
     def ways(self) -> list[Fraction]:
         """Distances in x, y, z and along the segment, mm."""
@@ -59,7 +61,7 @@ class Segment:
 
     def ratio(self) -> Fraction:
         """Of the greatest to the least Bernstein coefficient of sigma; 0 where one is not positive."""
-        sigma = self.hodograph()[3]
+        sigma = self._coefficients(_sigma)
         return max(sigma) / min(sigma) if min(sigma) > 0 else Fraction(0)
 
     def beziers(self) -> list[list[Fraction]]:

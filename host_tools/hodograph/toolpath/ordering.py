@@ -493,9 +493,8 @@ class _Sequence:
         if i + 1 < n:
             saved += _distance(last, self._first[i + 1]) - _distance(before, self._first[i + 1])
         # Place k is after visit k; place -1 is at the start.
-        places = np.array(
-            [k for k in range(begin - 1, end + 1) if k not in (i - 1, i)], dtype=np.int64
-        )
+        places = np.arange(begin - 1, end + 1)
+        places = places[(places < i - 1) | (places > i)]
         if not len(places):
             return 0.0
         left = np.where((places >= 0)[:, None], self._last[places], self._start)

@@ -26,6 +26,7 @@ from hodograph.bus.capture.setpoint_check import (
 from hodograph.errors import RunError
 from hodograph.native import NativeProgram
 from hodograph.pipeline import load_pipeline
+from marks import long
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 NODES = (2, 3)
@@ -315,7 +316,9 @@ def streamed(setpoints: NDArray[np.int32]) -> Stream:
     return stream
 
 
-@pytest.mark.parametrize("name", ["alpha", "heart", "star", "alpha_optimal", "heart_optimal"])
+@pytest.mark.parametrize(
+    "name", ["alpha", long("heart"), "star", "alpha_optimal", long("heart_optimal")]
+)
 def test_whole_programs_pass_and_each_jump_in_them_is_found(name: str) -> None:
     pipeline = load_pipeline(EXAMPLES / f"{name}.toml")
     machine = pipeline.machine

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Campaign files in a temporary folder, over a short path. Loaded by pytest; writes to temporary folders."""
+"""Campaign files in a temporary folder, over a short path; stops are planned once. Loaded by pytest; writes to
+temporary folders.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +9,15 @@ from pathlib import Path
 
 import pytest
 from campaign_files import EXAMPLES, PATH, Write
+
+from shared_programs import stops_planned_once
+
+__all__ = ["stops_planned_once"]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _stops(stops_planned_once: None) -> None:
+    """Many tests here compile the same paths."""
 
 
 @pytest.fixture

@@ -21,9 +21,9 @@ from campaign_files import Write
 from hodograph.cli.main import main
 
 TEXT = """
-paths = ["{examples}/heart.toml"]
+paths = ["path.toml"]
 profiles = ["quintic"]
-samples = 600
+samples = 1200
 [vary.time_constant_s]
 factor_uniform = [0.8, 1.2]
 [vary.gain_rad_s_v]
@@ -133,13 +133,13 @@ def test_a_cluster_gives_the_same_table(
             assert child.returncode == 0, reported.decode()
     assert far == campaign(file, tmp_path / "near", "--workers", "1")
     assert (tmp_path / "lost" / "runs.csv").read_bytes() == far
-    assert far.count(b"plant figures must be positive") == 600
+    assert far.count(b"plant figures must be positive") == 1200
     assert "Traceback" not in capfd.readouterr().err + reported.decode()
 
 
 def test_ctrl_c_is_one_line(write: Write, tmp_path: Path) -> None:
     """A terminal sends it to all processes; the next start goes on."""
-    endless = TEXT.replace("samples = 600", "samples = 50000")
+    endless = TEXT.replace("samples = 1200", "samples = 20000")
     with under_way(write(endless), tmp_path / "out") as child:
         os.killpg(child.pid, signal.SIGINT)
         _, reported = child.communicate(timeout=HANGS_S)

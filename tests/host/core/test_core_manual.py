@@ -23,7 +23,6 @@ WARNINGS = (
     "-Wpedantic",
     "-Wconversion",
     "-Werror",
-    "-O2",
     "-ffp-contract=off",
 )
 FRAME = """

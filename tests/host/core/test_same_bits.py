@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
+from core_sources import FIRMWARE, point_sources
 from marks import long
 
 ROOT = Path(__file__).resolve().parents[3]
-FIRMWARE = ROOT / "firmware"
 PROGRAMS = ROOT / "tests" / "data" / "programs"
 NAMES = (
     "alpha_exponential",
@@ -33,7 +33,6 @@ BUILDS = [(c, o) for c in COMPILERS for o in ("-O0", "-O2", "-O3")]
 
 def build(compiler: str, level: str, target: Path) -> Path:
     """The printing program, compiled."""
-    sources = [str(p) for p in sorted((FIRMWARE / "core").glob("*.c"))]
     subprocess.run(
         [
             compiler,
@@ -42,7 +41,7 @@ def build(compiler: str, level: str, target: Path) -> Path:
             "-ffp-contract=off",
             f"-I{FIRMWARE}",
             str(Path(__file__).with_name("print_bits.c")),
-            *sources,
+            *point_sources(),
             "-o",
             str(target),
         ],

@@ -18,10 +18,9 @@ from typing import Any
 import mpmath as mp
 import pytest
 
+from core_sources import FIRMWARE, point_sources
 from spatial_image import Q40, Q44, Extra, Segment, bernstein, like
 
-ROOT = Path(__file__).resolve().parents[3]
-FIRMWARE = ROOT / "firmware"
 KERNELS = ("fixed", "float", "double")
 BOUND_MM = {"fixed": 2.0**-36, "float": 5e-6, "double": 3e-11}
 EXTRA_BOUND = {"fixed": 1e-6, "float": 1e-5, "double": 1e-9}
@@ -147,11 +146,10 @@ class Exact:
 @pytest.fixture(scope="module")
 def points(tmp_path_factory: pytest.TempPathFactory) -> Callable[[list[str]], list[list[int]]]:
     target = tmp_path_factory.mktemp("core") / "segment_points"
-    sources = [str(p) for p in sorted((FIRMWARE / "core").glob("*.c"))]
     command = ["gcc", "-std=c99", "-O1", "-ffp-contract=off", "-fsanitize=undefined"]
     command += ["-fno-sanitize-recover=undefined", f"-I{FIRMWARE}"]
     own = str(Path(__file__).with_name("segment_points.c"))
-    subprocess.run([*command, own, *sources, "-o", str(target)], check=True)
+    subprocess.run([*command, own, *point_sources(), "-o", str(target)], check=True)
 
     def ask(lines: list[str]) -> list[list[int]]:
         text = "\n".join([*lines, "0"]) + "\n"

@@ -238,7 +238,7 @@ def derivatives(case: Case, samples: int) -> tuple[np.ndarray, np.ndarray]:
 
     By Taylor series: that of s(xi) is reversed, put into the curve, and F(t) into that.
     """
-    coefficients = [power_series(one) for one in case.segments]
+    series = [PowerSeries.of(one) for one in case.segments]
     starts = np.array([one.start for one in case.segments]) / Q40
     rows, which = [], []
     pieces = case.feed.pieces
@@ -254,7 +254,7 @@ def derivatives(case: Case, samples: int) -> tuple[np.ndarray, np.ndarray]:
             speeds = [f.deriv(k)(tau) / scale**k for k in (1, 2, 3)]
             for nudged in (s - 1e-9, s + 1e-9):  # both sides of a joint
                 k = int(np.clip(np.searchsorted(starts, nudged, side="right") - 1, 0, None))
-                rows.append(motion(*coefficients[k], s - starts[k], speeds))
+                rows.append(motion(series[k], s - starts[k], speeds))
                 which.append(i)
     return np.moveaxis(np.array(rows), 1, 0), np.array(which)
 
@@ -268,35 +268,41 @@ def reached(f: np.polynomial.Polynomial, way: float, end: float) -> float:
     return low
 
 
-def power_series(one: Segment) -> tuple[list[np.polynomial.Polynomial], np.polynomial.Polynomial]:
-    """Positions of the axes and arc length as polynomials of xi."""
-    xi = np.polynomial.Polynomial([0, 1])
-    axes = [one.at_powers(k) for k in range(3 + len(one.extras) + 1)]
-    polynomials = [np.polynomial.Polynomial(c) + 0 * xi for c in axes]
-    return polynomials[:-1], polynomials[-1]
+@dataclass(frozen=True)
+class PowerSeries:
+    """Derivatives of order 0 to 3 of the axes, (4, axes, 6) coefficients, and of the arc length, (4, 6), by xi."""
+
+    axes: np.ndarray
+    arc: np.ndarray
+
+    @classmethod
+    def of(cls, one: Segment) -> PowerSeries:
+        rows = np.array([one.at_powers(k) for k in range(3 + len(one.extras) + 1)])
+        orders = [rows]
+        for _ in range(3):
+            orders.append(np.pad(orders[-1][:, 1:] * np.arange(1, 6), ((0, 0), (0, 1))))
+        stacked = np.array(orders)
+        return cls(stacked[:, :-1], stacked[:, -1])
 
 
-def motion(
-    axes: list[np.polynomial.Polynomial],
-    arc: np.polynomial.Polynomial,
-    s: float,
-    speeds: list[float],
-) -> list[list[float]]:
-    xi = s / arc(1.0)
+def motion(series: PowerSeries, s: float, speeds: list[float]) -> np.ndarray:
+    """Velocity, acceleration and jerk (3, axes) at an arc length that changes with these derivatives by time."""
+    xi = s / series.arc[0].sum()
     for _ in range(8):
-        xi -= (arc(xi) - s) / arc.deriv()(xi)
-    c1, c2, c3 = arc.deriv(1)(xi), arc.deriv(2)(xi) / 2, arc.deriv(3)(xi) / 6
-    back = np.polynomial.Polynomial([0, 1 / c1, -c2 / c1**3, (2 * c2**2 - c1 * c3) / c1**5])
-    way = np.polynomial.Polynomial([0, speeds[0], speeds[1] / 2, speeds[2] / 6])
-    out: list[list[float]] = [[], [], []]
-    for axis in axes:
-        local = np.polynomial.Polynomial(
-            [axis.deriv(k)(xi) / math.factorial(k) if k else 0.0 for k in range(4)]
-        )
-        series = local(back(way)).coef
-        for k in (1, 2, 3):
-            out[k - 1].append(series[k] * math.factorial(k))
-    return out
+        value, slope = series.arc[:2] @ xi ** np.arange(6)
+        xi -= (value - s) / slope
+    c1, c2, c3 = series.arc[1:] @ xi ** np.arange(6) / (1, 2, 6)
+    back = (1 / c1, -c2 / c1**3, (2 * c2**2 - c1 * c3) / c1**5)
+    by_time = composed(np.array(back), np.array(speeds) / (1, 2, 6))
+    along = series.axes[1:] @ xi ** np.arange(6) / np.array([[1], [2], [6]])
+    return composed(along, by_time) * np.array([[1], [2], [6]])
+
+
+def composed(outer: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Coefficients of orders 1 to 3 of a power series whose variable is another one, both without constants."""
+    p1, p2, p3 = outer
+    q1, q2, q3 = inner
+    return np.array([p1 * q1, p1 * q2 + p2 * q1**2, p1 * q3 + 2 * p2 * q1 * q2 + p3 * q1**3])
 
 
 def at_all_rates(case: Case, at_one: np.ndarray, which: np.ndarray) -> np.ndarray:
@@ -317,9 +323,15 @@ def at_all_rates(case: Case, at_one: np.ndarray, which: np.ndarray) -> np.ndarra
 
 
 @pytest.fixture(scope="module")
-def peaks(six: Case) -> np.ndarray:
+def at_one(six: Case) -> tuple[np.ndarray, np.ndarray]:
+    """`derivatives` of the program of six axes."""
+    return derivatives(six, 60)
+
+
+@pytest.fixture(scope="module")
+def peaks(six: Case, at_one: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """The greatest velocity, acceleration and jerk (3, 6) of the axes, at every rate."""
-    return np.asarray(at_all_rates(six, *derivatives(six, 60)).max(axis=1))
+    return np.asarray(at_all_rates(six, *at_one).max(axis=1))
 
 
 @pytest.mark.parametrize("quantity", range(3))
@@ -484,12 +496,13 @@ def test_stops_of_a_spatial_program_keep_the_limits_of_all_axes(
         assert not run_trials(program, replace(hold, axis_jerk=narrow), fault, 100, seed=3).kept
 
 
-def test_what_a_spatial_program_uses_is_what_its_axes_do(six: Case) -> None:
+def test_what_a_spatial_program_uses_is_what_its_axes_do(
+    six: Case, at_one: tuple[np.ndarray, np.ndarray]
+) -> None:
     program = NativeProgram(six.image())
     used = StopSearch(program).used(StopLimits(acceleration=1.0, jerk=1.0))
-    at_one, _ = derivatives(six, 40)
     for found, rows in zip(
-        (used.axis_velocity, used.axis_acceleration, used.axis_jerk), at_one, strict=True
+        (used.axis_velocity, used.axis_acceleration, used.axis_jerk), at_one[0], strict=True
     ):
         assert np.array(found) == pytest.approx(np.abs(rows).max(axis=0), rel=0.02)
 

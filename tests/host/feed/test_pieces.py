@@ -200,9 +200,23 @@ def plans(draw: st.DrawFn) -> FeedPlan:
         raise
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=25, deadline=None)
 @given(plans())
-def test_pieces_join_and_end_exactly(plan: FeedPlan) -> None:
+def test_pieces_join_and_end_exactly_and_keep_the_rules_of_the_format(plan: FeedPlan) -> None:
+    join_and_end_exactly(plan)
+    keep_the_rules_of_the_format(plan)
+
+
+@pytest.mark.long
+@settings(max_examples=120, deadline=None)
+@given(plans())
+def test_pieces_of_more_plans(plan: FeedPlan) -> None:
+    join_and_end_exactly(plan)
+    keep_the_rules_of_the_format(plan)
+
+
+def join_and_end_exactly(plan: FeedPlan) -> None:
+    """F, its feed and its acceleration go on from piece to piece."""
     pieces = plan.pieces
     ends = []
     for piece in pieces:
@@ -226,9 +240,8 @@ def test_pieces_join_and_end_exactly(plan: FeedPlan) -> None:
     assert pieces.total_q32_s == round(plan.curve.time_s * 2**32)
 
 
-@settings(max_examples=60, deadline=None)
-@given(plans())
-def test_pieces_keep_the_rules_of_the_format(plan: FeedPlan) -> None:
+def keep_the_rules_of_the_format(plan: FeedPlan) -> None:
+    """Ranges, lengths and durations of pieces, and no feed backwards."""
     pieces = plan.pieces
     assert np.abs(pieces.c_q40).max() <= 2**54
     joints = np.append(pieces.start_q40, round(plan.length_mm * 2**40))

@@ -26,6 +26,9 @@ from hodograph.program.stop_planning import LongStopError
 from hodograph.program.stop_reserve import StopPlaces, zones_at_places
 from hodograph.program.stops import FAULT
 from hodograph.section_pipeline import SectionPipeline
+from marks import long
+
+pytestmark = pytest.mark.usefixtures("stops_planned_once")
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 FIVE_AXES = EXAMPLES / "machines/mill_five_axes.toml"
@@ -57,7 +60,7 @@ def on_machine(name: str, stop_time_ms: int, **limits: str) -> Pipeline:
     return Pipeline(replace(file, limits=replace(file.limits, **limits)), machine)
 
 
-@pytest.mark.parametrize("seed", [4, 10])
+@pytest.mark.parametrize("seed", [4, long(10)])
 def test_a_short_path_of_five_axes_is_planned_again(tmp_path: Path, seed: int) -> None:
     made = load_pipeline(five_axes_file(tmp_path, seed, OPTIMAL), allow_space=True)
     program = made.program
@@ -114,7 +117,7 @@ def corner(folder: Path, stop_time_ms: int) -> SectionPipeline:
     return load_job(file, replace(mill, stop_time_ms=stop_time_ms)).only_section("test").pipeline
 
 
-@pytest.mark.parametrize("stop_time_ms", [100, 60])
+@pytest.mark.parametrize("stop_time_ms", [long(100), 60])
 def test_a_section_of_a_toolpath_is_planned_with_less_feed(
     tmp_path: Path, stop_time_ms: int
 ) -> None:

@@ -152,12 +152,28 @@ def test_long_pieces_that_gain_nothing_stay_whole(tmp_path: Path) -> None:
     assert (made.program.pieces.duration_q32_s * 2.0**-32).max() > 0.2
 
 
-@pytest.mark.parametrize("example", ["alpha", "helix"])
-def test_the_same_stops_in_every_call(example: str, monkeypatch: pytest.MonkeyPatch) -> None:
+BEND_IN_SPACE = f"""
+[path]
+closed = false
+through = [[20, 0, 0], [14, 14, 1], [0, 20, 2]]
+[feed]
+profile = "optimal"
+[machine]
+file = "{EXAMPLES / "machines/mill.toml"}"
+"""
+
+
+@pytest.mark.parametrize("text", [None, BEND_IN_SPACE], ids=["alpha", "space"])
+def test_the_same_stops_in_every_call(
+    text: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Other tests plan the stops of a motion once, and rely on that (shared_programs.py): also in space, and where
     only the name of the program differs.
     """
-    own = load_pipeline(EXAMPLES / f"{example}.toml", allow_space=True)
+    file = EXAMPLES / "alpha.toml" if text is None else tmp_path / "bend.toml"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    own = load_pipeline(file, allow_space=True)
     monkeypatch.setattr(compiler, "plan_stops", shared_programs._stops)
     first, second = (pipeline_of(own.file) for _ in range(2))
     assert first.image == own.image

@@ -125,6 +125,6 @@ def test_a_fault_stop_that_takes_too_long_is_refused_with_its_place(tmp_path) ->
     text = text.replace("../drives", str(ROOT / "examples/drives"))
     machine = tmp_path / "machine.toml"
     machine.write_text(text, encoding="utf-8")
-    pipeline = load_pipeline(ROOT / "examples/alpha_optimal.toml", machine)
+    pipeline = load_pipeline(ROOT / "examples/alpha.toml", machine)
     with pytest.raises(PlanError, match=r"fault stop at arc length .* stop_time_ms = 10"):
         _ = pipeline.program

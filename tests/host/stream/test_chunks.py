@@ -44,6 +44,7 @@ from hodograph.stream.simulation import (
 from hodograph.stream.tails import Tails
 from hodograph.stream.windows import SectionFeed
 from hodograph.toolpath.files import ReadOptions
+from marks import long
 
 ROOT = Path(__file__).resolve().parents[3]
 MOST = 16 * 1024
@@ -198,7 +199,7 @@ def test_fewer_pieces_are_shared_where_there_is_no_room(tmp_path: Path, machine:
     assert min(chunk.header.shared_pieces for chunk in chunks[1:]) < LEAST_SHARED_PIECES
 
 
-@pytest.mark.parametrize("most", [4000, 3400])
+@pytest.mark.parametrize("most", [4000, long(3400)])
 def test_axes_rest_where_no_chunk_goes_on(tmp_path: Path, machine: Machine, most: int) -> None:
     """At the end of a chunk, rather than that the job ends with an error."""
     file = tmp_path / "wave.ngc"
@@ -381,13 +382,13 @@ def test_what_does_not_follow_is_found(short: list[Chunk]) -> None:
         assert shared_fault(replace(two, header=changed), one) is not None
 
 
-@pytest.mark.parametrize("share", [0.9975, 0.995])
+@pytest.mark.parametrize("share", [long(0.9975), 0.995])
 def test_pieces_that_the_proof_refuses_are_slower_and_allow_less_override(
     tmp_path: Path, machine: Machine, share: float
 ) -> None:
     """The proof of the axis limits may find more between two samples than the planner. Here it finds it everywhere."""
     file = tmp_path / "walk.ngc"
-    file.write_text(_walk(0, 8, 2.0, 0.5))
+    file.write_text(_walk(0, 6, 2.0, 0.5))
     (section,) = StreamReader(file, machine, 0.01, ReadOptions()).sections()
     made = SectionChunks(machine, "walk", section.blocks, 1, MOST)
     limits = made._limits

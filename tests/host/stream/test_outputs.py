@@ -344,7 +344,7 @@ def test_the_live_page_marks_each_place_once(waves: list[list[Chunk]], machine: 
 PATHS = """
 [[path]]
 closed = false
-through = [[0, 0], [20, 8], [40, 0]]
+through = [[0, 0], [10, 4], [20, 0]]
 [[path.output]]
 name = "valve"
 at_mm = 5.0
@@ -356,7 +356,7 @@ per_mm_s = 0.5
 
 [[path]]
 closed = false
-through = [[40, 0], [52, 20], [40, 40]]
+through = [[20, 0], [32, 20], [20, 40]]
 dwell_ms = 50
 [[path.output]]
 name = "needle"
@@ -365,7 +365,7 @@ on = true
 
 [[path]]
 closed = false
-through = [[40, 40], [20, 30], [0, 0]]
+through = [[20, 40], [14, 37], [10, 32]]
 [[path.output]]
 name = "valve"
 at_mm = 0.0

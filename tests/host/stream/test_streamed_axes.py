@@ -124,7 +124,7 @@ def test_setpoints_are_those_of_one_program(
     tmp_path: Path, machine: Machine, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     _short_windows(monkeypatch)
-    file = _written(tmp_path, _walk(seed, 60, 0.8, 10.0))
+    file = _written(tmp_path, _walk(seed, 45, 0.8, 10.0))
     (chunks,) = _sections(file, machine)
     assert len(chunks) > 2
     assert {chunk.program.axis_count for chunk in chunks} == {5}

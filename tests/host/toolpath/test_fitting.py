@@ -255,7 +255,7 @@ def test_noise_larger_than_the_chords_changes_the_time_a_little(
     chord_mm: float, noise_mm: float, share: float
 ) -> None:
     """Without care it would be several times as long."""
-    turn = np.linspace(0.0, np.pi, round(3.0 * np.pi / chord_mm) + 1)
+    turn = np.linspace(0.0, 0.5 * np.pi, round(1.5 * np.pi / chord_mm) + 1)
     points = 3.0 * np.stack((np.cos(turn), np.sin(turn)), axis=1)
     noise = np.random.default_rng(4).uniform(-noise_mm, noise_mm, size=points.shape)
     found = fitted(points + noise)
