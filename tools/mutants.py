@@ -6,12 +6,12 @@ Run by `make mutants`. Starts compilers and tests; writes to BUILD/mutation only
 
 Plants one mistake at a time (a comparison turned round, a constant one off, a statement left out) in the
 sources of an area and runs the area's tests: C sources with the unit tests that link them, under the
-sanitizers; Python modules, and C sources of the native module that no unit test links, in a copy of the
-tree with Python tests. A mistake that no test
-notices has survived: it is printed with its place. Mistakes are a random sample that depends on the
-seed alone. What is known from an earlier run (BUILD/mutation/AREA.jsonl) is not tried again for as long
-as the source stays as it is; --again tries those that survived once more. Exit status 0 whatever
-survives: a survivor is for a reader to judge. docs/validation/mutation.md has more.
+sanitizers; Python modules, and C sources of the native module, in a copy of the
+tree with Python tests. A mistake that no test notices has survived: it is printed with its place.
+Mistakes are a random sample that depends on the seed alone. What is known from an earlier run
+(BUILD/mutation/AREA.jsonl) is not tried again for as long as the source stays as it is; --again tries
+those that survived once more. Exit status 0 whatever survives: a survivor is for a reader to judge.
+docs/validation/mutation.md has more.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ import mutants
 from mutation import c_sites, python_sites
 from mutation.areas import AREAS, Area
 from mutation.native_module import NativeModule
-from mutation.outcome import KILLED, SURVIVED, Ledger, Outcome
+from mutation.outcome import INVALID, KILLED, SAME, SURVIVED, Ledger, Outcome
 from mutation.sites import Mutant
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -168,12 +168,12 @@ def test_a_mistake_is_planted_in_the_native_module(tmp_path: Path) -> None:
     path = "sim/offline/stop_usage.c"
     source = (ROOT / path).read_text(encoding="utf-8")
     changed = source.replace("share < 0.0", "share >= 0.0")
-    assert native.plant(path, changed) is True
+    assert native.plant(path, changed) is None
     asked = "import cffi, sys; lib = cffi.FFI().dlopen(sys.argv[1])"
     subprocess.run([sys.executable, "-c", asked, str(module)], check=True)
     native.restore()
     sound = (ROOT / "host_tools/hodograph/native/_native.abi3.so").read_bytes()
     assert module.read_bytes() == sound
-    assert native.plant(path, source.replace("/* SPDX", "/*  SPDX")) is False
-    assert native.plant(path, changed + "}") is None
+    assert native.plant(path, source.replace("/* SPDX", "/*  SPDX")) == SAME
+    assert native.plant(path, changed + "}") == INVALID
     assert module.read_bytes() == sound

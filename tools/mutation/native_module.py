@@ -12,6 +12,8 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from mutation.outcome import INVALID, SAME
+
 _MODULE = "host_tools/hodograph/native/_native.abi3.so"
 _ARCHIVES = ("sim", "core", "numerics")
 
@@ -25,22 +27,24 @@ class NativeModule:
         self.work = build / "mutation" / "native"
         self.work.mkdir(parents=True, exist_ok=True)
         compiler, *flags = shlex.split((build / "host/obj/flags").read_text())
-        self.compile = [compiler, *(flag for flag in flags if flag[:2] != "-W" and flag != "-g")]
+        folders = [f"-I{root / flag[2:]}" for flag in flags if flag[:2] == "-I"]
+        others = [flag for flag in flags if flag[:2] not in ("-I", "-W") and flag != "-g"]
+        self.compile = [compiler, *others, *folders]
 
-    def plant(self, path: str, changed: str) -> bool | None:
-        """Links the module with the changed source. False: the same machine code; None: it does not compile."""
+    def plant(self, path: str, changed: str) -> str | None:
+        """Links the module with the changed source. Where the change is no mistake, its outcome: INVALID or SAME."""
         made = self._object("changed", path, changed)
         if made is None:
-            return None
+            return INVALID
         plain = self._object("plain", path, (self.root / path).read_text(encoding="utf-8"))
         if plain is not None and made.read_bytes() == plain.read_bytes():
-            return False
+            return SAME
         words = ["-shared", "-o", str(self.work / "module.so")]
         words += [str(self.build / "native/hodograph/native/_native.o"), str(made)]
         words += [str(self.build / f"host/libhodograph_{name}.a") for name in _ARCHIVES]
         subprocess.run([*self.compile, *words, "-lm"], cwd=self.root, check=True)
         (self.work / "module.so").replace(self.target)
-        return True
+        return None
 
     def restore(self) -> None:
         """The sound module."""
@@ -52,11 +56,6 @@ class NativeModule:
         source.parent.mkdir(parents=True, exist_ok=True)
         source.write_text(text, encoding="utf-8")
         made = source.with_suffix(".o")
-        # Headers in the folder of the source are included without a folder.
-        words = [f"-iquote{(self.root / path).parent}", "-c", "-o", str(made), path]
-        command = [
-            *(f"-I{self.root / w[2:]}" if w[:2] == "-I" else w for w in self.compile),
-            *words,
-        ]
+        command = [*self.compile, "-c", "-o", str(made), path]
         done = subprocess.run(command, cwd=self.work / folder, capture_output=True, check=False)
         return made if done.returncode == 0 else None

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The result of one planted mistake, and the file that keeps results until the source changes. Used by tools/mutants,
-mutation/c_tests and mutation/python_tests. Reads this file and appends to it.
+mutation/c_tests, mutation/native_module and mutation/python_tests. Reads this file and appends to it.
 """
 
 from __future__ import annotations

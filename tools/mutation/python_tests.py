@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mutation.areas import Area
 from mutation.native_module import NativeModule
-from mutation.outcome import INVALID, KILLED, SAME, SURVIVED
+from mutation.outcome import INVALID, KILLED, SURVIVED
 from mutation.sites import Mutant
 
 _TIMED = re.compile(r"^([\d.]+)s (?:call|setup|teardown) +([^\s:]+)::", re.MULTILINE)
@@ -41,29 +41,27 @@ class PythonTests:
 
     def try_out(self, mutant: Mutant, source: str) -> tuple[str, str]:
         """The outcome of the mutant, and the test that found it."""
-        changed = mutant.applied(source)
-        if mutant.path.endswith(".c"):
-            return self._try_in_c(mutant.path, changed)
-        try:
-            compile(changed, mutant.path, "exec")
-        except SyntaxError:
-            return INVALID, ""
-        self._write(mutant.path, changed)
+        in_c, changed = mutant.path.endswith(".c"), mutant.applied(source)
+        no_mistake = (self.native.plant if in_c else self._plant)(mutant.path, changed)
+        if no_mistake is not None:
+            return no_mistake, ""
         try:
             by = self._run()
         finally:
-            self._write(mutant.path, source)
+            if in_c:
+                self.native.restore()
+            else:
+                self._write(mutant.path, source)
         return (KILLED, by) if by else (SURVIVED, "")
 
-    def _try_in_c(self, path: str, changed: str) -> tuple[str, str]:
-        planted = self.native.plant(path, changed)
-        if not planted:
-            return (INVALID if planted is None else SAME), ""
+    def _plant(self, path: str, changed: str) -> str | None:
+        """Writes the changed module; INVALID where Python cannot compile it."""
         try:
-            by = self._run()
-        finally:
-            self.native.restore()
-        return (KILLED, by) if by else (SURVIVED, "")
+            compile(changed, path, "exec")
+        except SyntaxError:
+            return INVALID
+        self._write(path, changed)
+        return None
 
     def _write(self, path: str, text: str) -> None:
         file = self.tree / path
