@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The rows of the stop search for the limits of axes: first to third derivatives of a path in space by its arc
-length, against differences of exact points. Run by pytest; writes to temporary folders.
+length, against differences of exact points. Run by pytest; writes nothing.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hodograph.feed import FeedRequest, Limits, plan_feed
 from hodograph.native.program import NativeProgram
 from hodograph.native.stop_search import StopLimits, StopSearch, limits_struct
 from hodograph.pipeline import load_pipeline
-from hodograph.program import compiler, encode
-from hodograph.program.stop_planning import with_bounds
+from hodograph.program import compile_program, encode
+from quick_stops import QUICK_STOPS
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 STEP_MM = 2e-3
-QUICK = 'profile = "minimax"\nnominal_mm_s = 20\nramp_time_s = 0.3'
 
 
 def differences(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -36,16 +36,10 @@ def differences(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize("name", ["helix", "five_axes"])
-def test_derivatives_of_all_axes(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    text = (EXAMPLES / f"{name}.toml").read_text().replace("machines/", f"{EXAMPLES}/machines/")
-    assert 'profile = "optimal"' in text
-    file = tmp_path / "path.toml"
-    file.write_text(text.replace('profile = "optimal"', QUICK))
-    pipeline = load_pipeline(file, allow_space=True)
-    monkeypatch.setattr(compiler, "plan_stops", lambda program, *_: with_bounds(program))
-    native = NativeProgram(encode(compiler.compile_program(pipeline.curve, pipeline.plan)))
+def test_derivatives_of_all_axes(name: str) -> None:
+    curve = load_pipeline(EXAMPLES / f"{name}.toml", allow_space=True).curve
+    plan = plan_feed(curve.length_mm, FeedRequest("minimax", 20.0, 0.3), Limits())
+    native = NativeProgram(encode(compile_program(curve, plan, QUICK_STOPS)))
     search = StopSearch(native)
     path, kept = search._path(limits_struct(StopLimits()))
     count = len(kept[0])
@@ -54,7 +48,6 @@ def test_derivatives_of_all_axes(
     found = np.array(
         [[list(path.bends[i].by_mm[order])[:axes] for i in range(count)] for order in range(3)]
     )
-    curve = pipeline.curve
     # Between joints, where the third derivative jumps.
     own = np.array([0.0, *np.cumsum(curve.segment_lengths_mm)])
     away = np.abs(s_mm[:, None] - own).min(axis=1)
