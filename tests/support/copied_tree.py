@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""A copy of the tree in which a test may change the firmware and build it. Used by tests/system/test_port_doc and
-tests/tools/test_check_image. Reads the tree with its build; writes to the folder that it is given.
+"""A copy of the tree in which a test may change the firmware and build it. Used by tests/system (test_port_doc,
+test_firmware_bytes) and tests/tools/test_check_image. Reads the tree with its build; writes to the folder that
+it is given.
 """
 
 from __future__ import annotations

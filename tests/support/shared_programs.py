@@ -46,6 +46,11 @@ def stops_planned_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="module")
+def all_stops_planned_once(stops_planned_once: None) -> None:
+    """`stops_planned_once` in all tests of the folder whose conftest.py imports both."""
+
+
 def _stops(program: Program, plan: FeedPlan, terms: StopTerms) -> Program:
     motion = replace(program, name="", events=no_events())
     limits = hold_limits(plan, terms), fault_limits(plan, terms)

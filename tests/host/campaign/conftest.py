@@ -10,14 +10,9 @@ from pathlib import Path
 import pytest
 from campaign_files import EXAMPLES, PATH, Write
 
-from shared_programs import stops_planned_once
+from shared_programs import all_stops_planned_once, stops_planned_once
 
-__all__ = ["stops_planned_once"]
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _stops(stops_planned_once: None) -> None:
-    """Many tests here compile the same paths."""
+__all__ = ["all_stops_planned_once", "stops_planned_once"]
 
 
 @pytest.fixture

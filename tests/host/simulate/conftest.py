@@ -15,9 +15,9 @@ from hodograph.feed import ControllerLimits, plan_feed
 from hodograph.program import ProgramOptions, compile_program, encode
 from hodograph.simulate import Motion, simulate
 from hodograph.spline import PHSpline, from_control_polygon
-from shared_programs import stops_planned_once
+from shared_programs import all_stops_planned_once, stops_planned_once
 
-__all__ = ["stops_planned_once"]
+__all__ = ["all_stops_planned_once", "stops_planned_once"]
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
@@ -53,8 +53,3 @@ def alpha() -> Case:
 @pytest.fixture(scope="session")
 def heart() -> Case:
     return make_case("heart")
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _stops(stops_planned_once: None) -> None:
-    """Programs of the same motion share their stops."""

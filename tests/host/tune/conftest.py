@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from hodograph.config import Drive, Machine, load_machine
-from shared_programs import stops_planned_once
+from shared_programs import all_stops_planned_once, stops_planned_once
 
-__all__ = ["stops_planned_once"]
+__all__ = ["all_stops_planned_once", "stops_planned_once"]
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 
@@ -24,8 +24,3 @@ def machine() -> Machine:
 def drives(machine: Machine) -> tuple[Drive, Drive]:
     x, y = machine.models(machine.path_axes)
     return x, y
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _stops(stops_planned_once: None) -> None:
-    """Programs of the same motion share their stops."""
