@@ -7,6 +7,7 @@ XDG_RUNTIME_DIR of the process, and makes a temporary folder.
 import os
 import signal
 import tempfile
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -32,7 +33,13 @@ for _name in ("XDG_STATE_HOME", "XDG_RUNTIME_DIR"):
     os.environ[_name] = _OWN.name
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    has_long = "not long" not in config.option.markexpr
     for item in items:
+        more = item.get_closest_marker("long_examples")
+        if more and has_long:
+            test: Any = item.obj  # type: ignore[attr-defined]
+            own = test._hypothesis_internal_use_settings
+            test._hypothesis_internal_use_settings = settings(own, max_examples=more.args[0])
         if item.get_closest_marker("long") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(LONG_TEST_LIMIT_S))

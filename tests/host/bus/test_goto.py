@@ -38,12 +38,14 @@ MACHINE = load_machine(
 COUNTS = st.integers(-200_000_000, 200_000_000)
 
 
+@pytest.mark.long_examples(100)
 @settings(max_examples=15, deadline=None)
 @given(COUNTS, COUNTS, COUNTS, COUNTS)
 def test_any_move(x0: int, y0: int, x1: int, y1: int) -> None:
     check_moves((x0, y0), (x1, y1))
 
 
+@pytest.mark.long_examples(100)
 @settings(max_examples=15, deadline=None)
 @given(COUNTS, COUNTS, st.integers(-3000, 3000), st.integers(-3000, 3000))
 def test_short_moves(x: int, y: int, dx: int, dy: int) -> None:
@@ -51,15 +53,6 @@ def test_short_moves(x: int, y: int, dx: int, dy: int) -> None:
         (x, y),
         (min(max(x + dx, -200_000_000), 200_000_000), min(max(y + dy, -200_000_000), 200_000_000)),
     )
-
-
-@pytest.mark.long
-@settings(max_examples=100, deadline=None)
-@given(COUNTS, COUNTS, COUNTS, COUNTS)
-def test_any_of_more_moves(x0: int, y0: int, x1: int, y1: int) -> None:
-    check_moves((x0, y0), (x1, y1))
-    near = tuple(min(max(a + b % 3001, -200_000_000), 200_000_000) for a, b in ((x0, x1), (y0, y1)))
-    check_moves((x0, y0), near)
 
 
 def check_moves(start: tuple[int, ...], end: tuple[int, ...], machine: Machine = MACHINE) -> None:
@@ -81,12 +74,14 @@ SPACE = load_machine(MACHINE.file.with_name("mill.toml"))
 FAR = 2_000_000_000
 
 
+@pytest.mark.long_examples(100)
 @settings(max_examples=12, deadline=None)
 @given(st.tuples(*[st.integers(-FAR, FAR)] * 3), st.tuples(*[st.integers(-FAR, FAR)] * 3))
 def test_any_move_in_space(start: tuple[int, ...], end: tuple[int, ...]) -> None:
     check_moves(start, end, SPACE)
 
 
+@pytest.mark.long_examples(100)
 @settings(max_examples=12, deadline=None)
 @given(
     st.tuples(*[st.integers(-1_900_000_000, 1_900_000_000)] * 3),
@@ -96,20 +91,6 @@ def test_short_moves_and_moves_along_an_axis(
     start: tuple[int, ...], distance: tuple[int, ...]
 ) -> None:
     check_moves(start, tuple(a + b for a, b in zip(start, distance, strict=True)), SPACE)
-
-
-@pytest.mark.long
-@settings(max_examples=100, deadline=None)
-@given(
-    st.tuples(*[st.integers(-1_900_000_000, 1_900_000_000)] * 3),
-    st.tuples(*[st.sampled_from([0, 1, -1, 1999, -2500, 60_000_000])] * 3),
-    st.tuples(*[st.integers(-FAR, FAR)] * 3),
-)
-def test_any_of_more_moves_in_space(
-    start: tuple[int, ...], distance: tuple[int, ...], end: tuple[int, ...]
-) -> None:
-    check_moves(start, tuple(a + b for a, b in zip(start, distance, strict=True)), SPACE)
-    check_moves(start, end, SPACE)
 
 
 def test_outside_the_travel() -> None:

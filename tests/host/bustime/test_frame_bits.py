@@ -90,17 +90,10 @@ def test_crc_of_the_catalogue() -> None:
     assert crc("".join(map(str, bits[0]))) == CRC_OF_123456789
 
 
+@pytest.mark.long_examples(1000)
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(identifiers, st.integers(0, 8), payload), min_size=1, max_size=8))
 def test_exact_length_is_that_of_the_encoder(frames: list[tuple[int, int, bytes]]) -> None:
-    recorded = np.concatenate([one(*frame) for frame in frames])
-    assert exact_bits(recorded).tolist() == [len(on_the_wire(*frame)) for frame in frames]
-
-
-@pytest.mark.long
-@settings(max_examples=1000, deadline=None)
-@given(st.lists(st.tuples(identifiers, st.integers(0, 8), payload), min_size=1, max_size=8))
-def test_exact_length_of_more_frames(frames: list[tuple[int, int, bytes]]) -> None:
     recorded = np.concatenate([one(*frame) for frame in frames])
     assert exact_bits(recorded).tolist() == [len(on_the_wire(*frame)) for frame in frames]
 
@@ -113,24 +106,10 @@ def test_the_encoder_is_understood_by_a_receiver(identifier: int, size: int, dat
     assert crc(received[:-15]) == int(received[-15:], 2)
 
 
-BOUNDED = given(st.integers(0, 0x7FF), st.integers(0, 8), payload)
-
-
+@pytest.mark.long_examples(3000)
 @settings(max_examples=300, deadline=None)
-@BOUNDED
+@given(st.integers(0, 0x7FF), st.integers(0, 8), payload)
 def test_bounds_hold(identifier: int, size: int, data: bytes) -> None:
-    is_within_bounds(identifier, size, data)
-
-
-@pytest.mark.long
-@settings(max_examples=3000, deadline=None)
-@BOUNDED
-def test_bounds_hold_for_more_frames(identifier: int, size: int, data: bytes) -> None:
-    is_within_bounds(identifier, size, data)
-
-
-def is_within_bounds(identifier: int, size: int, data: bytes) -> None:
-    """The exact length of a frame is within the bounds of its size and identifier."""
     exact = int(exact_bits(one(identifier, size, data))[0])
     assert plain_bits(size) <= exact <= worst_bits(identifier, size) <= generic_worst_bits(size)
 

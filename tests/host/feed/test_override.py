@@ -19,31 +19,17 @@ from hodograph.feed.override_levels import (
     seconds_per_s2,
 )
 
-OVERRIDDEN = given(
+
+@pytest.mark.long_examples(200)
+@settings(max_examples=20, deadline=None)
+@given(
     st.sampled_from(("quintic", "exponential", "minimax")),
     st.floats(1.0, 450.0),
     st.floats(0.03, 1.0),
     st.floats(0.0, 0.3),
     st.integers(0, 2**32 - 1),
 )
-"""Profile, feed, ramp time, reserve and the seed of the motion of the override."""
-
-
-@settings(max_examples=20, deadline=None)
-@OVERRIDDEN
 def test_no_motion_of_the_override_breaks_a_limit(profile, feed, time, reserve, seed) -> None:
-    limits_are_kept(profile, feed, time, reserve, seed)
-
-
-@pytest.mark.long
-@settings(max_examples=200, deadline=None)
-@OVERRIDDEN
-def test_no_motion_of_more_breaks_a_limit(profile, feed, time, reserve, seed) -> None:
-    limits_are_kept(profile, feed, time, reserve, seed)
-
-
-def limits_are_kept(profile: str, feed: float, time: float, reserve: float, seed: int) -> None:
-    """By the extremes of what the pieces of a plan allow, and by motions within."""
     controller = ControllerLimits(500.0, 5000.0, 200000.0, reserve)
     limits = Limits(450.0, 4500.0, 150000.0)
     plan = plan_feed(300.0, FeedRequest(profile, feed, time), limits, controller)

@@ -187,21 +187,10 @@ def run(case: Case, seed: int) -> tuple[dict[str, float], set[State]]:
     return worst_ratio(case, t, rate, slope, second), states
 
 
+@pytest.mark.long_examples(40)
 @settings(max_examples=5, deadline=None, derandomize=True)
 @given(st.integers(0, 2**20))
 def test_no_command_breaks_a_limit_of_the_axes(seed: int) -> None:
-    limits_are_kept(seed)
-
-
-@pytest.mark.long
-@settings(max_examples=40, deadline=None, derandomize=True)
-@given(st.integers(0, 2**20))
-def test_no_command_of_more_breaks_a_limit_of_the_axes(seed: int) -> None:
-    limits_are_kept(seed)
-
-
-def limits_are_kept(seed: int) -> None:
-    """By a random program under random commands."""
     ratio, _ = run(random_case(seed), seed)
     for name, value in ratio.items():
         # What needs no reserve may be passed by a plan of "optimal" as far as any limit: 0.1 %.

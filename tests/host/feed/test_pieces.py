@@ -200,17 +200,10 @@ def plans(draw: st.DrawFn) -> FeedPlan:
         raise
 
 
+@pytest.mark.long_examples(120)
 @settings(max_examples=25, deadline=None)
 @given(plans())
 def test_pieces_join_and_end_exactly_and_keep_the_rules_of_the_format(plan: FeedPlan) -> None:
-    join_and_end_exactly(plan)
-    keep_the_rules_of_the_format(plan)
-
-
-@pytest.mark.long
-@settings(max_examples=120, deadline=None)
-@given(plans())
-def test_pieces_of_more_plans(plan: FeedPlan) -> None:
     join_and_end_exactly(plan)
     keep_the_rules_of_the_format(plan)
 

@@ -61,35 +61,18 @@ def test_report_lists_what_exceeds_and_leaves_the_feed() -> None:
     assert "above its limit" in plan.excesses[0].excess_text
 
 
-LIMITED = given(
+@pytest.mark.long_examples(100)
+@settings(max_examples=15, deadline=None)
+@given(
     st.sampled_from(("quintic", "exponential", "minimax")),
     st.floats(5.0, 1000.0),
     st.floats(0.02, 1.0),
     st.floats(100.0, 20000.0),
     st.floats(5e3, 1e6),
 )
-"""Profile, feed, ramp time, limits of acceleration and jerk."""
-
-
-@settings(max_examples=15, deadline=None)
-@LIMITED
 def test_respect_keeps_the_limits_and_wastes_little(
     profile, feed, time, acceleration, jerk
 ) -> None:
-    keeps_the_limits(profile, feed, time, acceleration, jerk)
-
-
-@pytest.mark.long
-@settings(max_examples=100, deadline=None)
-@LIMITED
-def test_respect_keeps_more_limits(profile, feed, time, acceleration, jerk) -> None:
-    keeps_the_limits(profile, feed, time, acceleration, jerk)
-
-
-def keeps_the_limits(
-    profile: str, feed: float, time: float, acceleration: float, jerk: float
-) -> None:
-    """A plan keeps these limits, and where they lower the feed it uses them."""
     limits = Limits(None, acceleration, jerk)
     plan = plan_feed(5000.0, FeedRequest(profile, feed, time), limits)
     assert plan.peak_acceleration_mm_s2 <= acceleration * (1.0 + 1e-9)
@@ -101,7 +84,8 @@ def keeps_the_limits(
         assert "limits" in plan.notes[0]
 
 
-@settings(max_examples=40, deadline=None)
+@pytest.mark.long_examples(100)
+@settings(max_examples=15, deadline=None)
 @given(
     st.sampled_from(("quintic", "exponential", "minimax")),
     st.floats(0.01, 200.0),

@@ -127,7 +127,10 @@ def test_a_piece_that_starts_before_its_predecessor_is_named(piece: int) -> None
     assert python[0] == ProgramError.JOIN_LENGTH
 
 
-COMPILED = given(
+@example("exponential", 19.0, 1.0, 5, 1000, 0)
+@pytest.mark.long_examples(200)
+@settings(max_examples=12, deadline=None)
+@given(
     st.sampled_from(("quintic", "exponential", "minimax")),
     st.floats(0.05, 450.0),
     st.floats(0.003, 2.0),
@@ -135,27 +138,7 @@ COMPILED = given(
     st.sampled_from((1000, 2000, 4000, 8000)),
     st.integers(0, 10**6),
 )
-"""Profile, feed, ramp time, degree, period and the seed of a path."""
-
-
-@example("exponential", 19.0, 1.0, 5, 1000, 0)
-@settings(max_examples=12, deadline=None)
-@COMPILED
 def test_whatever_is_compiled_is_accepted(profile, feed, ramp, degree, period_us, seed) -> None:
-    accepted(profile, feed, ramp, degree, period_us, seed)
-
-
-@pytest.mark.long
-@settings(max_examples=200, deadline=None)
-@COMPILED
-def test_more_of_what_is_compiled(profile, feed, ramp, degree, period_us, seed) -> None:
-    accepted(profile, feed, ramp, degree, period_us, seed)
-
-
-def accepted(
-    profile: str, feed: float, ramp: float, degree: int, period_us: int, seed: int
-) -> None:
-    """A random path with this feed is compiled; the controller's check takes it and counts the same ticks."""
     rng = np.random.default_rng(seed)
     if seed % 3:
         turn = np.cumsum(rng.uniform(-0.4, 0.4, 8))
